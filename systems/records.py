@@ -105,11 +105,6 @@ SWEEPS = Section(
     search_upper=vectors(),
     caught=ints("int32"),  # impacts one after the other with what cannot be moved
     last_impact=floats(),  # s since the start of the step
-    cluster_root=ints("int32"),
-    cluster_next=ints("int32"),
-    cluster_tail=ints("int32"),
-    cluster_inverse_mass=floats(),
-    cluster_holder=ints("int32"),  # what cannot be moved and holds it, or -1
 )  # fmt: skip
 EVALUATIONS = Section(
     "body", "integrator", "the integrator evaluates forces more than once, or flies exactly",
@@ -305,7 +300,7 @@ IMPACTS = Schema(
     # the loop
     listed=integer(),  # pairs in the worklist
     linked=flag(),  # ``heads`` and ``links`` are those of the pairs
-    clusters_version=integer(),  # of the rows, when those of static bodies became clusters
+    swept_version=integer(),  # of the rows, when the impacts of static bodies were set to none
     may_sink=flag(),  # through something thin, at the speed of contacts at rest
     touchdown_pair=integer(),  # the last one of whose bodies landings were searched
     touchdown_time=number(),  # the time of its impact while they are searched, else 0

@@ -29,9 +29,10 @@ from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, mix, mix_f
 from ..shapes.tolerances import contact_margin, slop_of, smaller_extent
 from ..turning import carried, surface_velocity, turning_mass
 from .heap import heap_push
-from .impulses import BOUNCE, CROSS, FREE, SLIDE, STICK, STOP, STOPPED, TOUCHDOWN, is_deflected, is_rattling
+from .impulses import BOUNCE, CROSS, FREE, SLIDE, STOP, STOPPED, TOUCHDOWN, is_deflected, is_rattling
 
 QUICK = 1e-3  # of the step: inelastic impacts closer than this in time are treated as inelastic collapse
+MOST_PLASTIC = 1000  # impacts of a body in a step after which those beyond the cap are none any more
 MOST_LOOKS = 16_000_000  # at pairs in a step, of elastic impacts too: some seconds, then what meets is stopped
 
 NO_TOUCH, OVERLAPS_AT_END, SWEPT = range(3)
@@ -178,7 +179,8 @@ def correct_speed(state, a, b, touch, speed, dt):
 
 @part
 def kind_beyond_cap(state, a, b, path, t, speed, restitution, dt):
-    """STOP, STICK or SLIDE for a pair of which a body has had all the impacts it may have; -1: none, it is left."""
+    """What becomes of a pair of which a body has had all the impacts it may have: STOP or SLIDE; BOUNCE, once more, but
+    without restitution, if impacts that lose energy follow each other at once; -1: none, it is left."""
     bodies = state.bodies
     count, inverse_mass = bodies.impact_count, bodies.inverse_mass
     still = (count[a] >= STOPPED or inverse_mass[a] == 0.0) and (count[b] >= STOPPED or inverse_mass[b] == 0.0)
@@ -190,14 +192,10 @@ def kind_beyond_cap(state, a, b, path, t, speed, restitution, dt):
         return -1
     if restitution == 1.0 and is_rattling(state, a, b):
         return SLIDE
-    one, two = bodies.cluster_root[a], bodies.cluster_root[b]
-    movable = one != two and bodies.cluster_inverse_mass[one] + bodies.cluster_inverse_mass[two] > 0.0
-    movable = movable and max(count[a], count[b]) < STOPPED  # what meets something stopped keeps its momentum, as that
     since_last = t - max(bodies.last_impact[a], bodies.last_impact[b])
     collapse = restitution <= 0.0 or (restitution < 1.0 and since_last <= QUICK * dt)
-    if movable and (collapse or (state.mode == EVENT_DRIVEN and since_last <= 0.0)):
-        return STICK
-    return STOP
+    collapse |= state.mode == EVENT_DRIVEN and since_last <= 0.0
+    return BOUNCE if collapse and max(count[a], count[b]) < MOST_PLASTIC else STOP
 
 
 @part
@@ -296,9 +294,8 @@ def queue_next_impact(state, c, since, dt):
         event_kind = -1
         if impacts.sweeps:
             event_kind = kind_beyond_cap(state, a, b, path, t, speed, e, dt)
+        impacts.capped += event_kind in (-1, BOUNCE)
         if event_kind < 0:
-            impacts.capped += 1
             return
-        if event_kind == STICK:
-            e = 0.0
+        e = 0.0 if event_kind == BOUNCE else e
     queue_event(state, c, event_kind, path, touch, speed, e)

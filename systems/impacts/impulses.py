@@ -1,4 +1,4 @@
-"""What an impact does to its bodies: an impulse; beyond the cap of impacts, sticking together, or standing still.
+"""What an impact does to its bodies: an impulse; beyond the cap of impacts, standing still.
 
 A body's path within the step is x(t) = origin + p1 t + p2 t^2 + p3 t^3. An impact at time t changes the velocity by
 dv; the path becomes the one of a body that has travelled with dv all along and stood at origin - dv t at the start, so
@@ -18,11 +18,10 @@ from ..narrow_phase.manifolds import forget_manifold
 from ..turning import turn_at
 
 STOPPED = 1 << 30  # added to a body's impacts: it moves no more in this step, and the solver leaves it alone
-STUCK = 1 << 29  # in the impacts that the cap counts: no cap is that high, so a body that stuck once goes on to stick
 
-# Kinds of events: an impact, one that no cap counts, one that is too slow to bounce, two beyond the cap, a crossing of
+# Kinds of events: an impact, one that no cap counts, one that is too slow to bounce, one beyond the cap, a crossing of
 # what does not push, and one of what is caught between two walls.
-BOUNCE, FREE, TOUCHDOWN, STICK, STOP, CROSS, SLIDE = range(7)
+BOUNCE, FREE, TOUCHDOWN, STOP, CROSS, SLIDE = range(6)
 FEW, CAUGHT = 16, 1000  # impacts of a body in a step, one after the other with what stands still
 
 
@@ -91,88 +90,6 @@ def bounce(state, event, dt):
     if state.spinning:
         turn_at(bodies, (a, b), impacts.event_normal[event], scale(impacts.event_pull[event], mass), dt - now)
     log_impact(state, event, impacts.event_change[event] * mass)
-
-
-@part
-def rate_of(state, i, now):
-    """The velocity of body i, also of one that has been stopped until the step ends."""
-    bodies = state.bodies
-    return bodies.linear_velocity[i] if bodies.impact_count[i] >= STOPPED else rate_along(path_of(state, i), now)
-
-
-@part
-def mean_rate(state, root, now):
-    """The velocity of a cluster's centre of mass, of its bodies that can be moved; one that is held moves as what holds
-    it: what strikes it must not gain from how fast it slides along that, as if it had no end of mass."""
-    bodies, i, mass, total = state.bodies, root, 0.0, zero_of(state)
-    if bodies.inverse_mass[root] > 0.0 and bodies.cluster_inverse_mass[root] == 0.0:
-        holder = bodies.cluster_holder[root]
-        return rate_along(path_of(state, holder), now) if holder >= 0 else total
-    rate = rate_along(path_of(state, root), now)
-    while i >= 0:
-        if bodies.inverse_mass[i] > 0.0:
-            weight = 1.0 / bodies.inverse_mass[i]
-            total, mass = add_scaled(total, rate_of(state, i, now), weight), mass + weight
-        i = bodies.cluster_next[i]
-    return scale(total, 1.0 / mass) if mass > 0.0 else rate
-
-
-@part
-def can_stick(state, event):
-    """Whether the clusters of an event still are two, and one of them can be moved: others may have changed since."""
-    bodies, c = state.bodies, state.impacts.event_pair[event]
-    a, b = bodies.cluster_root[state.pairs.a[c]], bodies.cluster_root[state.pairs.b[c]]
-    return a != b and bodies.cluster_inverse_mass[a] + bodies.cluster_inverse_mass[b] > 0.0
-
-
-@part
-def stick(state, event, dt):
-    """Beyond the cap what loses energy sticks together until the step ends: a plastic impact of two clusters.
-
-    The inverse mass of a cluster, at its root, is 0 once it sticks to something that cannot be moved. Returns the root
-    of the one that has grown.
-    """
-    impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
-    root, following, lightness = bodies.cluster_root, bodies.cluster_next, bodies.cluster_inverse_mass
-    inverse_mass, c = bodies.inverse_mass, impacts.event_pair[event]
-    a, b, now = root[pairs.a[c]], root[pairs.b[c]], impacts.event_time[event]
-    impulse = impacts.event_change[event] / (lightness[a] + lightness[b])
-    closing = max(0.0, -dot(sub(mean_rate(state, b, now), mean_rate(state, a, now)), impacts.event_normal[event]))
-    impulse = min(impulse, 2.0 * closing / (lightness[a] + lightness[b]))  # more would add energy
-    for side in range(2):
-        i = a if side == 0 else b
-        dv = scale(impacts.event_normal[event], (-impulse if side == 0 else impulse) * lightness[i])
-        while i >= 0:
-            if inverse_mass[i] > 0.0:
-                bodies.impact_count[i] += 1
-                bodies.counted_impacts[i] |= STUCK
-                deflect(state, i, dv, now, dt)
-            i = following[i]
-    log_impact(state, event, impulse)
-    impacts.capped += 1
-    one_fixed, other_fixed = inverse_mass[pairs.a[c]] == 0.0, inverse_mass[pairs.b[c]] == 0.0
-    if one_fixed or other_fixed:  # that is in no cluster: others touch it too
-        held = b if one_fixed else a
-        lightness[held], bodies.cluster_holder[held] = 0.0, pairs.a[c] if one_fixed else pairs.b[c]
-        return held
-    join_clusters(bodies, a, b)
-    return a
-
-
-@part
-def join_clusters(bodies, a, b):
-    """The cluster with root b becomes part of the one with root a."""
-    lightness, following = bodies.cluster_inverse_mass, bodies.cluster_next
-    heavy = lightness[a] == 0.0 or lightness[b] == 0.0
-    if lightness[a] > 0.0:
-        bodies.cluster_holder[a] = bodies.cluster_holder[b]
-    lightness[a] = 0.0 if heavy else 1.0 / (1.0 / lightness[a] + 1.0 / lightness[b])
-    following[bodies.cluster_tail[a]] = b
-    bodies.cluster_tail[a] = bodies.cluster_tail[b]
-    i = b
-    while i >= 0:
-        bodies.cluster_root[i] = a
-        i = following[i]
 
 
 @part

@@ -14,7 +14,7 @@ from ..narrow_phase.stages import find_hasty
 from .bounds_exit import update_bounds_exit_time
 from .find import queue_next_impact
 from .heap import heap_pop
-from .impulses import CROSS, SLIDE, STICK, STOPPED, TOUCHDOWN, bounce, can_stick, slide, stick, stop
+from .impulses import CROSS, SLIDE, STOPPED, TOUCHDOWN, bounce, slide, stop
 from .together import EQUAL, holds, put_back
 from .worklist import lacks_room, list_contacts, list_landings, list_neighbours, list_pair, list_pairs_of
 
@@ -64,7 +64,7 @@ def begin_impacts(state, dt):
     impacts.active = impacts.sweeps or any_restitution(state)
     impacts.may_sink = impacts.sweeps and may_sink(state, dt)
     if impacts.sweeps:
-        begin_clusters(state)
+        begin_sweeps(state)
     impacts.waiting = impacts.listed = 0
     impacts.linked, impacts.touchdown_pair, impacts.touchdown_time = False, -1, 0.0
     impacts.until = state.neighbours_known_until if impacts.sweeps else math.inf
@@ -78,16 +78,13 @@ def begin_impacts(state, dt):
 
 
 @part
-def begin_clusters(state):
-    """Every body is a cluster of its own. Impacts change nothing of static ones."""
+def begin_sweeps(state):
+    """No body has had an impact. Impacts change nothing of static ones."""
     impacts, bodies = state.impacts, state.bodies
-    known = impacts.clusters_version == state.version
+    known = impacts.swept_version == state.version
     for i in range(state.first if known else 0, state.moving if known else state.count):
-        bodies.caught[i] = 0
-        bodies.last_impact[i], bodies.cluster_inverse_mass[i] = -1.0, bodies.inverse_mass[i]
-        bodies.cluster_root[i], bodies.cluster_next[i], bodies.cluster_tail[i] = i, -1, i
-        bodies.cluster_holder[i] = -1
-    impacts.clusters_version = state.version
+        bodies.caught[i], bodies.last_impact[i] = 0, -1.0
+    impacts.swept_version = state.version
 
 
 @part
@@ -109,19 +106,12 @@ def next_event(state):
 
 @part
 def take_swept_event(state, event, dt):
-    """Carry out what happens to swept bodies alone: a crossing, sticking together, standing still."""
+    """Carry out what happens to swept bodies alone: a crossing, standing still, sliding."""
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
     c, kind = impacts.event_pair[event], impacts.event_kind[event]
     if kind == CROSS:
         pairs.crossed[c] = True
         impacts.crossings += 1
-        return
-    if kind == STICK and can_stick(state, event):
-        i = stick(state, event, dt)
-        while i >= 0:
-            update_bounds_exit_time(state, i, dt)
-            list_pairs_of(state, i, -1)
-            i = bodies.cluster_next[i]
         return
     if kind in (SLIDE, TOUCHDOWN):
         impacts.capped += 1 if kind == SLIDE else 0

@@ -127,7 +127,7 @@ class Sleepers:
         if placed == self._placed:
             return
         self._placed = placed
-        state.support_version = state.impacts.clusters_version = -1
+        state.support_version = state.impacts.swept_version = -1
         if rows != state.first:
             state.first = rows
             state.statics_version += 1
@@ -144,12 +144,7 @@ class Sleepers:
             return
         self._leave_out(0)
         state.force_first, state.all_still = 0, False
-        if len(bodies.cluster_root):
-            here = np.arange(rows)
-            bodies.caught[:rows], bodies.last_impact[:rows] = 0, -1.0
-            bodies.cluster_root[:rows] = bodies.cluster_tail[:rows] = here
-            bodies.cluster_next[:rows] = bodies.cluster_holder[:rows] = -1
-            bodies.cluster_inverse_mass[:rows] = bodies.inverse_mass[:rows]
+        bodies.caught[:rows], bodies.last_impact[:rows] = 0, -1.0
 
     def look(self) -> None:
         """Code of the game has run within the step, before the flight."""

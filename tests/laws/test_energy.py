@@ -141,8 +141,8 @@ def test_rooms_under_gravity_gain_nothing(seed, mode, e, masses, maker):
 
 @pytest.mark.parametrize("mode", SWEPT)
 def test_what_slides_along_a_wall_does_not_strike_as_the_wall(mode):
-    """A ball that has had all its impacts sticks to the floor and slides on at 60 m/s. Held by the floor it cannot be
-    pushed, and what it meets must not bounce off it as off a floor of that speed: a ball of a ton would get 60 m/s."""
+    """A ball that has had all its impacts slides along the floor at 60 m/s. Held by the floor it cannot be pushed, and
+    what it meets must not bounce off it as off a floor of that speed: a ball of a ton would get 60 m/s."""
     with make_world(2, collision=mode, max_impacts_per_step=1, on_fault="ignore") as world:
         box(world, (0.0, -1.0), half=(20.0, 1.0), kind="static")
         ball(world, (0.0, 0.53), (60.0, -6.0))
