@@ -220,7 +220,7 @@ def turn_bodies(state, dt, spin):
     """bodies turn"""
     bodies, parts = state.bodies, 1 if len(zero_of(state)) == 2 else 3
     for i in range(state.first, state.moving):
-        if not spin.present[i] or bodies.still[i] != 0:
+        if not spin.present[i] or bodies.still[i] > 0:
             continue
         if i >= state.dynamic:
             turn_about(state, i, scale(spin_of(state, spin, i), dt))
@@ -237,7 +237,7 @@ def turn_bodies(state, dt, spin):
 
 
 @spinning.stage(
-    after="check_flight", records=(Spin,), reads=("spin.angular_velocity", "still"),
+    after="check_flight", records=(Spin,), reads=("spin.angular_velocity",),
     writes=("spin", "inverse_inertia", "rolling_radius", "turn"), needed="colliders",
 )  # fmt: skip
 def share_spins(state, dt, spin):
@@ -246,7 +246,7 @@ def share_spins(state, dt, spin):
     state.spinning = True
     for i in range(state.count):
         w = zero
-        if state.first <= i < state.moving and spin.present[i] and bodies.still[i] == 0:
+        if state.first <= i < state.moving and spin.present[i]:
             w = spin_of(state, spin, i)
         bodies.spin[i], bodies.turn[i] = w, scale(w, dt)
         bodies.inverse_inertia[i], bodies.rolling_radius[i] = 0.0, 0.0

@@ -66,7 +66,8 @@ class Extensions:
         reads, writes = ({name for stage in stages for name in getattr(stage, what)} for what in ("reads", "writes"))
         kept = {name for name in writes if name in OF_TABLE or self._table.has_column(name)}.difference(MADE_AGAIN)
         self.written = ColumnCopies(self._table, tuple(sorted(kept)))
-        self._scene.read_by_plugins, self._scene.moments_asked = reads - writes, "shapes" in reads
+        own = {name for name in writes if "." in name}  # no stage writes what sleeps, see docs/write-a-stage.md
+        self._scene.read_by_plugins, self._scene.moments_asked = (reads - writes) | own, "shapes" in reads
 
     def _bind(self, program: Program) -> None:
         """Rows for all columns that the stages name, and the addresses of what they have of their own."""

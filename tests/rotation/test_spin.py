@@ -222,6 +222,31 @@ def test_what_spins_stays_awake_and_what_has_stopped_sleeps():
         assert angle == pytest.approx(4.0)
 
 
+@pytest.mark.parametrize("way", range(4))
+def test_what_the_game_does_to_the_spin_of_a_sleeper_wakes_it(way):
+    """It rolls then as one that never slept: m r v + I w about the ground stays, k = 1/2."""
+    with space(gravity=(0, -10), sleeping=True) as world:
+        world.create_entity(Transform((0, -1)), RigidBody(kind="static"), AABBCollider((50, 1), friction=0.5))
+        entity = world.create_entity(Transform((0, 0.5)), RigidBody(), Spin(), SphereCollider(0.5, friction=0.5))
+        for _ in range(100):
+            world.step()
+        body, spin = world.component_for_entity(entity, RigidBody), world.component_for_entity(entity, Spin)
+        assert body.asleep
+        if way == 0:
+            spin.angular_velocity = -5.0
+        elif way == 1:
+            world.bodies.spin.angular_velocity[world.bodies.rows_of([entity])] = -5.0
+        elif way == 2:
+            spin.apply_impulse((1, 0), (0, 0.9))
+        else:
+            spin.apply_torque(-20.0)
+        for _ in range(60):
+            world.step()
+        about_ground = (5 * 0.125, 5 * 0.125, 0.9, 20 / 60)[way]
+        assert not body.asleep
+        assert body.linear_velocity[0] == pytest.approx(about_ground / (0.5 + 0.125 / 0.5), rel=1e-9)
+
+
 def test_plain_esper_calls_and_bulk_creation_do_the_same():
     hashes = []
     for way in range(3):
