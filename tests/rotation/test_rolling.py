@@ -287,3 +287,21 @@ def test_a_bin_of_spinning_discs_comes_to_rest_and_never_gains(seed, e):
         bodies = world.bodies.dynamic
         assert np.abs(bodies.linear_velocity).max() < 0.05
         assert np.abs(bodies.spin.angular_velocity).max() < 0.2
+
+
+@pytest.mark.parametrize("mass", [100.0, 1000.0])
+def test_friction_goes_on_to_turn_what_slips_in_place_under_a_heavy_body(mass):
+    """In a corner, with mu at floor and wall: r mu m g (1 + mu) / (1 + mu^2). The bodies rest to rounding, and the
+    substeps of an island that rests are not all solved."""
+    mu, r = 0.1, 0.5
+    with plane(2, friction=mu) as world:
+        world.create_entity(Transform((-1.5, 0)), RigidBody(kind="static"), AABBCollider((1, 9), friction=mu))
+        entity = ball(world, (0, r), 0.0, 1e6, r, 1.0, friction=mu)
+        world.create_entity(Transform((0, 1.5)), RigidBody(mass), AABBCollider((0.45, 0.5), friction=0.0))
+        for _ in range(1200):
+            world.step()
+        before = motion(world, entity)[1][2]
+        for _ in range(60):
+            world.step()
+        lost = before - motion(world, entity)[1][2]
+    assert lost == pytest.approx(r * mu * (mass + 1) * G * (1 + mu) / (1 + mu * mu) / (r * r / 2), rel=1e-3)

@@ -235,6 +235,9 @@ def is_still(solver, dt, span):
         fastest = max(fastest, dot(solver.velocity[q], solver.velocity[q]))
     for k in range(start, stop):
         extent = min(extent, solver.extent[k])
+    for q in range(begin, end if solver.spinning else begin):  # friction that slips goes on to turn them
+        change = scale(sub(solver.spin[q], solver.spin_before[q]), solver.rolling_radius[q])
+        fastest = max(fastest, dot(change, change))
     if not math.sqrt(fastest) * dt <= STILL * extent:
         return False
     changes = False
