@@ -261,13 +261,18 @@ def find_round(state, dt, spin, sphere):
     """which bodies roll, and their inertia"""
     bodies, parts = state.bodies, 1 if len(zero_of(state)) == 2 else 3
     for i in range(state.first, state.moving):
-        rolls = spin.present[i] and sphere.present[i] and (bodies.inverse_mass[i] > 0.0 or i >= state.dynamic)
-        if rolls and is_zero(state.colliders.offset[bodies.collider_slot[i], i]):
+        if not (spin.present[i] and sphere.present[i]):
+            continue
+        shape = bodies.levels[0, i]
+        several = state.several_levels and bodies.levels[state.level_count - 1, i] != shape  # another one decides
+        if several or not is_zero(state.colliders.offset[state.shapes.slots[shape], i]):
+            continue
+        if i >= state.dynamic:
             bodies.rolling_radius[i] = sphere.radius[i]
-            if i < state.dynamic:
-                xx, yy, moment, _, _, _ = inertia_of(state, spin, i)
-                if moment > 0.0 and (parts == 1 or (xx == yy == moment)):
-                    bodies.inverse_inertia[i] = 1.0 / moment
+        elif bodies.inverse_mass[i] > 0.0:
+            xx, yy, moment, _, _, _ = inertia_of(state, spin, i)
+            if moment > 0.0 and (parts == 1 or xx == yy == moment):  # else its surface would push for ever
+                bodies.rolling_radius[i], bodies.inverse_inertia[i] = sphere.radius[i], 1.0 / moment
 
 
 @spinning.stage(

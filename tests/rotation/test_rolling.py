@@ -305,3 +305,28 @@ def test_friction_goes_on_to_turn_what_slips_in_place_under_a_heavy_body(mass):
             world.step()
         lost = before - motion(world, entity)[1][2]
     assert lost == pytest.approx(r * mu * (mass + 1) * G * (1 + mu) / (1 + mu * mu) / (r * r / 2), rel=1e-3)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_ball_with_other_inertia_about_each_axis_takes_no_energy_from_nowhere(mode):
+    """Contacts do not turn it, so its surface must not push either."""
+    with plane(3, collision=mode) as world:
+        entity = ball(world, (0, 0.5, 0), spin=-20.0)
+        world.component_for_entity(entity, Spin).inertia = (0.2, 0.2, 0.3)
+        for _ in range(60):
+            world.step()
+        v, w = motion(world, entity)
+    assert np.abs(v).max() < 1e-9
+    assert w == pytest.approx((0, 0, -20.0))
+
+
+def test_a_box_within_a_sphere_that_only_sorts_out_pairs_does_not_roll():
+    found = []
+    for around in ((), (SphereCollider(1.0, friction=0.3),)):
+        with plane(2, friction=0.3) as world:
+            box = BoxCollider((0.5, 0.5), friction=0.3)
+            entity = world.create_entity(Transform((0, 0.5)), RigidBody(1.0, (5, 0)), Spin(0.0, 0.1), box, *around)
+            for _ in range(20):
+                world.step()
+            found.append((*motion(world, entity)[0], *motion(world, entity)[1]))
+    assert found[0] == found[1]
