@@ -73,16 +73,15 @@ class Spin(Component):
     def apply_force(self, force: Vector, at: Vector) -> None:
         """Push with ``force``, (d,) N, at a point of the world, (d,) m."""
         push, arm = self._checked(FORCE, force), self._arm(at)
+        self._turn(_cross(arm, push))  # first: this may be refused
         self._handle(RigidBody).apply_force(push)
-        self._turn(_cross(arm, push))
 
     def apply_impulse(self, impulse: Vector, at: Vector) -> None:
         """Change both velocities at once by an impulse, (d,) N s, at a point of the world, (d,) m."""
         push, arm, body = self._checked(IMPULSE, impulse), self._arm(at), self._handle(RigidBody)
         if body.kind == "dynamic":
-            change = self._turned_by(_cross(arm, push))
+            self.angular_velocity = self.angular_velocity + self._turned_by(_cross(arm, push))  # may be refused
             body.apply_impulse(push)
-            self.angular_velocity = self.angular_velocity + change
 
     def velocity_at(self, point: Vector) -> np.ndarray:
         """(d,) m/s: the velocity of the body's point that is there."""
@@ -112,9 +111,9 @@ class Spin(Component):
         """The change of the angular velocity by an angular impulse, N m s, along the world's axes."""
         moments = self.moments
         if not np.ndim(moments):
-            return float(twist) / moments if moments > 0.0 else 0.0
+            return float(twist / moments) if moments > 0.0 else 0.0
         axes = _matrix(self._in_world().column("rotation")[self._in_world().find(self._entity)])
-        return axes @ np.linalg.solve(moments, axes.T @ twist)
+        return axes @ np.linalg.pinv(moments, hermitian=True) @ axes.T @ twist  # 0 about an axis without inertia
 
     def _turn(self, torque: Any) -> None:
         if self._store is None or self._handle(RigidBody).kind == "dynamic":

@@ -332,3 +332,29 @@ def test_wrong_values_of_spin_are_refused_where_they_are_given():
             world.step()
         world.bodies.spin.angular_velocity[0] = 1.0
         assert world.state_hash() == at
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_push_that_is_refused_changes_nothing(d):
+    with space(d) as world:
+        entity = world.create_entity(Transform((0,) * d), RigidBody(), Spin(), SphereCollider(1))
+        world.step()
+        spin, at = world.component_for_entity(entity, Spin), world.state_hash()
+        with pytest.raises(ValueError, match=rf"entity {entity}: Spin.angular_velocity must be at most 1e\+150"):
+            spin.apply_impulse((0, 1e10, 0)[:d], at=(1e200, 0, 0)[:d])
+        spin.apply_torque(1.7e308 if d == 2 else (0, 0, 1.7e308))
+        pushed = world.state_hash()
+        finite = rf"entity {entity}: Spin.applied_torque must be finite"
+        with np.errstate(over="ignore"), pytest.raises(ValueError, match=finite):
+            spin.apply_force((0, 1e304, 0)[:d], at=(1e4, 0, 0)[:d])
+        assert world.state_hash() == pushed != at
+
+
+def test_an_impulse_does_not_turn_a_rod_about_its_own_axis():
+    """It has no inertia about it."""
+    with space(3) as world:
+        entity = world.create_entity(Transform((0, 0, 0)), RigidBody(3.0), Spin(), BoxCollider((1, 0, 0)))
+        world.step()
+        spin = world.component_for_entity(entity, Spin)
+        spin.apply_impulse((0, 2, 1), at=(1, 1, 0))  # twist (1, -1, 2), inertia (0, 1, 1)
+        assert spin.angular_velocity == pytest.approx((0, -1, 2))
