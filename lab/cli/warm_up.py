@@ -18,12 +18,13 @@ import click
 from rich.console import Console
 
 from ... import scenes
-from ...components import AABBCollider, SphereCollider
+from ...components import AABBCollider, RigidBody, SphereCollider, Transform
 from ...framework import Settings, World
 from ...framework.compilation import log
 from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_folder, clear_cache, used
 from ...framework.jit.prebuilt import INDEX, OFF, PORTABLE, write_index
 from ...plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
+from ...plugins.rotation import BoxCollider, Rotation, Spin
 from ..reporting.progress import Progress
 from ..reporting.text import TextTable
 from .loading import Loaded, load, stdout_kept_clean
@@ -112,6 +113,7 @@ def _work(targets: tuple[str, ...], everything: bool, dimensions: set[int]) -> I
         for d in sorted(dimensions):
             yield f"spheres and boxes, {d}D", lambda d=d: prepare_built_in(d)
             yield f"shapes of the plugins, {d}D", lambda d=d: prepare_shipped_plugins(d)
+            yield f"bodies that spin, {d}D", lambda d=d: prepare_rotation(d)
     names = [name for name in scenes.names() if scenes.get(name).dimensions in dimensions] if everything else targets
     for loaded in [load(name) for name in names]:  # report missing scenes before anything compiles
         yield loaded.name, lambda loaded=loaded: _prepare_scene(loaded)
@@ -131,6 +133,14 @@ def prepare_shipped_plugins(dimensions: int) -> None:
     shapes = [shape for plugin in plugins for shape in plugin.shapes if dimensions in shape.dimensions]
     with closing(World(Physics(dimensions=dimensions), *plugins)) as world:
         world.prepare(SphereCollider, AABBCollider, *shapes)
+
+
+def prepare_rotation(dimensions: int) -> None:
+    """What worlds need in which spheres and boxes spin."""
+    with closing(World(Physics(dimensions=dimensions), Rotation())) as world:
+        for collider in (SphereCollider(0.5), BoxCollider(0.5)):
+            world.create_entity(Transform((0.0,) * dimensions), RigidBody(), Spin(), collider)
+        world.prepare()
 
 
 def _prepare_scene(loaded: Loaded) -> None:

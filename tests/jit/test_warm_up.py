@@ -73,6 +73,7 @@ def names_of_work(monkeypatch, *arguments):
     done = []
     monkeypatch.setattr(warm_up, "prepare_built_in", lambda d: done.append(d))
     monkeypatch.setattr(warm_up, "prepare_shipped_plugins", lambda d: done.append(f"plugins {d}"))
+    monkeypatch.setattr(warm_up, "prepare_rotation", lambda d: done.append(f"spins {d}"))
     monkeypatch.setattr(warm_up, "_prepare_scene", lambda loaded: done.append(loaded.name))
     result = CliRunner().invoke(cli, ["warm-up", *arguments])
     assert result.exit_code == 0, result.stderr
@@ -80,12 +81,13 @@ def names_of_work(monkeypatch, *arguments):
 
 
 def test_what_is_to_be_compiled_can_be_chosen(monkeypatch):
-    assert names_of_work(monkeypatch) == [2, "plugins 2", 3, "plugins 3"]
-    assert names_of_work(monkeypatch, "--dimensions", "3") == [3, "plugins 3"]
+    everything = [2, "plugins 2", "spins 2", 3, "plugins 3", "spins 3"]
+    assert names_of_work(monkeypatch) == everything
+    assert names_of_work(monkeypatch, "--dimensions", "3") == [3, "plugins 3", "spins 3"]
     assert names_of_work(monkeypatch, "jump", "gas2d") == ["jump", "gas2d"]
     flat = [name for name in scenes.names() if scenes.get(name).dimensions == 2]
-    assert names_of_work(monkeypatch, "--all", "--dimensions", "2") == [2, "plugins 2", *flat]
-    assert names_of_work(monkeypatch, "--all") == [2, "plugins 2", 3, "plugins 3", *scenes.names()]
+    assert names_of_work(monkeypatch, "--all", "--dimensions", "2") == [2, "plugins 2", "spins 2", *flat]
+    assert names_of_work(monkeypatch, "--all") == [*everything, *scenes.names()]
 
 
 @pytest.mark.parametrize(
