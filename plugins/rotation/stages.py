@@ -21,7 +21,7 @@ from ...systems.shapes.dispatch import second_moments
 from .free_rotation import diagonalised, product, rotate, turn_freely
 
 TRIPLE = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))  # of the step: the outer two of Yoshida's three
-SLOW = 1e-4  # rad in a step: what turns slower may fall asleep
+SLOW = 1e-4  # rad in a step: what turns slower may fall asleep, if it is dynamic
 NOT_FINITE = f"Spin.angular_velocity must be finite, at most {FASTEST_TURN:g} rad/s"
 
 spinning = Plugin("stages of rotation")
@@ -305,5 +305,5 @@ def take_spins(state, dt, spin, sphere):
 def keep_spinning_awake(state, dt, spin):
     """what turns does not fall asleep"""
     for i in range(state.first, state.moving):
-        if spin.present[i] and length(spin_of(state, spin, i)) * dt > SLOW:
+        if spin.present[i] and length(spin_of(state, spin, i)) * dt > (SLOW if i < state.dynamic else 0.0):
             state.bodies.rest_steps[i] = 0

@@ -247,6 +247,17 @@ def test_what_the_game_does_to_the_spin_of_a_sleeper_wakes_it(way):
         assert body.linear_velocity[0] == pytest.approx(about_ground / (0.5 + 0.125 / 0.5), rel=1e-9)
 
 
+@pytest.mark.parametrize("collider", [(), (SphereCollider(1),)])
+def test_the_slow_hand_of_a_clock_does_not_fall_asleep(collider):
+    hour = math.tau / 43200
+    with space(sleeping=True) as world:
+        colliders = [one.copy() for one in collider]
+        hand = world.create_entity(Transform((0, 0)), RigidBody(kind="kinematic"), Spin(hour), *colliders)
+        for _ in range(300):
+            world.step()
+        assert world.component_for_entity(hand, Transform).rotation == pytest.approx(5 * hour)
+
+
 def test_plain_esper_calls_and_bulk_creation_do_the_same():
     hashes = []
     for way in range(3):
