@@ -26,6 +26,7 @@ from typing import Any
 import llvmlite.binding
 from numba.core import compiler
 from numba.core.caching import _Cache
+from numba.core.runtime import _nrt_python
 from numba.core.serialize import dumps
 
 from . import prebuilt
@@ -125,9 +126,17 @@ def _read(path: Path) -> Any:
         return None
 
 
+@functools.cache
+def _name_runtime() -> None:
+    """Name numba's runtime to the linker, as numba does before it first compiles: errors of plugins' stages call it."""
+    for name, address in _nrt_python.c_helpers.items():
+        llvmlite.binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+
+
 def _loaded(context: Any, library: Any, description: Any, *rest: Any) -> Any:
     """A kernel from its file, without what only the compiler needs: numba's own functions, which the first kernel that
     has to compile loads, and its code in LLVM's language, which is read when another kernel has it compiled in."""
+    _name_runtime()
     name, kind, (code, inlinable) = library
     nothing = llvmlite.binding.parse_assembly("").as_bitcode()
     symbols = "llvm_func_name", "llvm_cpython_wrapper_name", "llvm_cfunc_wrapper_name"
