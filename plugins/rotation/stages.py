@@ -22,7 +22,10 @@ from .free_rotation import diagonalised, product, rotate, turn_freely
 
 TRIPLE = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))  # of the step: the outer two of Yoshida's three
 SLOW = 1e-4  # rad in a step: what turns slower may fall asleep, if it is dynamic
-NOT_FINITE = f"Spin.angular_velocity must be finite, at most {FASTEST_TURN:g} rad/s"
+NOT_FINITE = (
+    f"Spin.angular_velocity must be finite, at most {FASTEST_TURN:g} rad/s: it, a torque or the damping is none"
+)
+NOT_POSITIVE = "Spin.inertia must be positive and finite"
 
 spinning = Plugin("stages of rotation")
 
@@ -38,6 +41,10 @@ def inertia_of(state, spin, i):
     """(xx, yy, zz, xy, xz, yz) of the inertia of body i about its position, along its own axes; in a plane zz alone."""
     d, bodies = len(zero_of(state)), state.bodies
     if spin.inertia[i, 0] == spin.inertia[i, 0]:
+        for k in range(1 if d == 2 else 3):
+            if not 0.0 < spin.inertia[i, k] < math.inf:
+                state.blamed = i + 1
+                raise ValueError(NOT_POSITIVE)
         if d == 2:
             return 0.0, 0.0, spin.inertia[i, 0], 0.0, 0.0, 0.0
         return spin.inertia[i, 0], spin.inertia[i, 1], spin.inertia[i, 2], 0.0, 0.0, 0.0
@@ -300,10 +307,16 @@ def take_spins(state, dt, spin, sphere):
 
 
 @spinning.stage(
-    before="update_sleep", records=(Spin,), reads=("spin.angular_velocity",), writes=("rest_steps",), needed="sleeping"
-)
+    before="update_sleep", records=(Spin,),
+    reads=("spin.angular_velocity", "spin.constant_torque", "spin.applied_torque", "spin.step_torque"),
+    writes=("rest_steps",), needed="sleeping",
+)  # fmt: skip
 def keep_spinning_awake(state, dt, spin):
-    """what turns does not fall asleep"""
+    """what turns, or is to, does not fall asleep"""
     for i in range(state.first, state.moving):
-        if spin.present[i] and length(spin_of(state, spin, i)) * dt > (SLOW if i < state.dynamic else 0.0):
-            state.bodies.rest_steps[i] = 0
+        if spin.present[i]:
+            pushed = False
+            for k in range(1 if len(zero_of(state)) == 2 else 3):
+                pushed |= torque_on(spin, i, k) != 0.0
+            if pushed or length(spin_of(state, spin, i)) * dt > (SLOW if i < state.dynamic else 0.0):
+                state.bodies.rest_steps[i] = 0

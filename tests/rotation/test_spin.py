@@ -343,6 +343,19 @@ def test_wrong_values_of_spin_are_refused_where_they_are_given():
             world.step()
         world.bodies.spin.angular_velocity[0] = 1.0
         assert world.state_hash() == at
+        world.bodies.spin.inertia[0] = -1.0
+        with pytest.raises(StepError, match=rf"entity {entity}: ValueError: Spin.inertia must be positive"):
+            world.step()
+
+
+def test_a_small_torque_turns_what_could_sleep():
+    with space(sleeping=True) as world:
+        entity = world.create_entity(
+            Transform((0, 0)), RigidBody(), Spin(inertia=1.0, constant_torque=0.005), SphereCollider(1)
+        )
+        for _ in range(300):
+            world.step()
+        assert world.component_for_entity(entity, Spin).angular_velocity == pytest.approx(0.025)
 
 
 @pytest.mark.parametrize("d", [2, 3])
