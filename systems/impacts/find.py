@@ -79,7 +79,7 @@ def find_touch(state, c, a, b, path, since, restitution, dt):
         if passive and (not swept or state.pairs.crossed[c]):
             return NO_TOUCH, nothing
         if swept:
-            stride = FAST * smaller_extent(bodies, a, b) / travel * dt
+            stride = FAST * smaller_extent(bodies, a, b) / travel * dt if travel > 0.0 else dt
             limits = rest_edge(state, a, b, dt), stride, bounce_threshold(state, a, b)
     if not swept:
         if restitution > 0.0:

@@ -14,6 +14,7 @@ from carom.framework import Settings, World
 from carom.plugins import Physics
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
+pytestmark = pytest.mark.plain
 METHODS = {"explicit_euler": 1, "semi_implicit_euler": 1, "velocity_verlet": 2, "yoshida4": 4, "rk4": 4}
 # Of the free top: splitting is of order 2 whatever the order of torques.
 FREE_ORDER = {"explicit_euler": 2, "semi_implicit_euler": 2, "velocity_verlet": 2, "yoshida4": 4, "rk4": 4}

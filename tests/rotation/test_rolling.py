@@ -45,6 +45,7 @@ def motion(world, entity):
 # -- on a slope -----------------------------------------------------------------------------------
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
 def test_on_a_slope_it_rolls_or_slips_as_newton_says(d, mode):
@@ -65,6 +66,7 @@ def test_on_a_slope_it_rolls_or_slips_as_newton_says(d, mode):
         assert (abs(slip) < 1e-9) == (times < 1), slip
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize("d", [2, 3])
 def test_the_angle_follows_the_way(d):
     """x = r angle while it rolls, to the first step's share."""
@@ -78,6 +80,7 @@ def test_the_angle_follows_the_way(d):
     assert -0.5 * angle == pytest.approx(x, rel=1e-3)
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("spin", [0.0, 30.0, -30.0])
 def test_a_ball_that_slides_comes_to_roll_with_the_momentum_about_the_ground(d, spin):
@@ -95,6 +98,7 @@ def test_a_ball_that_slides_comes_to_roll_with_the_momentum_about_the_ground(d, 
 # -- impacts --------------------------------------------------------------------------------------
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("seed", range(3))
@@ -209,6 +213,7 @@ def test_a_wheel_that_turns_drives_what_lies_on_it():
     assert np.abs(v).max() < 1e-9
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
 def test_a_bar_that_turns_throws_with_the_speed_of_its_points(d, mode):
@@ -229,6 +234,7 @@ def test_a_bar_that_turns_throws_with_the_speed_of_its_points(d, mode):
         assert v[1] == pytest.approx(u + e * (u + 2.0), rel=0.02)
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize("mode", MODES)
 def test_a_bar_that_turns_slowly_lifts_and_carries(mode):
     """A ball that cannot slip has the velocity of the point that it touches, below its centre; it stays on the bar."""
@@ -247,6 +253,7 @@ def test_a_bar_that_turns_slowly_lifts_and_carries(mode):
         assert not world.faults
 
 
+@pytest.mark.plain
 def test_a_flipper_that_may_pass_the_ball_is_told():
     with World(Physics(2, gravity=0), Rotation(), settings=Settings(on_fault="ignore")) as world:
         entity = world.create_entity(

@@ -14,6 +14,7 @@ from carom.framework import CaromError, Phase, Settings, StepError, System, Worl
 from carom.plugins import Physics, capsule, convex_polygon
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
+pytestmark = pytest.mark.plain
 SIDE = 400  # of the lattice that sums inertia
 
 
