@@ -117,6 +117,7 @@ def test_the_free_top_is_that_of_jacobis_functions_at_the_order_of_the_method(me
     assert orders[-1] == pytest.approx(FREE_ORDER[method], abs=0.15), (errors, orders)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("method", ["semi_implicit_euler", "velocity_verlet", "yoshida4"])
 def test_momentum_and_the_quaternions_length_stay_and_energy_does_not_drift(method):
     """100 s at 60 Hz: L to 1e-12 of itself, energy within dt^order, at the end as in between."""

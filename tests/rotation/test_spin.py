@@ -279,6 +279,7 @@ def test_plain_esper_calls_and_bulk_creation_do_the_same():
     assert hashes[0] == hashes[1] == hashes[2]
 
 
+@pytest.mark.compiled
 def test_a_world_with_the_plugin_but_without_a_spin_runs_the_same_stages_and_bits():
     found = []
     for plugins in ((), (Rotation(),)):
