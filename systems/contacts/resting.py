@@ -8,6 +8,7 @@ from ...framework.vectors import add_scaled, dot, item, length, replace, sub
 from ..ccd.search_bounds import FAST, is_swept
 from ..codes import OK
 from ..impacts.impulses import STOPPED, is_rattling
+from ..integration.turning import carried
 from ..narrow_phase.manifolds import (
     centre_offset,
     centre_offset_at_start,
@@ -22,7 +23,6 @@ from ..narrow_phase.manifolds import (
 )  # fmt: skip
 from ..shapes.dispatch import both_convex, mix, mix_friction
 from ..shapes.tolerances import SAME_PLACE, contact_margin, slop_for, slop_of, smaller_extent
-from ..turning import carried
 from .approach import first_touch_on_segment, meets_at_corner, segment_start
 
 ENTRY_ITERATIONS = 24

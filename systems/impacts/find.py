@@ -22,12 +22,12 @@ from ..integration.trajectory import (
     relative_path,
     travel_of,
 )
+from ..integration.turning import carried, surface_velocity, turning_mass
 from ..linking.parts import FIRST_TOUCH, call_first_touch
 from ..narrow_phase.manifolds import is_at_manifold
 from ..narrow_phase.stages import rank_rows
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, mix, mix_friction
 from ..shapes.tolerances import contact_margin, slop_of, smaller_extent
-from ..turning import carried, surface_velocity, turning_mass
 from .heap import heap_push
 from .impulses import BOUNCE, CROSS, FREE, SLIDE, STOP, STOPPED, TOUCHDOWN, is_deflected, is_rattling
 

@@ -17,8 +17,8 @@ from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 from ..integration.trajectory import rate_along, relative_path
+from ..integration.turning import surface_velocity, turn_at, turning_mass
 from ..shapes.dispatch import mix_friction
-from ..turning import surface_velocity, turn_at, turning_mass
 from .exact_sum import exact_sum
 from .impulses import FREE, deflect, log_impact, stands_still
 

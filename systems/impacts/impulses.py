@@ -14,8 +14,8 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST
 from ..integration.trajectory import along, path_of, rate_along
+from ..integration.turning import turn_at
 from ..narrow_phase.manifolds import forget_manifold
-from ..turning import turn_at
 
 STOPPED = 1 << 30  # added to a body's impacts: it moves no more in this step, and the solver leaves it alone
 

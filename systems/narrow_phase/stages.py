@@ -5,8 +5,8 @@ from __future__ import annotations
 from ...framework.compilation import inlined, part
 from ...framework.vectors import dot, length, sub
 from ..codes import NEED_ORDER, NEED_PAIRS, OK, RUN_BROAD
+from ..integration.turning import is_mill
 from ..shapes.dispatch import evaluate_batch
-from ..turning import is_mill
 from .manifolds import is_near, mark_early
 
 # Candidates are sorted by comparison if there are so many times more bodies, else by counting.

@@ -11,7 +11,7 @@ import math
 
 from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, dot, scale, sub
-from ...turning import cross_spin
+from ...integration.turning import cross_spin
 from ..constants import (
     DEEP,
     EXCESS,

@@ -9,7 +9,7 @@ import math
 
 from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, dot, scale, sub
-from ...turning import surface_velocity, turn_by, turning_mass
+from ...integration.turning import surface_velocity, turn_by, turning_mass
 
 
 @inlined

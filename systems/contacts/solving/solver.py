@@ -15,7 +15,7 @@ from ....framework.compilation import packed, part
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add, add_scaled, dot, length, scale, sub
 from ...codes import OK
-from ...turning import turn_by
+from ...integration.turning import turn_by
 from ..constants import (
     AGREED,
     AGREED_SHARE,

@@ -7,8 +7,8 @@ The spin is a vector; in 2D its first component is the angular velocity, about t
 
 from __future__ import annotations
 
-from ..framework.compilation import inlined
-from ..framework.vectors import add, add_scaled, item, length, replace, scale, sub
+from ...framework.compilation import inlined
+from ...framework.vectors import add, add_scaled, item, length, replace, scale, sub
 
 
 @inlined
