@@ -115,6 +115,9 @@ class Room:
         bodies = min(2 * state.needed, state.count)
         if bodies > len(solver.body_row):
             solver.reserve(min(with_spare(bodies), self._scene.table.capacity), *records.SOLVER_BODIES)
+        if state.spinning:
+            solver.reserve(len(solver.first), *records.SOLVER_ARMS)
+            solver.reserve(len(solver.body_row), *records.SOLVER_SPINS)
 
     def reserve_warm_start(self, rows: int) -> None:
         """Room for the impulses of so many contacts, if there is less."""

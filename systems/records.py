@@ -14,7 +14,7 @@ from ..components import Collider, RigidBody
 from ..framework.jit.records.schema import Schema, Section, flag, flags, floats, integer, ints, number, vectors
 from ..framework.schedule.stages import PROGRAM_FIELDS
 from .broad_phase.records import GRID
-from .contacts.solving.records import SOLVER, WARM_START
+from .contacts.solving.records import ARMS, SOLVER, TURNS, WARM_START
 
 
 def default_of(field: Any) -> Any:
@@ -117,7 +117,8 @@ EVALUATIONS = Section(
 SPINS = Section(
     "body", "rotation", "bodies spin: a plugin's stages say how fast, and contacts change that",
     spin=vectors(),  # rad/s; in 2D the first component
-    inverse_inertia=floats(default=0.0),  # 1 / (kg m^2), in every direction; 0: contacts do not turn it
+    inverse_inertia=vectors(),  # 1 / (kg m^2): in 2D the first component; in 3D xx, yy, zz along the world's axes,
+    inverse_products=vectors(),  # and xy, xz, yz; 0: contacts do not turn it
     rolling_radius=floats(default=0.0),  # m: of a round body; 0: its surface moves as its centre
     turn=vectors(),  # rad, in the step
 )  # fmt: skip
@@ -346,13 +347,16 @@ CONTACTS = Schema(
     steps=ints(),  # numbers of the steps that the contacts are of
 )  # fmt: skip
 
-# The solver's columns: those of contacts, but for ``starts``, and from ``bodies`` on those of bodies, islands, ranges.
-_fields = list(SOLVER.fields.items())
-_split = list(SOLVER.fields).index("bodies")
-SOLVER_CONTACTS = Section("contact", "contacts at rest", RESTED, **dict(_fields[:_split]))
-del SOLVER_CONTACTS.fields["starts"]
-SOLVER_BODIES = Section("body at rest", "contacts at rest", RESTED, **dict(_fields[_split:]))
-SOLVER.sections = SOLVER_CONTACTS, SOLVER_BODIES
+# The solver's columns: those of contacts, but for ``starts``, from ``bodies`` on those of bodies, islands, ranges, and
+# those of either that are there where bodies spin.
+_fields = dict(SOLVER.fields)
+_fields.pop("starts")
+SOLVER_ARMS = Section("contact", "rotation", "bodies spin", **{name: _fields.pop(name) for name in ARMS})
+SOLVER_SPINS = Section("body at rest", "rotation", "bodies spin", **{name: _fields.pop(name) for name in TURNS})
+_split = list(_fields).index("bodies")
+SOLVER_CONTACTS = Section("contact", "contacts at rest", RESTED, **dict(list(_fields.items())[:_split]))
+SOLVER_BODIES = Section("body at rest", "contacts at rest", RESTED, **dict(list(_fields.items())[_split:]))
+SOLVER.sections = SOLVER_CONTACTS, SOLVER_ARMS, SOLVER_BODIES, SOLVER_SPINS
 WARM_START.sections = (Section("contact", "contacts at rest", RESTED, **WARM_START.fields),)
 
 STATE = Schema(

@@ -330,6 +330,9 @@ class Scene:
         """Compile or load the functions of the shapes; sweeps: also those of swept bodies and casts."""
         if self.linked is not None:
             self.linked.fill(self.state.shapes, sweeps, self.moments_asked)
+            for number, shape in enumerate(self.linked.shapes if self.moments_asked else ()):
+                if shape.support is not None:
+                    self.parameters.need_support(number)
 
     # -- what changes from step to step -----------------------------------------------------------
 

@@ -243,57 +243,102 @@ def turn_bodies(state, dt, spin):
             spin.step_torque[i, k] = 0.0
 
 
+@part
+def inverted(xx, yy, zz, xy, xz, yz):
+    """The inverse of a symmetric matrix; about axes of the body without inertia it does not turn."""
+    if xy == 0.0 and xz == 0.0 and yz == 0.0:
+        inverse = 1.0 / xx if xx > 0.0 else 0.0, 1.0 / yy if yy > 0.0 else 0.0, 1.0 / zz if zz > 0.0 else 0.0
+        return inverse[0], inverse[1], inverse[2], 0.0, 0.0, 0.0
+    a, b, c = yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy
+    d, e, f = xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz
+    size = xx * a + xy * d + xz * e
+    if not size > 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    return a / size, b / size, c / size, d / size, e / size, f / size
+
+
+@part
+def write_inverse_inertia(state, spin, i):
+    """How impulses of contacts turn a body, along the axes of the world."""
+    bodies, nothing = state.bodies, zero_of(state)
+    xx, yy, zz, xy, xz, yz = inertia_of(state, spin, i)
+    if len(nothing) == 2:
+        bodies.inverse_inertia[i] = replace(nothing, 0, 1.0 / zz if zz > 0.0 else 0.0)
+        return
+    xx, yy, zz, xy, xz, yz = inverted(xx, yy, zz, xy, xz, yz)
+    if xx == yy == zz and xy == xz == yz == 0.0:  # round, to the bit
+        bodies.inverse_inertia[i] = replace(replace(replace(nothing, 0, xx), 1, xx), len(nothing) - 1, xx)
+        return
+    q = rotation_in_space(state, i)
+    x, y, z = rotate(q, (1.0, 0.0, 0.0), True), rotate(q, (0.0, 1.0, 0.0), True), rotate(q, (0.0, 0.0, 1.0), True)
+    along_x = xx * x[0] + xy * x[1] + xz * x[2], xy * x[0] + yy * x[1] + yz * x[2], xz * x[0] + yz * x[1] + zz * x[2]
+    along_y = xx * y[0] + xy * y[1] + xz * y[2], xy * y[0] + yy * y[1] + yz * y[2], xz * y[0] + yz * y[1] + zz * y[2]
+    along_z = xx * z[0] + xy * z[1] + xz * z[2], xy * z[0] + yy * z[1] + yz * z[2], xz * z[0] + yz * z[1] + zz * z[2]
+    diagonal = replace(replace(nothing, 0, product_of(along_x, x)), 1, product_of(along_y, y))
+    products = replace(replace(nothing, 0, product_of(along_x, y)), 1, product_of(along_x, z))
+    bodies.inverse_inertia[i] = replace(diagonal, len(nothing) - 1, product_of(along_z, z))
+    bodies.inverse_products[i] = replace(products, len(nothing) - 1, product_of(along_y, z))
+
+
+@part
+def product_of(u, v):
+    """The scalar product of two triples."""
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+
+
 @spinning.stage(
-    after="check_flight", records=(Spin,), reads=("spin.angular_velocity",),
-    writes=("spin", "inverse_inertia", "rolling_radius", "turn"), needed="colliders",
+    after="check_flight", records=(Spin,),
+    reads=(
+        "mass", "inverse_mass", "shapes", "levels", "offset", "rotation", "spin.inertia", "spin.angular_velocity",
+    ),
+    writes=("spin", "inverse_inertia", "inverse_products", "rolling_radius", "turn"), needed="colliders",
 )  # fmt: skip
 def share_spins(state, dt, spin):
-    """how fast bodies spin, for the contacts"""
+    """how fast bodies spin, and how contacts turn them"""
     bodies, zero = state.bodies, zero_of(state)
     state.spinning = True
     for i in range(state.count):
-        w = zero
-        if state.first <= i < state.moving and spin.present[i]:
+        w, moves = zero, state.first <= i < state.moving and spin.present[i]
+        if moves:
             w = spin_of(state, spin, i)
         bodies.spin[i], bodies.turn[i] = w, scale(w, dt)
-        bodies.inverse_inertia[i], bodies.rolling_radius[i] = 0.0, 0.0
+        bodies.inverse_inertia[i], bodies.inverse_products[i], bodies.rolling_radius[i] = zero, zero, 0.0
+        if moves and i < state.dynamic and bodies.inverse_mass[i] > 0.0:
+            write_inverse_inertia(state, spin, i)
 
 
 @spinning.stage(
     after="check_flight", records=(Spin, SphereCollider),
-    reads=("mass", "inverse_mass", "shapes", "levels", "offset", "spin.inertia", "sphere_collider.radius"),
-    writes=("inverse_inertia", "rolling_radius"), needed="colliders",
+    reads=("inverse_mass", "shapes", "levels", "offset", "inverse_inertia", "sphere_collider.radius"),
+    writes=("rolling_radius",), needed="colliders",
 )  # fmt: skip
 def find_round(state, dt, spin, sphere):
-    """which bodies roll, and their inertia"""
-    bodies, parts = state.bodies, 1 if len(zero_of(state)) == 2 else 3
+    """which bodies roll: contacts push on their centre, and turn them by friction alone"""
+    bodies, d = state.bodies, len(zero_of(state))
     for i in range(state.first, state.moving):
         if not (spin.present[i] and sphere.present[i]):
             continue
-        shape = bodies.levels[0, i]
+        shape, inverse, others = bodies.levels[0, i], bodies.inverse_inertia[i], bodies.inverse_products[i]
         several = state.several_levels and bodies.levels[state.level_count - 1, i] != shape  # another one decides
         if several or not is_zero(state.colliders.offset[state.shapes.slots[shape], i]):
             continue
-        if i >= state.dynamic:
+        alike = is_zero(others) and item(inverse, 0) == item(inverse, 1) == item(inverse, d - 1)
+        if d == 2 or i >= state.dynamic or alike:
             bodies.rolling_radius[i] = sphere.radius[i]
-        elif bodies.inverse_mass[i] > 0.0:
-            xx, yy, moment, _, _, _ = inertia_of(state, spin, i)
-            if moment > 0.0 and (parts == 1 or xx == yy == moment):  # else its surface would push for ever
-                bodies.rolling_radius[i], bodies.inverse_inertia[i] = sphere.radius[i], 1.0 / moment
 
 
 @spinning.stage(
     after="resolve_static_penetration",
-    records=(Spin, SphereCollider),
-    reads=("spin", "turn", "inverse_inertia"),
+    records=(Spin,),
+    reads=("spin", "turn", "inverse_mass"),
     writes=("spin.angular_velocity", "rotation", "axes"),
     needed="colliders",
 )
-def take_spins(state, dt, spin, sphere):
+def take_spins(state, dt, spin):
     """what contacts have made of the spins; the step has turned the bodies with these"""
     bodies, parts = state.bodies, 1 if len(zero_of(state)) == 2 else 3
     for i in range(state.first, state.dynamic):
-        if not (spin.present[i] and sphere.present[i] and bodies.inverse_inertia[i] > 0.0):
+        if not (spin.present[i] and bodies.inverse_mass[i] > 0.0):
             continue
         changed, further = False, bodies.turn[i]
         for k in range(parts):

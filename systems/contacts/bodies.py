@@ -7,6 +7,8 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..codes import NEED_COLUMNS, NEED_SOLVER, OK
 from ..integration.trajectory import along, path_of
+from .constants import FREQUENCY, SAG, TIPPING_FREQUENCY, TIPPING_SAG
+from .points import points_of
 from .solving.islands import order_rows
 from .solving.prediction import drop_support
 
@@ -28,6 +30,18 @@ def start_of_flight(state, i, v, a, dt):
     return add_scaled(add_scaled(there, v, -t), a, -0.5 * t * (t + dt / state.substeps))
 
 
+@part
+def list_rows(state):
+    """The pair of each contact, and which of its points; in canonical order."""
+    solver, pairs, r = state.solver, state.pairs, 0
+    for h in range(pairs.resting_count):
+        c = pairs.resting[h]
+        for e in range(points_of(state, c) if solver.tips else 1):
+            solver.pair[r], solver.point[r] = c, e
+            r += 1
+    solver.frequency, solver.sag = (TIPPING_FREQUENCY, TIPPING_SAG) if solver.tips else (FREQUENCY, SAG)
+
+
 def gather(state, dt):
     """The bodies of the contacts at rest, where the step starts; the contacts sorted by colour.
 
@@ -40,13 +54,14 @@ def gather(state, dt):
         return OK
     if len(bodies.held) == 0:
         return NEED_COLUMNS
-    if solver.contacts > len(solver.first) or min(2 * solver.contacts, state.count) > len(solver.body_row):
+    too_few = solver.contacts > len(solver.first) or min(2 * solver.contacts, state.count) > len(solver.body_row)
+    if too_few or (state.spinning and (len(solver.arm_a) == 0 or len(solver.turn) < len(solver.body_row))):
         state.needed = solver.contacts
         return NEED_SOLVER
+    list_rows(state)
     order_rows(state, dt)
     for r in range(solver.contacts):
-        c, k = pairs.resting[r], solver.slot[r]
-        solver.pair[k] = c
+        c, k = solver.pair[r], solver.slot[r]
         solver.first[k], solver.second[k] = bodies.place[pairs.a[c]], bodies.place[pairs.b[c]]
     inverse_mass, nothing = bodies.inverse_mass, zero_of(state)
     solver.movers = 0
@@ -70,12 +85,12 @@ def gather(state, dt):
                 if state.impacts.sweeps and bodies.impact_count[i] > 0:
                     x = start_of_flight(state, i, v, a, dt)
         solver.velocity[q], solver.shift[q], solver.acceleration[q] = v, x, a
-    solver.spinning = state.spinning
     for q in range(solver.bodies if state.spinning else 0):
         i = solver.body_row[q]
-        solver.spin[q], solver.rolling_radius[q] = bodies.spin[i], bodies.rolling_radius[i]
-        solver.turn[q] = nothing
-        solver.inverse_inertia[q] = bodies.inverse_inertia[i] if solver.inverse_mass[q] > 0.0 else 0.0
+        solver.spin[q], solver.turn[q] = bodies.spin[i], scale(bodies.turn[i], -1.0)  # to where the step starts
+        solver.reach[q] = length(bodies.half_extents[i]) + length(bodies.offset[i])
+        solver.inverse_inertia[q] = bodies.inverse_inertia[i]
+        solver.inverse_products[q] = bodies.inverse_products[i]
     return OK
 
 
@@ -84,7 +99,7 @@ def put_back(state, dt):
     solver, pairs, bodies = state.solver, state.pairs, state.bodies
     for r in range(solver.contacts):
         k = solver.slot[r]
-        pairs.impulse[pairs.resting[r]] += solver.total[k]
+        pairs.impulse[solver.pair[r]] += solver.total[k]
         if solver.had_impulse[k]:
             bodies.held[solver.body_row[solver.first[k]]] = True
             bodies.held[solver.body_row[solver.second[k]]] = True
@@ -95,7 +110,7 @@ def put_back(state, dt):
             bodies.position[i] = add(bodies.previous_position[i], solver.shift[q])
             bodies.linear_velocity[i] = solver.velocity[q]
             if state.spinning:
-                bodies.spin[i], bodies.turn[i] = solver.spin[q], solver.turn[q]
+                bodies.spin[i], bodies.turn[i] = solver.spin[q], add(bodies.turn[i], solver.turn[q])
     if state.any_warm_started:
         drop_support(state, dt)
     return OK

@@ -11,7 +11,9 @@ import math
 # The spring of a soft contact.
 FREQUENCY = 0.25  # times the rate of the substeps; above .5 an explicit spring is unstable
 DAMPING_RATIO = 10.0  # at the usual number of substeps; overdamped, so that pushing out gives little speed
+TIPPING_FREQUENCY = 0.125  # where pairs have several points: with .25 piles of boxes that turn never rest
 SAG = 1.0 / (2.0 * math.pi * FREQUENCY) ** 2  # of a contact that bears an impulse J per substep h: SAG J h / mass
+TIPPING_SAG = 1.0 / (2.0 * math.pi * TIPPING_FREQUENCY) ** 2
 
 # How fast overlap is pushed out. A bounded push bounds the force, so the bound grows with the load.
 DEEP = 0.03  # extents: more overlap does not push faster; .2 lets rooms of mixed masses gain energy
@@ -65,5 +67,6 @@ IDLE = 1e-9  # of the impulse that holds a body: less is none
 UNREACHED = 1e6  # extents: a row that is left to the next step
 
 # What is remembered of a step.
+NEAR_PLACE = 0.2  # extents: so near a point is the one of the step before
 TURNED = 0.5  # cosine between the normals of two steps, below which the impulses say nothing
 MOST_LOAD = 4.0  # of what forces give an island in a step: what is more was a blow, and not what holds it

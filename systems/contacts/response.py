@@ -19,7 +19,7 @@ from .events import disabled_pairs
 from .response_stages import begin_response
 from .resting import find_resting, find_touching, linearise
 from .solving.prediction import predict_rest
-from .solving.solver import solve_contacts
+from .solving.solver import solve_contacts, solve_turning_contacts
 from .solving.warm_start import match_warm_start, store_warm_start
 from .static_penetration import resolve_static_penetration
 
@@ -61,7 +61,11 @@ class Response(StagedSystem):
         ),
         Stage(
             solve_contacts, "substeps: forces, warm start, push, move, relax, guard", ("solver",), ("solver",),
-            "colliders", REST,
+            "no body spins", REST,
+        ),
+        Stage(
+            solve_turning_contacts, "the same, with the arms of the contacts", ("solver",), ("solver",), "bodies spin",
+            REST,
         ),
         Stage(put_back, "where the resting bodies are at the end", ("solver",), MOTION, "colliders", REST),
         Stage(

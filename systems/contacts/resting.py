@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from ...framework.compilation import part
+from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add_scaled, dot, item, length, replace, sub
 from ..ccd.search_bounds import FAST, is_swept
 from ..codes import OK
 from ..impacts.impulses import STOPPED, is_rattling
-from ..integration.turning import carried
 from ..narrow_phase.manifolds import (
     centre_offset,
     centre_offset_at_start,
@@ -22,8 +21,9 @@ from ..narrow_phase.manifolds import (
     make_manifold,
 )  # fmt: skip
 from ..shapes.dispatch import both_convex, mix, mix_friction
-from ..shapes.tolerances import SAME_PLACE, contact_margin, slop_for, slop_of, smaller_extent
+from ..shapes.tolerances import SAME_PLACE, contact_margin, slop_for, slop_of, smaller_extent, turning_margin
 from .approach import first_touch_on_segment, meets_at_corner, segment_start
+from .points import lay_arms, points_of
 
 ENTRY_ITERATIONS = 24
 APART = 1e-11  # of the extent: a smaller gap is none, not even as seen past a round corner
@@ -100,7 +100,7 @@ def is_resting(state, dt, c):
     hit, carried = count[a] > 0 or count[b] > 0, bodies.warm_started[a] or bodies.warm_started[b]
     if not pairs.near_contact[c] and not hit and not carried:
         return False
-    margin, d = contact_margin(state, dt, a, b), centre_offset(bodies, a, b)
+    margin, d = turning_margin(state, dt, a, b), centre_offset(bodies, a, b)
     if pairs.early[c] and not hit and is_at_manifold(pairs, c, d, smaller_extent(bodies, a, b)):  # usual
         depth, normal, far = depth_by_plane(pairs, c, d), pairs.normal[c], False
     else:
@@ -125,8 +125,10 @@ def find_resting(state, dt):
             if pairs.rests[c]:
                 pairs.resting[count] = c
                 count += 1
-    pairs.resting_count = count
-    state.solver.contacts = count
+    rows = count
+    for h in range(count if state.spinning else 0):
+        rows += points_of(state, pairs.resting[h]) - 1
+    pairs.resting_count, state.solver.contacts, state.solver.tips = count, rows, rows > count
     state.resting_counted += count
     return OK
 
@@ -169,12 +171,23 @@ def normal_varies(state, a, b, d, normal):
     return varies
 
 
+@inlined
+def repeat_row(solver, one, k):
+    """What the points of a pair have in common."""
+    solver.normal[k], solver.gap[k], solver.apart[k] = solver.normal[one], solver.gap[one], solver.apart[one]
+    solver.varies[k], solver.parting[k] = solver.varies[one], solver.parting[one]
+    solver.extent[k], solver.friction[k] = solver.extent[one], solver.friction[one]
+
+
 def linearise(state, dt):
     """Of each contact at rest the normal and the gap where the step starts, and what the solver needs of its bodies."""
     pairs, bodies, solver = state.pairs, state.bodies, state.solver
     friction, slot_of_body, has_friction = state.colliders.friction, bodies.collider_slot, False
     for r in range(solver.contacts):  # in the order of the pairs, for the caches
-        c, k = pairs.resting[r], solver.slot[r]
+        c, k = solver.pair[r], solver.slot[r]
+        if solver.point[r] > 0:
+            repeat_row(solver, solver.slot[r - 1], k)
+            continue
         a, b, parting = pairs.a[c], pairs.b[c], pairs.parting[c]
         extent, d = smaller_extent(bodies, a, b), centre_offset_at_start(bodies, a, b)
         slop, end, struck_along = slop_for(state, extent), centre_offset(bodies, a, b), pairs.normal[c]
@@ -197,13 +210,13 @@ def linearise(state, dt):
         # After an impact at time t the body seems to come from dv t behind: no overlap to be pushed out.
         solver.parting[k] = parting == PARTS or (pairs.impulse[c] > 0.0 and gap > 0.0)
         solver.extent[k] = extent
-        if state.spinning:
-            solver.carried[k] = carried(bodies, a, b, pairs.point[c], d)
-            solver.gap[k] -= dt * dot(solver.carried[k], normal)  # shapes stand as they are turned when the step ends
         mu = mix_friction(state, state.friction_rule, friction[slot_of_body[a], a], friction[slot_of_body[b], b])
         solver.friction[k] = mu
         has_friction |= mu != 0.0
     solver.has_friction = has_friction
+    for r in range(solver.contacts if state.spinning else 0):
+        if solver.point[r] == 0:
+            lay_arms(state, dt, r, solver.gap[solver.slot[r]])
     return OK
 
 

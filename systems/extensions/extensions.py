@@ -124,4 +124,8 @@ class Extensions:
             stage.name: met[stage.needed] and present
             for stage, present in zip(self.stages, self.present(), strict=True)
         }
-        return {NEEDED: any(needed.values()), **needed}
+        spins = any(needed[stage.name] for stage in self.stages if "spin" in stage.writes)
+        return {
+            NEEDED: any(needed.values()), **needed,
+            "bodies spin": spins, "no body spins": met["colliders"] and not spins,
+        }  # fmt: skip

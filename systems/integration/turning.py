@@ -1,14 +1,13 @@
 """Bodies that spin, where another body touches them: how fast their surface moves, and how impulses there turn them.
 
-Only round dynamic bodies are turned: their contacts lie on the line of the normal through the centre, and what pushes
-along that does not turn them. What is kinematic turns whatever its shape, and each point of it has its own velocity.
-The spin is a vector; in 2D its first component is the angular velocity, about the axis that leads out of the plane.
+An arm leads from the centre of mass of a body, which is its position, to the point. The spin is a vector; in 2D its
+first component is the angular velocity, about the axis that leads out of the plane.
 """
 
 from __future__ import annotations
 
 from ...framework.compilation import inlined
-from ...framework.vectors import add, add_scaled, item, length, replace, scale, sub
+from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 
 
 @inlined
@@ -33,6 +32,57 @@ def twist(arm, impulse):
 
 
 @inlined
+def symmetric(diagonal, products, v):
+    """A symmetric matrix (xx, yy, zz), (xy, xz, yz) times a vector; in 2D the first component times it."""
+    if len(v) == 2:
+        return scale(v, item(diagonal, 0))
+    x, y, z = item(v, 0), item(v, 1), item(v, len(v) - 1)
+    xy, xz, yz = item(products, 0), item(products, 1), item(products, len(v) - 1)
+    u = replace(v, 0, item(diagonal, 0) * x + xy * y + xz * z)
+    u = replace(u, 1, xy * x + item(diagonal, 1) * y + yz * z)
+    return replace(u, len(v) - 1, xz * x + yz * y + item(diagonal, len(v) - 1) * z)
+
+
+@inlined
+def change_of_spin(bodies, i, turned):
+    """How an angular impulse changes the spin of body i."""
+    return symmetric(bodies.inverse_inertia[i], bodies.inverse_products[i], turned)
+
+
+@inlined
+def spin_energy(bodies, i, u, v):
+    """u . I v of a body: twice the energy of spin u, if v is the same; 0 of what contacts do not turn."""
+    d, p = bodies.inverse_inertia[i], bodies.inverse_products[i]
+    if len(u) == 2:
+        w = item(d, 0)
+        return item(u, 0) * item(v, 0) / w if w > 0.0 else 0.0
+    last = len(u) - 1
+    a, b, c, f, g, h = item(d, 0), item(d, 1), item(d, last), item(p, 0), item(p, 1), item(p, last)
+    aa, bb, cc = b * c - h * h, a * c - g * g, a * b - f * f
+    ab, ac, bc = g * h - f * c, f * h - g * b, f * g - a * h
+    size = a * aa + f * ab + g * ac
+    if not size > 0.0:
+        return 0.0
+    diagonal = replace(replace(replace(d, 0, aa), 1, bb), last, cc)
+    products = replace(replace(replace(p, 0, ab), 1, ac), last, bc)
+    return dot(u, symmetric(diagonal, products, v)) / size
+
+
+@inlined
+def turn_of_arm(turn, arm):
+    """By how much the end of an arm moves as it turns, to the second order."""
+    once = cross_spin(turn, arm)
+    return add_scaled(once, cross_spin(turn, once), 0.5)
+
+
+@inlined
+def compliance(bodies, i, arm, along):
+    """1 / kg that an impulse at the end of an arm, along a unit vector, moves by turning the body."""
+    turned = twist(arm, along)
+    return dot(turned, change_of_spin(bodies, i, turned))
+
+
+@inlined
 def surface_velocity(bodies, a, b, normal):
     """How much faster than its centre the surface of b moves there, as the surface of a sees it; ``normal`` from a to
     b."""
@@ -44,14 +94,14 @@ def surface_velocity(bodies, a, b, normal):
 def turning_mass(bodies, a, b):
     """1 / kg that an impulse along the surface moves beside the bodies' inverse masses."""
     r_a, r_b = bodies.rolling_radius[a], bodies.rolling_radius[b]
-    return bodies.inverse_inertia[a] * r_a * r_a + bodies.inverse_inertia[b] * r_b * r_b
+    return item(bodies.inverse_inertia[a], 0) * r_a * r_a + item(bodies.inverse_inertia[b], 0) * r_b * r_b
 
 
 @inlined
 def turn_by(bodies, a, b, normal, impulse):
     """An impulse along the surface, on b and back on a, changes the spins of both."""
     turned = twist(normal, impulse)
-    w_a, w_b = bodies.inverse_inertia[a], bodies.inverse_inertia[b]
+    w_a, w_b = item(bodies.inverse_inertia[a], 0), item(bodies.inverse_inertia[b], 0)
     if w_a > 0.0:
         bodies.spin[a] = add_scaled(bodies.spin[a], turned, -w_a * bodies.rolling_radius[a])
     if w_b > 0.0:

@@ -60,8 +60,11 @@ def kind_of(scene: Scene, integration: Integration, program: Program) -> Kind:
         return dimensions, stages, conditions, None, ()
     asking = dict.fromkeys((*QUERY_SHAPES, *(shape.component for shape in linked.shapes)))
     queries = tuple(linked_query(registry, linked, component) for component in asking if component in registry.shapes)
-    sleeping = frozenset(("sleeping",)) if scene.state.sleeping else frozenset()
-    return dimensions, stages, conditions | WITH_COLLIDERS | sleeping, linked, queries
+    if scene.state.sleeping:
+        conditions |= {"sleeping"}
+    if any("spin" in stage.writes for stage in stages if stage.plugin):
+        conditions |= {"bodies spin"}
+    return dimensions, stages, conditions | WITH_COLLIDERS, linked, queries
 
 
 def needed_functions(

@@ -13,7 +13,7 @@ from ...framework.compilation import inlined, part
 from ...framework.vectors import add, add_scaled, dot, item, length, sub
 from ..codes import OK
 from ..shapes.dispatch import both_convex, evaluate
-from ..shapes.tolerances import FLAT_SLOPS, PLANE_SIZES, SAME_PLACE, contact_margin, slop_for
+from ..shapes.tolerances import FLAT_SLOPS, PLANE_SIZES, SAME_PLACE, slop_for, turning_margin
 
 
 @inlined
@@ -131,7 +131,7 @@ def mark_early(state):
 def is_near(state, span, c):
     """Whether a solid pair may touch within the step, by its depth where free flight leads."""
     pairs = state.pairs
-    return pairs.is_solid[c] and pairs.depth[c] >= -contact_margin(state, span, pairs.a[c], pairs.b[c])
+    return pairs.is_solid[c] and pairs.depth[c] >= -turning_margin(state, span, pairs.a[c], pairs.b[c])
 
 
 @part

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ...framework.compilation import inlined
+from ...framework.vectors import length
 
 SLOP = 0.005  # of the extent of the smaller body
 MARGIN_STEPS = 2.0
@@ -38,3 +39,21 @@ def contact_margin(state, dt, a, b):
     bodies = state.bodies
     change = max(bodies.force_speed_change[a], bodies.force_speed_change[b])
     return slop_of(state, a, b) + MARGIN_STEPS * change * dt
+
+
+@inlined
+def reach_of(bodies, i):
+    """How far body i reaches from its centre of mass, at most."""
+    return length(bodies.half_extents[i]) + length(bodies.offset[i])
+
+
+@inlined
+def turning_margin(state, dt, a, b):
+    """How near a pair is looked at before it touches: the same, and how far corners come by turning."""
+    margin, bodies = contact_margin(state, dt, a, b), state.bodies
+    if state.spinning:
+        if bodies.rolling_radius[a] == 0.0:
+            margin += dt * length(bodies.spin[a]) * reach_of(bodies, a)
+        if bodies.rolling_radius[b] == 0.0:
+            margin += dt * length(bodies.spin[b]) * reach_of(bodies, b)
+    return margin

@@ -11,7 +11,7 @@ import math
 
 from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, dot, scale, sub
-from ...integration.turning import cross_spin
+from ...integration.turning import spin_energy
 from ..constants import (
     DEEP,
     EXCESS,
@@ -23,7 +23,7 @@ from ..constants import (
     SOLVED,
     SWEEPS,
 )  # fmt: skip
-from .rows import closing_speed, relax_listed
+from .rows import closing_speed, first_velocity, relax_listed, second_velocity
 
 
 @part
@@ -44,7 +44,7 @@ def islands_of(solver, span):
 def weigh(solver, span, islands):
     """What contacts do to the energy of each island if a share s of all that they have changed acts: E(s) = slope s +
     curvature s^2 / 2, which is exact. What moves by itself gives its work to the island, not the contacts."""
-    start, stop, begin, end = span
+    start, stop, begin, end, arms = span
     slope, curvature, energy, island = solver.slope, solver.curvature, solver.energy, solver.island
     for t in range(islands[0], islands[1]):
         slope[t] = curvature[t] = energy[t] = 0.0
@@ -56,25 +56,23 @@ def weigh(solver, span, islands):
             slope[t] += m * dot(v, change)
             curvature[t] += m * dot(change, change)
             energy[t] += m * dot(v, v)
-    for q in range(begin, end if solver.spinning else begin):
-        t, w = island[q], solver.inverse_inertia[q]
-        if t >= 0 and w > 0.0:
+    for q in range(begin, end if len(arms) > 0 else begin):
+        t = island[q]
+        if t >= 0:
             before = solver.spin_before[q]
             change = sub(solver.spin[q], before)
-            slope[t] += dot(before, change) / w
-            curvature[t] += dot(change, change) / w
-            energy[t] += dot(before, before) / w
+            slope[t] += spin_energy(solver, q, before, change)
+            curvature[t] += spin_energy(solver, q, change, change)
+            energy[t] += spin_energy(solver, q, before, before)
     for k in range(start, stop if solver.movers > 0 else start):
         a, b = solver.first[k], solver.second[k]
         if island[a] < 0 or island[b] < 0:
             push = scale(solver.normal[k], solver.impulse[k])
             if solver.has_friction:
                 push = add(push, solver.tangent[k])
-            work = -dot(push, solver.velocity[a]) if island[a] < 0 else dot(push, solver.velocity[b])
-            if solver.spinning:
-                fixed = a if island[a] < 0 else b
-                rate = cross_spin(scale(solver.spin[fixed], solver.rolling_radius[fixed]), solver.normal[k])
-                work += dot(push, solver.carried[k]) - dot(solver.tangent[k], rate)
+            work = -dot(push, first_velocity(solver, k, arms))
+            if island[a] >= 0:
+                work = dot(push, second_velocity(solver, k, arms))
             slope[island_of(solver, k)] += work
 
 
@@ -89,7 +87,7 @@ def gains(solver, t):
 def allow(solver, bias_rate, h, dt, span, islands):
     """What each island may gain in a substep: what forces give from rest, more of that where it is pushed out, and a
     small share of its motion and of the energy at the speed of pushing."""
-    start, stop, begin, end = span
+    start, stop, begin, end, _ = span
     allowed, motion = solver.allowed, solver.momentum
     share, zero = h / dt, scale(solver.normal[start], 0.0)  # of what a step may give
     for t in range(islands[0], islands[1]):
@@ -108,9 +106,9 @@ def allow(solver, bias_rate, h, dt, span, islands):
 
 
 @inlined
-def excess_speed(solver, k):
+def excess_speed(solver, k, arms):
     """The speed that a pass over row k would still change: what closes too fast, and what an impulse sends apart."""
-    excess = closing_speed(solver, k) - solver.opening[k]
+    excess = closing_speed(solver, k, arms) - solver.opening[k]
     return max(excess, -excess * (solver.impulse[k] > 0.0))  # without a branch, which would be as good as random
 
 
@@ -120,12 +118,12 @@ def find_struck(solver, dt, span):
     any."""
     start, stop, any_struck = span[0], span[1], False
     for k in range(start, stop):
-        any_struck |= excess_speed(solver, k) * dt > EXCESS * solver.extent[k]
+        any_struck |= excess_speed(solver, k, span[4]) * dt > EXCESS * solver.extent[k]
     first, last = islands_of(solver, span)
     for t in range(first, last if any_struck else first):
         solver.struck[t] = False
     for k in range(start, stop if any_struck else start):
-        if excess_speed(solver, k) * dt > EXCESS * solver.extent[k]:
+        if excess_speed(solver, k, span[4]) * dt > EXCESS * solver.extent[k]:
             solver.struck[island_of(solver, k)] = True
     return any_struck
 
@@ -139,7 +137,7 @@ def find_unsolved(solver, turn, any_struck, dt, span, islands):
         unsolved[t] = gains(solver, t)
         any_gain |= unsolved[t]
     for k in range(span[0], span[1] if any_gain or any_struck else span[0]):
-        wrong = any_struck and excess_speed(solver, k) * dt > SOLVED * solver.extent[k]
+        wrong = any_struck and excess_speed(solver, k, span[4]) * dt > SOLVED * solver.extent[k]
         if wrong or any_gain:
             t = island_of(solver, k)
             if ((wrong and solver.struck[t]) or unsolved[t]) and turn < solver.passes[t]:
@@ -151,7 +149,7 @@ def find_unsolved(solver, turn, any_struck, dt, span, islands):
 @part
 def restrain(solver, span, islands):
     """In islands that still gain only the share acts that takes the most energy: the least of E(s)."""
-    start, stop, begin, end = span
+    start, stop, begin, end, arms = span
     share, any_gain = solver.share, False
     for t in range(islands[0], islands[1]):
         share[t] = 1.0
@@ -166,7 +164,7 @@ def restrain(solver, span, islands):
             before = solver.velocity_before[q]
             change = sub(solver.velocity[q], before)
             solver.velocity[q] = add_scaled(before, change, share[t]) if share[t] > 0.0 else before
-            if solver.spinning:
+            if len(arms) > 0:
                 turned = sub(solver.spin[q], solver.spin_before[q])
                 solver.spin[q] = add_scaled(solver.spin_before[q], turned, share[t])
     for k in range(start, stop if any_gain else start):
@@ -191,7 +189,7 @@ def finish_substep(solver, bias_rate, any_struck, h, dt, span):
     turn, count = 0, find_unsolved(solver, 0, any_struck, dt, span, islands)
     while count > 0:
         for _ in range(SWEEPS):
-            relax_listed(solver, count)
+            relax_listed(solver, count, span[4])
         weigh(solver, span, islands)
         turn += SWEEPS
         count = find_unsolved(solver, turn, any_struck, dt, span, islands)

@@ -10,6 +10,7 @@ from ....framework.compilation import part
 from ....framework.vectors import add, dot, sub
 from ..approach import centre_offset, centre_offset_at_start
 from ..constants import ALONG, IDLE, LOAD, OPEN, UNREACHED
+from .rows import closing_speed, room_of
 
 
 @part
@@ -24,7 +25,7 @@ def presses(solver, k, dt):
 
 
 @part
-def choose_hard(state, dt, nothing):
+def choose_hard(state, dt, nothing, arms):
     """Contacts with what cannot be moved are hard if their body has rested until now, and nothing presses on it.
 
     Not those that push against the sum of its normals: no impulse is high enough for what is squeezed. Nor one that
@@ -55,7 +56,7 @@ def choose_hard(state, dt, nothing):
             any_apart |= hard and solver.apart[k]
             if hard and solver.apart[k]:
                 solver.gap[k] = max(0.0, solver.gap[k])  # faces that meet in the end do not overlap at the start
-                if dot(sub(solver.velocity[b], solver.velocity[a]), n) > 0.0:  # the body has passed the corner
+                if closing_speed(solver, k, arms) < 0.0:  # the body has passed the corner
                     solver.impulse[k], solver.tangent[k] = 0.0, nothing
     solver.any_hard = any_hard
     if any_apart:
@@ -72,10 +73,11 @@ def leave_out_of_reach(state):
     for k in range(solver.contacts):
         if solver.hard[k] and not solver.apart[k]:
             held[solver.first[k]] = held[solver.second[k]] = 1.0
-    for k in range(solver.contacts):
+    for r in range(solver.contacts):
+        k, c = solver.slot[r], solver.pair[r]
         if solver.hard[k] and solver.apart[k]:
             body = solver.first[k] if solver.inverse_mass[solver.first[k]] > 0.0 else solver.second[k]
-            a, b = pairs.a[solver.pair[k]], pairs.b[solver.pair[k]]
+            a, b = pairs.a[c], pairs.b[c]
             travel = sub(centre_offset(bodies, a, b), centre_offset_at_start(bodies, a, b))
             if held[body] > 0.0 and solver.gap[k] + dot(travel, solver.normal[k]) > OPEN * solver.extent[k]:
                 solver.gap[k] += UNREACHED * solver.extent[k]
@@ -85,8 +87,8 @@ def leave_out_of_reach(state):
 def leave_open(solver, h, span):
     """A hard contact that was open when the step began and is not overlapped when it ends is left to the next step if
     its body is held by another one: it slides on, and by then it may have passed the corner that it would stop at."""
-    start, stop, begin, end = span
-    first, second, shift, held = solver.first, solver.second, solver.shift, solver.held
+    start, stop, begin, end, arms = span
+    first, second, held = solver.first, solver.second, solver.held
     for q in range(begin, end):
         held[q] = 0.0
     for k in range(start, stop):
@@ -96,6 +98,6 @@ def leave_open(solver, h, span):
     for k in range(start, stop):
         if solver.hard[k] and solver.apart[k]:
             body = first[k] if solver.inverse_mass[first[k]] > 0.0 else second[k]
-            room = solver.gap[k] + dot(sub(shift[second[k]], shift[first[k]]), solver.normal[k])
+            room = room_of(solver, k, arms)
             if held[body] > 0.0 and solver.impulse[k] <= IDLE * held[body] and room > -OPEN * solver.extent[k]:
                 solver.opening[k] = UNREACHED * solver.extent[k] / h

@@ -25,7 +25,6 @@ from ..constants import (
     MOST_SAG,
     MOST_SUBSTEPS,
     OWN_SAG,
-    SAG,
     STRIKE,
     STRUCK,
     SUBSTEP_WORK,
@@ -55,7 +54,7 @@ def colour_rows(state):
     for k in range(COLOURS + 2):
         starts[k] = 0
     for r in range(solver.contacts):
-        c, taken = pairs.resting[r], 0
+        c, taken = solver.pair[r], 0
         a, b = pairs.a[c], pairs.b[c]
         p, q = number_body(state, a), number_body(state, b)
         moves_a, moves_b = inverse_mass[a] > 0.0, inverse_mass[b] > 0.0
@@ -116,7 +115,7 @@ def weigh_rows(state, dt):
     solver, pairs, bodies, nothing = state.solver, state.pairs, state.bodies, zero_of(state)
     velocity, inverse_mass = bodies.start_velocity, bodies.inverse_mass
     for r in range(solver.contacts):
-        c = pairs.resting[r]
+        c = solver.pair[r]
         a, b = pairs.a[c], pairs.b[c]
         t = max(solver.island[bodies.place[a]], solver.island[bodies.place[b]])
         w_a, w_b, inverse_extent = inverse_mass[a], inverse_mass[b], 1.0 / smaller_extent(bodies, a, b)
@@ -138,7 +137,7 @@ def choose_substeps(solver, t, usual, dt):
     most substeps cannot bear counts as lighter, see ``bears``. From masses, not from impulses, which would change with
     the substeps; by factors of two, so that it seldom changes.
     """
-    sag = SAG * solver.most_change[t] * dt
+    sag = solver.sag * solver.most_change[t] * dt
     own = sag * solver.own[t] / OWN_SAG
     need = sag * solver.stiff[t] / (solver.lightest[t] * MOST_SAG)
     hard = own > float(usual * usual)
@@ -173,7 +172,7 @@ def place_rows(state):
     for s in range(solver.ranges):
         ends[s] = body_ends[s] = 0
     for r in range(solver.contacts):
-        c = pairs.resting[r]
+        c = solver.pair[r]
         t = max(island[bodies.place[pairs.a[c]]], island[bodies.place[pairs.b[c]]])
         solver.slot[r] = range_of[t]
         ends[range_of[t]] += 1

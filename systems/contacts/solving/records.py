@@ -9,7 +9,8 @@ SOLVER = Schema(
     # rows: contacts at rest, in the order of their ranges and colours
     contacts=integer(),
     slot=ints("int32"),  # the row of contact r,
-    pair=ints("int32"),  # and its pair
+    pair=ints("int32"),  # its pair,
+    point=ints("int8"),  # and which of the points of that
     colour=ints("int8"),  # of contact r
     listed=ints("int32"),  # some rows
     first=ints("uint32"),  # places of the two bodies
@@ -34,8 +35,14 @@ SOLVER = Schema(
     hard=flags(),
     any_hard=flag(),
     has_friction=flag(),
-    spinning=flag(),
-    carried=vectors(),  # m/s, where bodies spin: see turning
+    tips=flag(),  # some pair has several points
+    # where bodies spin:
+    place=vectors(),  # of the point, from the centre of the first shape
+    arm_a=vectors(),  # from the centres of mass to the surfaces there,
+    arm_b=vectors(),
+    core_a=vectors(),  # and to what of the shapes turns: a rounding stays along the normal
+    core_b=vectors(),
+    tangent_mass=floats(),  # kg, that an impulse along the surface moves
     visits=integer(),  # rows solved in this step
     starts=ints(),  # where each colour begins
     # bodies, in the order of their ranges
@@ -53,8 +60,9 @@ SOLVER = Schema(
     spin=vectors(),  # where bodies spin, as in the records of the bodies
     spin_before=vectors(),  # of a substep
     turn=vectors(),
-    inverse_inertia=floats(),
-    rolling_radius=floats(),
+    inverse_inertia=vectors(),
+    inverse_products=vectors(),
+    reach=floats(),  # m, of its shape from its centre of mass
     mover=ints("int32"),  # bodies that move by themselves
     movers=integer(),
     shared=flags(),  # something presses on it
@@ -89,6 +97,8 @@ SOLVER = Schema(
     # ranges: the ordinary islands, then each special one
     ranges=integer(),
     usual=integer(),  # substeps,
+    frequency=number(),  # of the springs, times the rate of the substeps,
+    sag=number(),  # and what follows from it
     push_rate=number(),  # 1 / s: overlap that they push out of itself
     special=ints("int32"),  # island of a range
     row_ends=ints("int32"),
@@ -102,6 +112,9 @@ SOLVER = Schema(
     restrained_row=integer(),
 )
 
+ARMS = ("place", "arm_a", "arm_b", "core_a", "core_b", "tangent_mass")
+TURNS = ("spin", "spin_before", "turn", "inverse_inertia", "inverse_products", "reach")
+
 # Impulses of the contacts at rest, for the next step: [now, i] is the memory, [1 - now, i] is written.
 WARM_START = Schema(
     "WarmStart",
@@ -110,6 +123,7 @@ WARM_START = Schema(
     counts=ints(),
     entity_a=ints(stacked=True),
     entity_b=ints(stacked=True),
+    place=vectors(stacked=True),  # of the point, where bodies spin
     normal=vectors(stacked=True),
     impulse=floats(stacked=True),  # N s of the last substep, as if the step were one,
     tangent=vectors(stacked=True),  # and along the surface

@@ -1,6 +1,9 @@
 """Rows of the solver: points where two bodies touch. How a row moves its bodies stands here, and nowhere else.
 
-What a round body that spins adds along the surface is in :mod:`turning`.
+Where bodies spin, each row has an arm to each of its bodies. ``arms`` is ARMS or NO_ARMS, which differ in type: each
+part is compiled as if there were no other, and a world without rotation pays nothing for it.
+
+A range of rows is a span (first row, end of the rows, first body, end of the bodies, arms).
 """
 
 from __future__ import annotations
@@ -8,94 +11,158 @@ from __future__ import annotations
 import math
 
 from ....framework.compilation import inlined, part
-from ....framework.vectors import add, add_scaled, dot, scale, sub
-from ...integration.turning import surface_velocity, turn_by, turning_mass
+from ....framework.vectors import add, add_scaled, divided, dot, item, replace, scale, sub
+from ...integration.turning import change_of_spin, compliance, cross_spin, turn_of_arm, twist
+
+NO_ARMS, ARMS = (), (True,)
 
 
 @inlined
-def effective_mass(solver, k):
-    """The mass that an impulse along row k moves."""
-    return 1.0 / (solver.inverse_mass[solver.first[k]] + solver.inverse_mass[solver.second[k]])
+def compliance_along(solver, k, along, arms):
+    """1 / kg that an impulse at row k moves in a direction."""
+    a, b = solver.first[k], solver.second[k]
+    moved = solver.inverse_mass[a] + solver.inverse_mass[b]
+    if len(arms) > 0:
+        moved += compliance(solver, a, solver.arm_a[k], along) + compliance(solver, b, solver.arm_b[k], along)
+    return moved
 
 
 @inlined
-def relative_velocity(solver, k):
-    """The velocity of the second body of row k, as the first one sees it."""
-    return sub(solver.velocity[solver.second[k]], solver.velocity[solver.first[k]])
+def room_of(solver, k, arms):
+    """The gap of row k where its bodies are now."""
+    a, b = solver.first[k], solver.second[k]
+    way = sub(solver.shift[b], solver.shift[a])
+    if len(arms) > 0:
+        way = add(way, turn_of_arm(solver.turn[b], solver.core_b[k]))
+        way = sub(way, turn_of_arm(solver.turn[a], solver.core_a[k]))
+    return solver.gap[k] + dot(way, solver.normal[k])
 
 
 @inlined
-def closing_speed(solver, k):
-    """The speed at which the bodies of row k approach each other along its normal."""
-    return -dot(relative_velocity(solver, k), solver.normal[k])
+def most_compliance(solver, k, arms):
+    """1 / kg that an impulse along the surface at row k moves, in the direction in which that is most."""
+    n = solver.normal[k]
+    axis = 0 if abs(item(n, 0)) < 0.75 else 1
+    one = add_scaled(replace(scale(n, 0.0), axis, 1.0), n, -item(n, axis))
+    one = divided(one, math.sqrt(dot(one, one)))
+    along = compliance_along(solver, k, one, arms)
+    if len(n) == 2:
+        return along
+    two = cross_spin(n, one)
+    across, a, b = compliance_along(solver, k, two, arms), solver.first[k], solver.second[k]
+    mixed = dot(twist(solver.arm_a[k], one), change_of_spin(solver, a, twist(solver.arm_a[k], two)))
+    mixed += dot(twist(solver.arm_b[k], one), change_of_spin(solver, b, twist(solver.arm_b[k], two)))
+    half = 0.5 * (along - across)
+    return 0.5 * (along + across) + math.sqrt(half * half + mixed * mixed)
 
 
 @inlined
-def apply_impulse(solver, k, impulse):
+def weigh_row(solver, k, arms):
+    """The masses that row k moves along its normal and its surface."""
+    solver.mass[k] = 1.0 / compliance_along(solver, k, solver.normal[k], arms)
+    if len(arms) > 0:
+        solver.tangent_mass[k] = 1.0 / most_compliance(solver, k, arms)
+
+
+@inlined
+def first_velocity(solver, k, arms):
+    """The velocity of the first body of row k at its point."""
+    q = solver.first[k]
+    v = solver.velocity[q]
+    if len(arms) > 0:
+        v = add(v, cross_spin(solver.spin[q], solver.arm_a[k]))
+    return v
+
+
+@inlined
+def second_velocity(solver, k, arms):
+    """The same of the second body."""
+    q = solver.second[k]
+    v = solver.velocity[q]
+    if len(arms) > 0:
+        v = add(v, cross_spin(solver.spin[q], solver.arm_b[k]))
+    return v
+
+
+@inlined
+def relative_velocity(solver, k, arms):
+    """The velocity of the second body of row k at its point, as the first one sees it there."""
+    return sub(second_velocity(solver, k, arms), first_velocity(solver, k, arms))
+
+
+@inlined
+def closing_speed(solver, k, arms):
+    """The speed at which the points of row k approach each other along its normal."""
+    return -dot(relative_velocity(solver, k, arms), solver.normal[k])
+
+
+@inlined
+def apply_impulse(solver, k, impulse, arms):
     """Push the second body of row k by an impulse, a vector, and the first one back."""
     velocity, inverse_mass = solver.velocity, solver.inverse_mass
     a, b = solver.first[k], solver.second[k]
     v_a, v_b, w_a, w_b = velocity[a], velocity[b], inverse_mass[a], inverse_mass[b]
     if w_a > 0.0:  # storing what stays as it is would make rows with one floor wait for each other
         velocity[a] = add_scaled(v_a, impulse, -w_a)
+        if len(arms) > 0:
+            solver.spin[a] = sub(solver.spin[a], change_of_spin(solver, a, twist(solver.arm_a[k], impulse)))
     if w_b > 0.0:
         velocity[b] = add_scaled(v_b, impulse, w_b)
+        if len(arms) > 0:
+            solver.spin[b] = add(solver.spin[b], change_of_spin(solver, b, twist(solver.arm_b[k], impulse)))
 
 
 @part
-def solve_normals(solver, bias, softness, pushes, start, stop):
-    """One pass over the rows from start to stop, along their normals.
+def solve_normals(solver, bias, softness, pushes, span):
+    """One pass over the rows of a range, along their normals.
 
     bias: speed at which each row may close, below 0 at which it is to open. softness: (share of that speed which a soft
     row takes, share of its impulse that it gives back), where this pass ``pushes``.
     """
     impulse, soft = solver.impulse, solver.soft
     mass_scale, impulse_scale = softness
+    start, stop, _, _, arms = span
     for k in range(start, stop):
         old = impulse[k]
-        excess = solver.mass[k] * (closing_speed(solver, k) - bias[k])
+        excess = solver.mass[k] * (closing_speed(solver, k, arms) - bias[k])
         if pushes and soft[k]:
             excess = mass_scale * excess - impulse_scale * old
         new = max(0.0, old + excess)
-        apply_impulse(solver, k, scale(solver.normal[k], new - old))
+        apply_impulse(solver, k, scale(solver.normal[k], new - old), arms)
         impulse[k] = new
 
 
 @inlined
-def solve_friction_of(solver, k):
+def solve_friction_of(solver, k, arms):
     """Stop what slides at row k, with at most ``friction`` times the normal impulse (Coulomb)."""
-    n, old, w, mass = solver.normal[k], solver.tangent[k], relative_velocity(solver, k), solver.mass[k]
-    a, b = solver.first[k], solver.second[k]
-    if solver.spinning:
-        w = add(add(w, solver.carried[k]), surface_velocity(solver, a, b, n))
-        mass = 1.0 / (1.0 / mass + turning_mass(solver, a, b))
+    n, old, w = solver.normal[k], solver.tangent[k], relative_velocity(solver, k, arms)
+    mass = solver.tangent_mass[k] if len(arms) > 0 else solver.mass[k]
     pull = add_scaled(old, add_scaled(w, n, -dot(w, n)), -mass)
     strength, limit = math.sqrt(dot(pull, pull)), solver.friction[k] * solver.impulse[k]
     if strength > limit:
         pull = scale(pull, limit / strength)
     solver.tangent[k] = pull
-    apply_impulse(solver, k, sub(pull, old))
-    if solver.spinning:
-        turn_by(solver, a, b, n, sub(pull, old))
+    apply_impulse(solver, k, sub(pull, old), arms)
 
 
 @part
-def solve_friction(solver, start, stop):
-    """One pass over the rows from start to stop, along their surfaces."""
+def solve_friction(solver, span):
+    """The same along their surfaces."""
+    start, stop, _, _, arms = span
     for k in range(start, stop):
         if solver.friction[k] != 0.0:
-            solve_friction_of(solver, k)
+            solve_friction_of(solver, k, arms)
 
 
 @part
-def relax_listed(solver, count):
+def relax_listed(solver, count, arms):
     """One pass over the first rows of ``listed``, which may close as fast as what is open lets them."""
     for e in range(count):
         k = solver.listed[e]
         old = solver.impulse[k]
-        new = max(0.0, old + solver.mass[k] * (closing_speed(solver, k) - solver.opening[k]))
-        apply_impulse(solver, k, scale(solver.normal[k], new - old))
+        new = max(0.0, old + solver.mass[k] * (closing_speed(solver, k, arms) - solver.opening[k]))
+        apply_impulse(solver, k, scale(solver.normal[k], new - old), arms)
         solver.impulse[k] = new
         if solver.friction[k] != 0.0:
-            solve_friction_of(solver, k)
+            solve_friction_of(solver, k, arms)
     solver.visits += count

@@ -13,16 +13,14 @@ import math
 
 from ....framework.compilation import packed, part
 from ....framework.jit.records.record_type import zero_of
-from ....framework.vectors import add, add_scaled, dot, length, scale, sub
+from ....framework.vectors import add, add_scaled, dot, length, scale
 from ...codes import OK
-from ...integration.turning import turn_by
 from ..constants import (
     AGREED,
     AGREED_SHARE,
     DAMPING_RATIO,
     DEEP,
     DEEPEST,
-    FREQUENCY,
     HARD_PASSES,
     LAST_RELAX_PASSES,
     LOADED,
@@ -31,7 +29,6 @@ from ..constants import (
     OPEN,
     REFINED_PASSES,
     RELAX_PASSES,
-    SAG,
     SLOPE,
     STILL,
     SUBSTEP_WORK,
@@ -40,7 +37,17 @@ from ..constants import (
 )  # fmt: skip
 from .guard import find_struck, finish_substep
 from .hard import choose_hard, leave_open
-from .rows import apply_impulse, closing_speed, effective_mass, relax_listed, solve_friction, solve_normals
+from .rows import (
+    ARMS,
+    NO_ARMS,
+    apply_impulse,
+    closing_speed,
+    relax_listed,
+    room_of,
+    solve_friction,
+    solve_normals,
+    weigh_row,
+)  # fmt: skip
 
 ORDINARY, REFINED, HARD = range(3)  # ranges: with the usual substeps, with more, with contacts that do not sag
 
@@ -52,9 +59,9 @@ def measure(solver, h, bias_rate, dt, stiff, ends, span):
     opening: at most closing what is open within a substep, or, in the one that ``ends`` the step, within a usual one;
     pushing: in the pass that pushes, overlap is to open as well, softly where ``soft`` says so.
     """
-    shift, ahead = solver.shift, dt / solver.usual if ends else h
+    ahead = dt / solver.usual if ends else h
     for k in range(span[0], span[1]):
-        room = solver.gap[k] + dot(sub(shift[solver.second[k]], shift[solver.first[k]]), solver.normal[k])
+        room = room_of(solver, k, span[4])
         opening = pushing = max(0.0, room) / ahead
         extent, soft = solver.extent[k], False
         if room <= OPEN * extent and not solver.parting[k]:  # what was just closed is soft, on either side of rounding
@@ -67,9 +74,6 @@ def measure(solver, h, bias_rate, dt, stiff, ends, span):
             pushing = bias_rate * room
             soft = not (stiff or hard)
         solver.had_impulse[k] |= solver.impulse[k] > 0.0
-        if solver.spinning:  # what turns by itself comes nearer, or goes, by itself
-            leaves = dot(solver.carried[k], solver.normal[k])
-            opening, pushing = opening + leaves, pushing + leaves
         solver.opening[k], solver.pushing[k], solver.soft[k] = opening, pushing, soft
 
 
@@ -79,7 +83,7 @@ def apply_forces(solver, h, span):
     for q in range(span[2], span[3]):
         v = add_scaled(solver.velocity[q], solver.acceleration[q], h)
         solver.velocity[q], solver.velocity_before[q] = v, v
-    for q in range(span[2], span[3] if solver.spinning else span[2]):
+    for q in range(span[2], span[3] if len(span[4]) > 0 else span[2]):
         solver.spin_before[q] = solver.spin[q]
 
 
@@ -94,9 +98,7 @@ def apply_warm_start(solver, most, span):
             push = scale(solver.normal[k], solver.impulse[k])
             if solver.has_friction:
                 push = add(push, solver.tangent[k])
-                if solver.spinning:
-                    turn_by(solver, solver.first[k], solver.second[k], solver.normal[k], solver.tangent[k])
-            apply_impulse(solver, k, push)
+            apply_impulse(solver, k, push, span[4])
 
 
 @part
@@ -107,10 +109,10 @@ def move(solver, h, span):
     for m in range(solver.movers if span[2] > 0 else 0):
         q = solver.mover[m]
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], h)
-    for q in range(span[2], span[3] if solver.spinning else span[2]):
+        if len(span[4]) > 0:
+            solver.turn[q] = add_scaled(solver.turn[q], solver.spin[q], h)
+    for q in range(span[2], span[3] if len(span[4]) > 0 else span[2]):
         solver.turn[q] = add_scaled(solver.turn[q], solver.spin[q], h)
-    for k in range(span[0], span[1] if solver.spinning else span[0]):
-        solver.gap[k] += h * dot(solver.carried[k], solver.normal[k])
 
 
 @part
@@ -145,7 +147,7 @@ def converge(solver, soft, pushes, h, span):
     start, stop, least = span[0], span[1], least_change(solver, h, span)
     for _ in range(min(HARD_PASSES, SUBSTEP_WORK // (stop - start))):
         note_impulses(solver, span)
-        solve_pass(solver, solver.pushing if pushes else solver.opening, soft, pushes, start, stop)
+        solve_pass(solver, solver.pushing if pushes else solver.opening, soft, pushes, span)
         if agrees(solver, h, least, span):
             break
 
@@ -182,21 +184,21 @@ def close_in_order(solver, h, span):
     work = SUBSTEP_WORK
     for e in range(count):
         k = solver.listed[e]
-        new = closing_speed(solver, k) > solver.opening[k]
+        new = closing_speed(solver, k, span[4]) > solver.opening[k]
         while new and work > 0:
             note_impulses(solver, span)
-            relax_listed(solver, e + 1)
+            relax_listed(solver, e + 1, span[4])
             work -= e + 1
             new = not agrees(solver, h, least, span)
 
 
 @part
-def solve_pass(solver, bias, soft, pushes, start, stop):
+def solve_pass(solver, bias, soft, pushes, span):
     """One pass over the rows of a range: along their normals, then along their surfaces."""
-    solve_normals(solver, bias, soft, pushes, start, stop)
+    solve_normals(solver, bias, soft, pushes, span)
     if solver.has_friction:
-        solve_friction(solver, start, stop)
-    solver.visits += stop - start
+        solve_friction(solver, span)
+    solver.visits += span[1] - span[0]
 
 
 @part
@@ -208,7 +210,7 @@ def solve_substep(solver, spring, most, dt, h, kind, ends, span):
     apply_warm_start(solver, most, span)
     if stiff:
         close_in_order(solver, h, span)
-    solve_pass(solver, solver.pushing, soft, True, start, stop)
+    solve_pass(solver, solver.pushing, soft, True, span)
     if stiff:
         converge(solver, soft, True, h, span)
     move(solver, h, span)
@@ -217,7 +219,7 @@ def solve_substep(solver, spring, most, dt, h, kind, ends, span):
     if ends and solver.any_hard:
         leave_open(solver, h, span)
     for _ in range(REFINED_PASSES if kind != ORDINARY else (LAST_RELAX_PASSES if ends else RELAX_PASSES)):
-        solve_pass(solver, opening, soft, False, start, stop)
+        solve_pass(solver, opening, soft, False, span)
     if stiff:
         converge(solver, soft, False, h, span)
     finish_substep(solver, bias_rate, any_struck, h, dt, span)
@@ -229,15 +231,15 @@ def solve_substep(solver, spring, most, dt, h, kind, ends, span):
 @part
 def is_still(solver, dt, span):
     """Whether an island rests, and its last substep has changed nothing that matters: those that follow would not."""
-    start, stop, begin, end = span
+    start, stop, begin, end, arms = span
     extent, fastest = math.inf, 0.0
     for q in range(begin, end):
         fastest = max(fastest, dot(solver.velocity[q], solver.velocity[q]))
     for k in range(start, stop):
         extent = min(extent, solver.extent[k])
-    for q in range(begin, end if solver.spinning else begin):  # friction that slips goes on to turn them
-        change = scale(sub(solver.spin[q], solver.spin_before[q]), solver.rolling_radius[q])
-        fastest = max(fastest, dot(change, change))
+    for q in range(begin, end if len(arms) > 0 else begin):
+        around = scale(solver.spin[q], solver.reach[q])
+        fastest = max(fastest, dot(around, around))
     if not math.sqrt(fastest) * dt <= STILL * extent:
         return False
     changes = False
@@ -253,7 +255,7 @@ def repeat_substep(solver, left, h, span):
         solver.total[k] += left * solver.impulse[k]
     for q in range(span[2], span[3]):
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], left * h)
-        if solver.spinning:
+        if len(span[4]) > 0:
             solver.turn[q] = add_scaled(solver.turn[q], solver.spin[q], left * h)
 
 
@@ -278,13 +280,13 @@ def solve_range(solver, substeps, kind, dt, span):
     """The substeps of a range. Where there are more than usual, springs are damped by as much more: for the heavy
     bodies that they bear, and so that overlap is pushed out at the usual rate."""
     h, stiff, special = dt / substeps, kind == HARD, kind != ORDINARY
-    omega = 2.0 * math.pi * FREQUENCY / h
+    omega = 2.0 * math.pi * solver.frequency / h
     damping = 2.0 * DAMPING_RATIO * substeps / solver.usual + h * omega
     stiffness, bias_rate = h * omega * damping, omega / damping
     spring = stiffness / (1.0 + stiffness), 1.0 / (1.0 + stiffness), bias_rate
     scale_impulses(solver, 1.0 / substeps, span)
     for k in range(span[0], span[1]):
-        sag = LOADED * SAG * solver.impulse[k] * h / solver.mass[k]
+        sag = LOADED * solver.sag * solver.impulse[k] * h / solver.mass[k]
         solver.loaded[k] = 0.0 if stiff else min(sag, MOST_LOADED * solver.extent[k])
     measure(solver, h, bias_rate, dt, stiff, False, span)
     most = most_impulse(solver, solver.island[span[2]], substeps) if special else math.inf
@@ -308,9 +310,13 @@ def lighten(solver, t, span):
             if solver.overloaded == 0:
                 solver.overloaded_row = solver.body_row[q]
             solver.overloaded += 1
+            if len(span[4]) > 0:
+                by = least / solver.inverse_mass[q]
+                solver.inverse_inertia[q] = scale(solver.inverse_inertia[q], by)
+                solver.inverse_products[q] = scale(solver.inverse_products[q], by)
             solver.inverse_mass[q], solver.heft[q] = least, 1.0 / least
     for k in range(span[0], span[1]):
-        solver.mass[k] = effective_mass(solver, k)
+        weigh_row(solver, k, span[4])
 
 
 @part
@@ -332,26 +338,27 @@ def count_work(state, dt):
                 solver.restrained += 1
 
 
-@packed
-def solve_contacts(state, dt):
+@part
+def advance(state, dt, arms):
     """Advance the bodies by their substeps under their mean acceleration and their contacts."""
     solver = state.solver
-    if solver.contacts == 0:
-        return OK
     for k in range(solver.contacts):
-        solver.mass[k] = effective_mass(solver, k)
+        weigh_row(solver, k, arms)
         solver.total[k], solver.had_impulse[k] = 0.0, False
     solver.visits, solver.usual = 0, state.substeps
-    omega = 2.0 * math.pi * FREQUENCY * state.substeps / dt
+    omega = 2.0 * math.pi * solver.frequency * state.substeps / dt
     solver.push_rate = omega / (2.0 * DAMPING_RATIO + omega * dt / state.substeps)
-    choose_hard(state, dt, zero_of(state))
+    choose_hard(state, dt, zero_of(state), arms)
     start = begin = 0
     for s in range(solver.ranges):
-        span = start, solver.row_ends[s], begin, solver.body_ends[s]
+        span = start, solver.row_ends[s], begin, solver.body_ends[s], arms
         t, special = solver.special[s], s > 0
         if special:
             for m in range(solver.movers):
-                solver.shift[solver.mover[m]] = zero_of(state)
+                q = solver.mover[m]
+                solver.shift[q] = zero_of(state)
+                if len(arms) > 0:
+                    solver.turn[q] = scale(solver.spin[q], -dt)
             if solver.bears[t] < 1.0:
                 lighten(solver, t, span)
         if span[1] > start:
@@ -361,4 +368,19 @@ def solve_contacts(state, dt):
             solve_range(solver, substeps, kind, dt, span)
         start, begin = span[1], span[3]
     count_work(state, dt)
+
+
+@packed
+def solve_contacts(state, dt):
+    """The contacts of bodies of which none spins."""
+    if state.solver.contacts > 0:
+        advance(state, dt, NO_ARMS)
+    return OK
+
+
+@packed
+def solve_turning_contacts(state, dt):
+    """The contacts of bodies of which some spin."""
+    if state.solver.contacts > 0:
+        advance(state, dt, ARMS)
     return OK

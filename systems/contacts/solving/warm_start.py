@@ -11,8 +11,9 @@ from ....framework.data.row_moves import place_of
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add_scaled, dot, length, scale, sub
 from ...codes import NEED_WARM_START, OK
-from ..constants import EXCESS, MOST_LOAD, OPEN, TURNED
+from ..constants import EXCESS, MOST_LOAD, NEAR_PLACE, OPEN, TURNED
 from .guard import excess_speed, island_of
+from .rows import ARMS, NO_ARMS
 
 
 @part
@@ -52,6 +53,27 @@ def find_rows(state):
     memory.rows_version[now] = state.version
 
 
+@part
+def start_with(solver, memory, k, several, span):
+    """Row k starts with the impulses of the point of its pair, remembered in a range, that is nearest to it; of the
+    only one if there are not several, then or now."""
+    now, m = memory.now, span[0]
+    if several:
+        nearest, m = NEAR_PLACE * solver.extent[k], -1
+        for one in range(span[0], span[1]):
+            away = length(sub(memory.place[now, one], solver.place[k]))
+            if away < nearest and not memory.off[one]:
+                nearest, m = away, one
+        if m < 0:
+            return
+        memory.off[m] = True  # each once
+    n = solver.normal[k]
+    if dot(memory.normal[now, m], n) > TURNED:
+        pull = memory.tangent[now, m]
+        solver.impulse[k] = memory.impulse[now, m]
+        solver.tangent[k] = add_scaled(pull, n, -dot(pull, n))
+
+
 def match_warm_start(state, dt):
     """Start each contact with the impulses that its pair had, if its normal has not turned far; else with none."""
     solver, memory, bodies, pairs = state.solver, state.warm_start, state.bodies, state.pairs
@@ -63,35 +85,38 @@ def match_warm_start(state, dt):
     if memory.counts[now] > 0:
         scale_to(state, dt)
         find_rows(state)
-    r = 0
-    for m in range(memory.counts[now]):
-        first, second, same = memory.first[now, m], memory.second[now, m], False
+    r = m = 0
+    while m < memory.counts[now]:
+        first, second, same, stop = memory.first[now, m], memory.second[now, m], False, m + 1
         while r < solver.contacts:
-            c = pairs.resting[r]
+            c = solver.pair[r]
             same = pairs.a[c] == first and pairs.b[c] == second
             if same or entity[pairs.a[c]] > memory.entity_a[now, m]:
                 break
             if entity[pairs.a[c]] == memory.entity_a[now, m] and entity[pairs.b[c]] > memory.entity_b[now, m]:
                 break
             r += 1
-        if same:
-            k = solver.slot[r]
+        while solver.tips and stop < memory.counts[now] and memory.first[now, stop] == first:
+            if memory.second[now, stop] != second:
+                break
+            stop += 1
+        begin = r
+        while same and r < solver.contacts and solver.pair[r] == solver.pair[begin]:
             r += 1
-            n = solver.normal[k]
-            if dot(memory.normal[now, m], n) > TURNED:
-                pull = memory.tangent[now, m]
-                solver.impulse[k] = memory.impulse[now, m]
-                solver.tangent[k] = add_scaled(pull, n, -dot(pull, n))
+        several = stop - m > 1 or r - begin > 1
+        for one in range(begin, r):
+            start_with(solver, memory, solver.slot[one], several, (m, stop))
+        m = stop
     return OK
 
 
 @part
-def find_squeezed(solver, dt):
+def find_squeezed(solver, dt, arms):
     """Bodies of which some row still closes: the impulses of their rows do not tell what holds them."""
     for q in range(solver.bodies):
         solver.squeezes[q] = False
     for k in range(solver.contacts):
-        if excess_speed(solver, k) * dt > EXCESS * solver.extent[k]:
+        if excess_speed(solver, k, arms) * dt > EXCESS * solver.extent[k]:
             a, b = solver.first[k], solver.second[k]
             solver.squeezes[a] |= solver.inverse_mass[a] > 0.0
             solver.squeezes[b] |= solver.inverse_mass[b] > 0.0
@@ -106,10 +131,13 @@ def store_warm_start(state, dt):
     if solver.contacts > len(memory.off):
         state.needed = solver.contacts
         return NEED_WARM_START
-    find_squeezed(solver, dt)
+    if state.spinning:
+        find_squeezed(solver, dt, ARMS)
+    else:
+        find_squeezed(solver, dt, NO_ARMS)
     new, count = 1 - memory.now, 0
     for r in range(solver.contacts):
-        k, c = solver.slot[r], pairs.resting[r]
+        k, c = solver.slot[r], solver.pair[r]
         if not solver.total[k] * dt > OPEN * solver.extent[k] * solver.mass[k]:  # of rounding; also nan
             continue
         a, b = pairs.a[c], pairs.b[c]
@@ -126,6 +154,8 @@ def store_warm_start(state, dt):
         kept = most / last if last > most else 1.0
         memory.impulse[new, count], memory.tangent[new, count] = kept * last, scale(solver.tangent[k], kept)
         memory.normal[new, count] = solver.normal[k]
+        if state.spinning:
+            memory.place[new, count] = solver.place[k]
         count += 1
     memory.counts[new], memory.rows_version[new] = count, state.version
     memory.step[new] = dt

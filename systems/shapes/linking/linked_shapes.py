@@ -97,7 +97,8 @@ class LinkedShapes:
         """Everything that a step may call for these shapes; sweeps: where there are swept bodies; moments: where some
         stage asks for them."""
         for number, function in enumerate(self.functions):
-            yield from function.all_functions(by_address=number in self.warm_started)
+            taken = number in self.warm_started or (moments and function.shape.support is not None)
+            yield from function.all_functions(by_address=taken)
             if moments and function.moments is not None:
                 yield function.moments
         yield from self._rules

@@ -1,0 +1,72 @@
+"""The points of a pair at rest, where bodies spin: how many rows it has, and the arms of these."""
+
+from __future__ import annotations
+
+from ...framework.compilation import inlined, part
+from ...framework.jit.records.record_type import zero_of
+from ...framework.jit.stack_arrays import stack_array
+from ...framework.vectors import add, add_scaled, length, row, scale, sub
+from ..narrow_phase.manifolds import centre_offset_at_start, evaluate_pair, has_manifold
+from ..shapes.convex.points import MOST_POINTS, contact_points
+from ..shapes.linking.convex_by_address import convex_at, rounding_by_address
+from ..shapes.tolerances import turning_margin
+from .constants import UNREACHED
+
+TILT = 0.1  # rad: faces whose normals are so near that of the contact touch along their length, or soon will
+
+
+@inlined
+def is_turned(bodies, i):
+    """Whether contacts turn body i by pushing along their normals: it is not round."""
+    return length(bodies.inverse_inertia[i]) > 0.0 and bodies.rolling_radius[i] == 0.0
+
+
+@inlined
+def points_of(state, c):
+    """How many rows pair c has."""
+    bodies, a, b = state.bodies, state.pairs.a[c], state.pairs.b[c]
+    if not (is_turned(bodies, a) or is_turned(bodies, b)) or bodies.rolling_radius[a] + bodies.rolling_radius[b] > 0.0:
+        return 1
+    return 2 if len(zero_of(state)) == 2 else MOST_POINTS
+
+
+@inlined
+def rounding_of(state, i):
+    """How far the shape of body i reaches beyond its core."""
+    shape = convex_at(state.shapes.parameters[state.bodies.shape[i]], i)
+    return rounding_by_address(shape) if shape[1] != 0 else 0.0
+
+
+@part
+def lay_arms(state, dt, r, gap):
+    """The points of the pair whose first row is r: gaps, and the arms to both bodies. Shapes stand as they are turned
+    where the step ends; rows that the pair does not need are never reached."""
+    solver, pairs, bodies = state.solver, state.pairs, state.bodies
+    c, first = solver.pair[r], solver.slot[r]
+    a, b, normal, extent = pairs.a[c], pairs.b[c], solver.normal[first], solver.extent[first]
+    d, nothing = centre_offset_at_start(bodies, a, b), zero_of(state)
+    places, gaps = stack_array(MOST_POINTS, nothing), stack_array(MOST_POINTS, 0.0)
+    point = pairs.point[c]
+    if not has_manifold(pairs, c):
+        _, _, _, point = evaluate_pair(state, a, b, d)
+    count, rows = 1, points_of(state, c)
+    places[0], gaps[0] = point, gap
+    if rows > 1:
+        tilt = TILT + dt * (length(bodies.spin[a]) + length(bodies.spin[b]))
+        margin = turning_margin(state, dt, a, b)
+        count = contact_points(state, (a, b), (d, normal, -gap, point), (margin, tilt), places, gaps)
+    round_a, round_b = rounding_of(state, a), rounding_of(state, b)
+    for e in range(rows):
+        k = solver.slot[r + e]
+        at, between = row(places, min(e, count - 1), nothing), gaps[min(e, count - 1)]
+        solver.place[k], solver.gap[k] = at, between if e < count else UNREACHED * extent
+        solver.arm_a[k] = add(bodies.offset[a], add_scaled(at, normal, -0.5 * between))
+        solver.arm_b[k] = add(bodies.offset[b], add_scaled(sub(at, d), normal, 0.5 * between))
+        if bodies.rolling_radius[a] > 0.0:
+            solver.arm_a[k] = scale(normal, bodies.rolling_radius[a])
+        if bodies.rolling_radius[b] > 0.0:
+            solver.arm_b[k] = scale(normal, -bodies.rolling_radius[b])
+        solver.core_a[k] = add_scaled(solver.arm_a[k], normal, -round_a)
+        solver.core_b[k] = add_scaled(solver.arm_b[k], normal, round_b)
+
+
