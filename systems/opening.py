@@ -61,6 +61,18 @@ def keep_state(state, dt):
     return OK
 
 
+@part
+def axes_are_old(state):
+    """Whether some body is not turned as it was when its axes were made. What turns it in a step makes them, too."""
+    rotation, known, old = state.bodies.rotation, state.bodies.axes_rotation, False
+    numbers = state.count * (1 if len(state.gravity[0]) == 2 else 4)
+    if len(known) < numbers:
+        return True
+    for k in range(numbers):
+        old |= rotation[k] != known[k]
+    return old
+
+
 def read_bodies(state, dt):
     """1 / mass of what moves freely; whether any speed is limited, any body swept or rotated."""
     bodies, mass, inverse_mass, limited = state.bodies, state.bodies.mass, state.bodies.inverse_mass, False
@@ -81,7 +93,7 @@ def read_bodies(state, dt):
         return NEED_SWEEPS
     state.read_version = state.statics_version
     rotated = state.collides and any_rotation(state)
-    if rotated or state.rotated or state.rotation_stale:
+    if rotated != state.rotated or state.rotation_stale or (rotated and (state.several_levels or axes_are_old(state))):
         return ROTATE
     return OK
 

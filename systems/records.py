@@ -136,7 +136,8 @@ BODIES = Schema(
     EVALUATIONS, SPINS, UNDO, UNDO_FORCE, SLEEPING,
     Section(
         "body", "rotation", "some body is rotated, or a shape reads its axes",
-        axes=floats(),  # rotation matrices (n, d, d), flat
+        axes=floats(),  # rotation matrices (n, d, d), flat,
+        axes_rotation=floats(),  # and the rotations that they are of
     ),
     Section(
         "body", "shapes", "which shapes a body has, and where they are",

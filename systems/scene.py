@@ -349,11 +349,13 @@ class Scene:
         if fresh:
             self._axes = np.zeros((table.capacity, self.state.dimensions, self.state.dimensions))
             bodies.axes = self._axes.reshape(-1)
+            bodies.axes_rotation = np.full(table.capacity * (1 if self.state.dimensions == 2 else 4), np.nan)
         if fresh or self.rotated != before:
             self._bind_shapes()
             self.state.statics_version += 1
         if needed:
             self._axes[:count] = axes_of(rotation, self.state.dimensions)
+            bodies.axes_rotation[: rotation.size] = rotation.reshape(-1)
         if self.state.several_levels:  # a box that is stretched may reach out of the level around it
             turned = rotation != 0.0 if self.state.dimensions == 2 else rotation[:, 1:].any(axis=1)
             bodies.level_not_enclosing[:count] = self.stretches & turned

@@ -203,11 +203,14 @@ def write_axes(state, i):
     axes, d = state.bodies.axes, len(zero_of(state))
     if len(axes) == 0:
         return
+    known = state.bodies.axes_rotation
     if d == 2:
-        angle = state.bodies.rotation[i]
+        angle = known[i] = state.bodies.rotation[i]
         cosine, sine, k = math.cos(angle), math.sin(angle), 4 * i
         axes[k], axes[k + 1], axes[k + 2], axes[k + 3] = cosine, -sine, sine, cosine
         return
+    for k in range(4 * i, 4 * i + 4):
+        known[k] = state.bodies.rotation[k]
     w, x, y, z = rotation_in_space(state, i)
     k = 9 * i
     axes[k], axes[k + 1], axes[k + 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)

@@ -54,6 +54,8 @@ def _sections(record: Record, sections: Sequence[Section], least: int = 1) -> It
             rows = array.shape[1] if record.schema.fields[name].stacked else len(array)
             if name == "axes":
                 rows //= record.dimensions**2
+            elif name == "axes_rotation" and record.dimensions == 3:
+                rows //= 4
             if rows >= least:
                 shown = f"_{name}" if section is SLEEP_COLUMNS else name
                 yield from _column(shown, section.of, section.group, array, rows, section.why)
