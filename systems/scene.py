@@ -57,7 +57,7 @@ class Scene:
         self._settings = settings
         self.prepared: set[type[Any]] = set()  # colliders whose functions are kept ready
         self.read_by_plugins: set[str] = set()  # columns that stages of plugins read
-        self.moments_asked = False  # whether one of them reads the shapes' second moments
+        self.moments_asked = False  # whether one of them reads the shapes: second moments, supports
         self.version = 0
         self.linked: LinkedShapes | None = None
         self.parameters: ParameterRecords | None = None
@@ -139,7 +139,7 @@ class Scene:
         present = self._place_levels(present)
         self.state.collides = bool((self.levels[0, :moving] >= 0).any())
         self.linked = linked_shapes(self.registry, present, self.state.dimensions) if present else None
-        self.parameters = ParameterRecords(self.linked) if self.linked else None
+        self.parameters = ParameterRecords(self.linked, self.moments_asked) if self.linked else None
         self._bind_shapes()
         self.state.rotation_stale = True
         self.state.statics_version += 1
@@ -330,9 +330,6 @@ class Scene:
         """Compile or load the functions of the shapes; sweeps: also those of swept bodies and casts."""
         if self.linked is not None:
             self.linked.fill(self.state.shapes, sweeps, self.moments_asked)
-            for number, shape in enumerate(self.linked.shapes if self.moments_asked else ()):
-                if shape.support is not None:
-                    self.parameters.need_support(number)
 
     # -- what changes from step to step -----------------------------------------------------------
 

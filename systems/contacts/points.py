@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.stack_arrays import stack_array
-from ...framework.vectors import add, add_scaled, length, row, scale, sub
+from ...framework.vectors import add, add_scaled, length, row, scale, store, sub
 from ..narrow_phase.manifolds import centre_offset_at_start, evaluate_pair, has_manifold
 from ..shapes.convex.points import MOST_POINTS, contact_points
 from ..shapes.linking.convex_by_address import convex_at, rounding_by_address
@@ -50,11 +50,12 @@ def lay_arms(state, dt, r, gap):
     if not has_manifold(pairs, c):
         _, _, _, point = evaluate_pair(state, a, b, d)
     count, rows = 1, points_of(state, c)
-    places[0], gaps[0] = point, gap
+    store(places, 0, point)
+    gaps[0] = gap
     if rows > 1:
         tilt = TILT + dt * (length(bodies.spin[a]) + length(bodies.spin[b]))
         margin = turning_margin(state, dt, a, b)
-        count = contact_points(state, (a, b), (d, normal, -gap, point), (margin, tilt), places, gaps)
+        count = contact_points(state, (a, b), d, (-gap, normal, point), (margin, tilt), places, gaps)
     round_a, round_b = rounding_of(state, a), rounding_of(state, b)
     for e in range(rows):
         k = solver.slot[r + e]

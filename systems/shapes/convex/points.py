@@ -1,52 +1,393 @@
-"""The points at which two convex shapes touch: where their faces lie on each other, from their supports.
+"""The points in which two convex shapes touch: the corners of what their faces share.
 
-The ends of a face are the supports a little to either side of the normal.
+The face of a shape is made of its farthest points in directions tilted a little from the normal: in 2D the two ends of
+an edge, in 3D the corners of a polygon, or two of an edge. Seen along the normal the two faces are clipped by each
+other, and at each corner of what is left their heights give the gap. Neither face is the reference for the other.
+
+Roundings are added along the normal: a rounded edge that is tilted keeps the ends of its core.
 """
 
 from __future__ import annotations
 
-from ....framework.compilation import part
-from ....framework.vectors import add, add_scaled, dot, item, negative, replace, scale
-from ..linking.convex_by_address import convex_at, rounding_by_address, support_by_address
+import math
 
-MOST_POINTS = 4
-SHORT = 1e-9  # of the distances of the ends: faces that share no more touch at a point
+from ....framework.compilation import inlined, part
+from ....framework.jit.stack_arrays import stack_array
+from ....framework.vectors import add, add_scaled, dot, item, row, scale, store, sub
+from ..linking.convex_by_address import convex_at, rounding_by_address, support_by_address
+from .gjk import cross
+
+MOST_POINTS = 4  # of a pair in 3D; 2 in 2D
+SAME = 1e-12  # of the coordinates: corners that are no farther apart are one
+FLAT = 1e-6  # of its size: how far a face may be from flat; what is shared and narrower is a point
+FINER = 1e-3  # of the tilt: looks for the face that lies flat where several are within the tilt, or none is flat
+DIRECTIONS = 8  # around the normal, in 3D: a face of more corners shows so many of them
+ROOM = 2 * DIRECTIONS  # each edge of a convex polygon that clips another adds at most one corner
+STEEP = 0.83  # cosine: a normal nearer to the x axis takes the y axis for its basis
+PREFERRED = (0.61, 0.35, 0.71)  # any direction: of points that are equally good the farthest that way is kept
 
 
 @part
-def contact_points(state, sides, plane, within, places, gaps):
-    """How many points the shapes of two bodies have; their places, relative to the centre of the first shape and in the
-    middle between the surfaces, and the gaps there.
+def contact_points(state, rows, d, met, within, places, gaps):
+    """Write up to 2 (2D) or 4 (3D) points in which two rows touch, and the gaps there; returns how many, at least 1.
 
-    sides: the rows; plane: (from centre to centre, normal, depth, point) of the pair; within: (the largest gap of a
-    point, the largest angle, rad, between the normal of a face and that of the contact).
+    rows: (a, b). d: from the centre of a's shape to that of b's. met: (depth, normal, point) as the pair's function
+    answers for these. within: (margin, tilt); points with larger gaps are left out, but for the deepest; faces count
+    whose normals are within so many radians of that of the contact. places: relative to the centre of a's shape, in
+    the middle between the surfaces. gaps: along the normal, negative where the shapes overlap.
+
+    A shape without a support and without an end is a plane through the pair's point. Where there are no two faces that
+    share something, the point is that of the pair.
     """
-    a, b = sides
-    d, normal, depth, point = plane
+    depth, _, point = met
+    parameters, shape, count = state.shapes.parameters, state.bodies.shape, 0
+    a, b = convex_at(parameters[shape[rows[0]]], rows[0]), convex_at(parameters[shape[rows[1]]], rows[1])
+    if (a[0] != 0 or is_plane(state, rows[0])) and (b[0] != 0 or is_plane(state, rows[1])):
+        if len(d) == 2:
+            count = points_2d((a, b), d, met, within, places, gaps)
+        else:
+            count = points_3d((a, b), d, met, within, places, gaps)
+    if count == 0:
+        store(places, 0, point)
+        gaps[0] = -depth
+        count = 1
+    return count
+
+
+@inlined
+def is_plane(state, i):
+    """Whether a shape without a support counts as a plane: it is convex and has no end on any side."""
+    half, endless = state.bodies.half_extents[i], not state.shapes.concave[state.bodies.shape[i]]
+    for k in range(len(half)):
+        endless = endless and item(half, k) == math.inf
+    return endless
+
+
+@inlined
+def keep_near(places, gaps, count, margin, like):
+    """Leave out points whose gap exceeds the margin, but for the deepest; returns how many are left."""
+    deepest, kept = gaps[0], 0
+    for k in range(1, count):
+        deepest = min(deepest, gaps[k])
+    for k in range(count):
+        if gaps[k] <= max(margin, deepest):
+            store(places, kept, row(places, k, like))
+            gaps[kept] = gaps[k]
+            kept += 1
+    return kept
+
+
+# -- 2D -------------------------------------------------------------------------------------------
+
+
+@part
+def edge_towards(shape, normal, tilt):
+    """Both ends of the core's edge in the direction of a normal; twice the same point if there is a corner."""
+    along = (-normal[1], normal[0])
+    one = normal
+    for _ in range(2):
+        one = support_by_address(shape, add_scaled(normal, along, -tilt))
+        two = support_by_address(shape, add_scaled(normal, along, tilt))
+        way = sub(two, one)
+        square = dot(way, way)
+        if square <= SAME * SAME * dot(one, one):
+            break
+        outward = (way[1], -way[0])
+        if dot(outward, sub(support_by_address(shape, outward), one)) <= FLAT * square:
+            return one, two
+        tilt *= FINER
+    return one, one
+
+
+@part
+def profile(shape, centre, normal, face):
+    """(low, high, at, height, slope) of a face over the tangent: its ends, and its height at one place. face: (side:
+    1 if it looks along the normal, -1 against it, tilt, height if it is a plane)."""
+    side, tilt, level = face
+    if shape[0] == 0:
+        return -math.inf, math.inf, 0.0, level, 0.0
+    along = (-normal[1], normal[0])
+    one, two = edge_towards(shape, scale(normal, side), tilt)
+    one, way = add(centre, one), sub(two, one)
+    at, reach = dot(along, one), dot(along, way)
+    slope = dot(normal, way) / reach if reach != 0.0 else 0.0
+    height = dot(normal, one) + side * rounding_by_address(shape)
+    return min(at, at + reach), max(at, at + reach), at, height, slope
+
+
+@part
+def points_2d(pair, d, met, within, places, gaps):
+    """Both ends of the interval that two edges share; 0 if they share none."""
+    depth, normal, point = met
     margin, tilt = within
-    parameters, shape = state.shapes.parameters, state.bodies.shape
-    one, other = convex_at(parameters[shape[a]], a), convex_at(parameters[shape[b]], b)
-    places[0], gaps[0] = point, -depth
-    if one[0] == 0 or other[0] == 0 or len(d) > 2:
-        return 1
-    along = replace(replace(normal, 0, -item(normal, 1)), 1, item(normal, 0))
-    back, apart = negative(normal), -depth
-    a_high = support_by_address(one, add_scaled(normal, along, tilt))
-    a_low = support_by_address(one, add_scaled(normal, along, -tilt))
-    b_high = add(d, support_by_address(other, add_scaled(back, along, tilt)))
-    b_low = add(d, support_by_address(other, add_scaled(back, along, -tilt)))
-    high, low = min(dot(a_high, along), dot(b_high, along)), max(dot(a_low, along), dot(b_low, along))
-    if not high - low > SHORT * (abs(high) + abs(low)):
-        return 1
-    count = 0
-    for e in range(2):
-        at = high if e == 0 else low
-        share_a = (at - dot(a_low, along)) / (dot(a_high, along) - dot(a_low, along))
-        share_b = (at - dot(b_low, along)) / (dot(b_high, along) - dot(b_low, along))
-        level_a = dot(a_low, normal) * (1.0 - share_a) + dot(a_high, normal) * share_a + rounding_by_address(one)
-        level_b = dot(b_low, normal) * (1.0 - share_b) + dot(b_high, normal) * share_b - rounding_by_address(other)
-        apart = level_b - level_a
-        if apart <= margin:
-            places[count], gaps[count] = add_scaled(scale(normal, 0.5 * (level_a + level_b)), along, at), apart
+    level, along = dot(normal, point), (-normal[1], normal[0])
+    low_a, high_a, at_a, height_a, slope_a = profile(pair[0], scale(d, 0.0), normal, (1.0, tilt, level + 0.5 * depth))
+    low_b, high_b, at_b, height_b, slope_b = profile(pair[1], d, normal, (-1.0, tilt, level - 0.5 * depth))
+    low, high = max(low_a, low_b), min(high_a, high_b)
+    if not high - low > FLAT * min(high_a - low_a, high_b - low_b):
+        return 0
+    for k in range(2):
+        at = low if k == 0 else high
+        top, bottom = height_a + slope_a * (at - at_a), height_b + slope_b * (at - at_b)
+        store(places, k, add_scaled(scale(along, at), normal, 0.5 * (top + bottom)))
+        gaps[k] = bottom - top
+    return keep_near(places, gaps, 2, margin, d)
+
+
+# -- 3D: all in coordinates (x, y, height), which ``basis`` gives: two tangents and the normal ------
+
+
+@inlined
+def basis_of(normal):
+    """Two tangents and the normal; the first tangent is the same for the opposite normal."""
+    axis = (0.0, 1.0, 0.0) if abs(normal[0]) > STEEP else (1.0, 0.0, 0.0)
+    along = add_scaled(axis, normal, -dot(axis, normal))
+    along = scale(along, 1.0 / math.sqrt(dot(along, along)))
+    return along, cross(normal, along), normal
+
+
+@inlined
+def coordinates(basis, vector):
+    """Of a vector of the world."""
+    return dot(basis[0], vector), dot(basis[1], vector), dot(basis[2], vector)
+
+
+@inlined
+def vector_of(basis, x, y, height):
+    """The vector of the world with these coordinates."""
+    return add_scaled(add_scaled(scale(basis[0], x), basis[1], y), basis[2], height)
+
+
+@inlined
+def is_same(one, two):
+    """Whether two corners are one."""
+    way = sub(two, one)
+    return dot(way, way) <= SAME * SAME * dot(one, one)
+
+
+@part
+def corners_around(shape, basis, side, tilt, corners):
+    """Write the corners in directions around the normal, counter-clockwise as seen against it; returns how many."""
+    count, outward = 0, scale(basis[2], side)
+    for k in range(DIRECTIONS):
+        angle = (k + 0.5) * 2.0 * math.pi / DIRECTIONS  # never along the axes: boxes have two corners there
+        x, y = tilt * math.cos(angle), tilt * math.sin(angle)
+        direction = add(outward, vector_of(basis, x, y, 0.0))
+        found = coordinates(basis, support_by_address(shape, direction))
+        if count == 0 or not is_same(row(corners, count - 1, found), found):
+            store(corners, count, found)
             count += 1
-    return max(count, 1)
+    while count > 1 and is_same(row(corners, 0, outward), row(corners, count - 1, outward)):
+        count -= 1
+    return count
+
+
+@part
+def slope_of(shape, basis, face, corners, count):
+    """(whether the corners are those of a flat face, how its height changes with x, with y). face: as in profile."""
+    side, tilt, _ = face
+    first = row(corners, 0, basis[0])
+    way = sub(row(corners, 1, first), first)
+    size = dot(way, way)
+    up = (-way[0] * way[2], -way[1] * way[2], way[0] * way[0] + way[1] * way[1])  # of an edge
+    if count > 2:
+        up = scale(up, 0.0)
+    for k in range(2, count):
+        following = sub(row(corners, k, first), first)
+        up, way = add(up, cross(way, following)), following
+        size = max(size, dot(way, way))
+    square = dot(up, up)
+    if not (up[2] > 0.0 and up[2] * up[2] >= (1.0 - 4.0 * tilt * tilt) * square):
+        return False, 0.0, 0.0
+    most = FLAT * math.sqrt(square * size)
+    beyond = coordinates(basis, support_by_address(shape, scale(vector_of(basis, up[0], up[1], up[2]), side)))
+    if side * dot(up, sub(beyond, first)) > most:
+        return False, 0.0, 0.0
+    for k in range(1, count):
+        if abs(dot(up, sub(row(corners, k, first), first))) > most:
+            return False, 0.0, 0.0
+    return True, -up[0] / up[2], -up[1] / up[2]
+
+
+@part
+def face_towards(shape, centre, basis, face, corners):
+    """Write the corners of a face: (how many, how its height changes with x, with y). face: as in profile.
+
+    0: a plane without end, whose height is that of the first corner. 1: no face and no edge.
+    """
+    side, tilt, level = face
+    if shape[0] == 0:
+        store(corners, 0, (0.0, 0.0, level))
+        return 0, 0.0, 0.0
+    for _ in range(2):
+        count = corners_around(shape, basis, side, tilt, corners)
+        if count == 1:
+            break
+        is_flat, along_x, along_y = slope_of(shape, basis, (side, tilt, level), corners, count)
+        if is_flat:
+            origin = add_scaled(coordinates(basis, centre), (0.0, 0.0, 1.0), side * rounding_by_address(shape))
+            for k in range(count):
+                store(corners, k, add(origin, row(corners, k, origin)))
+            return count, along_x, along_y
+        tilt *= FINER
+    return 1, 0.0, 0.0
+
+
+@inlined
+def size_of(corners, count):
+    """How far the others are from the first corner."""
+    square = 0.0
+    for k in range(1, count):
+        x, y = corners[k, 0] - corners[0, 0], corners[k, 1] - corners[0, 1]
+        square = max(square, x * x + y * y)
+    return math.sqrt(square)
+
+
+@part
+def clip(subject, count, clipper, edges):
+    """Cut from one polygon, or edge, in x and y what is outside of another; returns how many corners it has then.
+
+    Both run counter-clockwise. Corners on the rim of the other are inside, and of several close together one is kept.
+    """
+    other = stack_array(ROOM, (0.0, 0.0, 0.0))
+    near = FLAT * min(size_of(subject, count), size_of(clipper, edges))
+    like = (0.0, 0.0, 0.0)
+    for e in range(edges):
+        start, end = row(clipper, e, like), row(clipper, e + 1 if e + 1 < edges else 0, like)
+        along, kept = sub(end, start), 0
+        length = math.sqrt(along[0] * along[0] + along[1] * along[1])
+        inward = (-along[1] / length, along[0] / length, 0.0)
+        for k in range(count):
+            one, two = row(subject, k, like), row(subject, k + 1 if k + 1 < count else 0, like)
+            inside_one, inside_two = dot(inward, sub(one, start)), dot(inward, sub(two, start))
+            if inside_one >= -near and kept < ROOM:
+                store(other, kept, one)
+                kept += 1
+            if (inside_one >= -near) != (inside_two >= -near) and kept < ROOM:
+                share = min(max(inside_one / (inside_one - inside_two), 0.0), 1.0)
+                store(other, kept, add_scaled(one, sub(two, one), share))
+                kept += 1
+        count = 0
+        for k in range(kept):
+            before = row(other, k - 1 if k > 0 else kept - 1, like)
+            way = sub(row(other, k, like), before)
+            if way[0] * way[0] + way[1] * way[1] > near * near or (count == 0 and k + 1 == kept):
+                store(subject, count, row(other, k, like))
+                count += 1
+    return count
+
+
+@part
+def points_of_edges(of_a, of_b, width, within, found, gaps):
+    """Both ends of what two nearly parallel edges share; 0 if they cross, or are not near at both. width: the sum of
+    their roundings, which touch round about where the edges are beside each other."""
+    margin, tilt = within
+    like = (0.0, 0.0, 0.0)
+    a, b = row(of_a, 0, like), row(of_b, 0, like)
+    way_a, way_b = sub(row(of_a, 1, like), a), sub(row(of_b, 1, like), b)
+    long_a, long_b = size_of(of_a, 2), size_of(of_b, 2)
+    turned = (way_a[0] * way_b[1] - way_a[1] * way_b[0]) / (long_a * long_b)
+    if not abs(turned) <= tilt:
+        return 0
+    same = way_a[0] * way_b[0] + way_a[1] * way_b[1] >= 0.0
+    along = add_scaled(scale(way_a, 1.0 / long_a), way_b, (1.0 if same else -1.0) / long_b)
+    size = math.sqrt(along[0] * along[0] + along[1] * along[1])
+    along = (along[0] / size, along[1] / size, 0.0)
+    at_a, at_b, reach_a, reach_b = dot(along, a), dot(along, b), dot(along, way_a), dot(along, way_b)
+    low = max(min(at_a, at_a + reach_a), min(at_b, at_b + reach_b))
+    high = min(max(at_a, at_a + reach_a), max(at_b, at_b + reach_b))
+    narrow = FLAT * min(long_a, long_b)
+    if not high - low > narrow:
+        return 0
+    for k in range(2):
+        at = low if k == 0 else high
+        on_a, on_b = add_scaled(a, way_a, (at - at_a) / reach_a), add_scaled(b, way_b, (at - at_b) / reach_b)
+        way = sub(on_b, on_a)
+        aside = way[1] * along[0] - way[0] * along[1]
+        if abs(aside) >= max(width, narrow):
+            return 0
+        gaps[k] = way[2] + width - math.sqrt(max(width * width - aside * aside, 0.0))
+        if gaps[k] > margin:
+            return 0
+        store(found, k, add_scaled(on_a, way, 0.5))
+    return 2
+
+
+@inlined
+def best_of(values, scores, count, slack):
+    """The one of the highest score among those that are within the slack of the highest value."""
+    most, best = values[0], -1
+    for k in range(1, count):
+        most = max(most, values[k])
+    for k in range(count):
+        if values[k] >= most - slack and (best < 0 or scores[k] > scores[best]):
+            best = k
+    return best
+
+
+@part
+def reduce(found, gaps, count, preferred):
+    """Keep four points in their order: the deepest, the farthest from it, the widest on both sides of that line."""
+    values, scores, size = stack_array(ROOM, 0.0), stack_array(ROOM, 0.0), size_of(found, count)
+    for k in range(count):
+        values[k], scores[k] = -gaps[k], dot(preferred, (found[k, 0], found[k, 1], 0.0))
+    one = best_of(values, scores, count, FLAT * size)
+    x, y = found[one, 0], found[one, 1]
+    for k in range(count):
+        values[k] = (found[k, 0] - x) * (found[k, 0] - x) + (found[k, 1] - y) * (found[k, 1] - y)
+    two = best_of(values, scores, count, FLAT * size * size)
+    along_x, along_y = found[two, 0] - x, found[two, 1] - y
+    for k in range(count):
+        values[k] = along_x * (found[k, 1] - y) - along_y * (found[k, 0] - x)
+    left = best_of(values, scores, count, FLAT * size * size)
+    for k in range(count):
+        values[k] = -values[k]
+    right, kept = best_of(values, scores, count, FLAT * size * size), 0
+    for k in range(count):
+        if k in (one, two, left, right):
+            store(found, kept, row(found, k, preferred))
+            gaps[kept] = gaps[k]
+            kept += 1
+    return kept
+
+
+@part
+def points_3d(pair, d, met, within, places, gaps):
+    """The corners of what two faces share, at most four; 0 if they share nothing."""
+    depth, normal, point = met
+    margin, tilt = within
+    basis, level = basis_of(normal), dot(normal, point)
+    of_a, of_b = stack_array(ROOM, (0.0, 0.0, 0.0)), stack_array(ROOM, (0.0, 0.0, 0.0))
+    apart = stack_array(ROOM, 0.0)
+    face = (1.0, tilt, level + 0.5 * depth)
+    count_a, slope_ax, slope_ay = face_towards(pair[0], scale(d, 0.0), basis, face, of_a)
+    if count_a == 1:
+        return 0
+    count_b, slope_bx, slope_by = face_towards(pair[1], d, basis, (-1.0, tilt, level - 0.5 * depth), of_b)
+    if count_b == 1:
+        return 0
+    if count_a == 2 and count_b == 2:
+        width = rounding_by_address(pair[0]) + rounding_by_address(pair[1])
+        found = stack_array(2, (0.0, 0.0, 0.0))
+        count = points_of_edges(of_a, of_b, width, within, found, apart)
+    else:
+        base_a, base_b = row(of_a, 0, d), row(of_b, 0, d)
+        of_first = count_b == 0 or 0 < count_a <= count_b  # clip the one of fewer corners, which may be an edge
+        found, other = (of_a, of_b) if of_first else (of_b, of_a)
+        count, edges = (count_a, count_b) if of_first else (count_b, count_a)
+        if edges > 0:
+            count = clip(found, count, other, edges)
+        for k in range(count):
+            x, y = found[k, 0], found[k, 1]
+            top = base_a[2] + slope_ax * (x - base_a[0]) + slope_ay * (y - base_a[1])
+            bottom = base_b[2] + slope_bx * (x - base_b[0]) + slope_by * (y - base_b[1])
+            found[k, 2], apart[k] = 0.5 * (top + bottom), bottom - top
+    if count < 2:
+        return 0
+    count = keep_near(found, apart, count, margin, d)
+    if count > MOST_POINTS:
+        count = reduce(found, apart, count, coordinates(basis, PREFERRED))
+    for k in range(count):
+        store(places, k, vector_of(basis, found[k, 0], found[k, 1], found[k, 2]))
+        gaps[k] = apart[k]
+    return count

@@ -96,15 +96,21 @@ class LinkedShapes:
     def all_functions(self, sweeps: bool, moments: bool) -> Iterator[Linked]:
         """Everything that a step may call for these shapes; sweeps: where there are swept bodies; moments: where some
         stage asks for them."""
+        by_address = self.supported(moments)
         for number, function in enumerate(self.functions):
-            taken = number in self.warm_started or (moments and function.shape.support is not None)
-            yield from function.all_functions(by_address=taken)
+            yield from function.all_functions(by_address=number in by_address)
             if moments and function.moments is not None:
                 yield function.moments
         yield from self._rules
         for pair in self.pairs.values():
             if pair is not None:
                 yield from pair.functions(sweeps)
+
+    def supported(self, moments: bool) -> set[int]:
+        """Shapes whose records have the addresses of support and rounding: all that have a support where moments are
+        asked for, because what spins touches in several points."""
+        spinning = (number for number, shape in enumerate(self.shapes) if moments and shape.support is not None)
+        return self.warm_started.union(spinning)
 
     def _table(self, name: str) -> np.ndarray:
         """Addresses of a function, by shape, or for pairs at first * count + second; 0 where there is none."""
@@ -130,14 +136,15 @@ def addresses(functions: Any) -> np.ndarray:
 class ParameterRecords:
     """The parameter records of one world: of each shape as its component has it, and as it is in the world.
 
-    Both are one record for shapes that rotation does not change, and while no body is rotated.
+    Both are one record for shapes that rotation does not change, and while no body is rotated. moments: as in
+    :meth:`LinkedShapes.supported`.
     """
 
-    def __init__(self, linked: LinkedShapes) -> None:
+    def __init__(self, linked: LinkedShapes, moments: bool = False) -> None:
         self._linked = linked
         self.own = [make_parameter_record(shape, linked.dimensions) for shape in linked.shapes]
         self.world = list(self.own)
-        for number in linked.warm_started:
+        for number in linked.supported(moments):
             self.need_support(number)
 
     def bind(

@@ -23,7 +23,7 @@ from ....framework.jit.records.schema import Column, Schema, axes, floats, integ
 from ....framework.plugins.registry import Shape
 
 # What every parameter record begins with.
-HEADER_FIELDS = {"support": integer(), "rounding": integer()}  # addresses; 0 until a generic convex pair needs them
+HEADER_FIELDS = {"support": integer(), "rounding": integer()}  # addresses; 0 until some function calls by them
 HEADER = Schema("ShapeHeader", **HEADER_FIELDS)
 
 
