@@ -22,6 +22,8 @@ SAME = 1e-12  # of the coordinates: corners that are no farther apart are one
 FLAT = 1e-6  # of its size: how far a face may be from flat; what is shared and narrower is a point
 FINER = 1e-3  # of the tilt: looks for the face that lies flat where several are within the tilt, or none is flat
 DIRECTIONS = 8  # around the normal, in 3D: a face of more corners shows so many of them
+START = math.cos(math.pi / 8), math.sin(math.pi / 8)  # the first: off the axes, where boxes have two corners
+SLANT = math.sqrt(0.5)  # sine and cosine of the way from one to the next
 ROOM = 2 * DIRECTIONS  # each edge of a convex polygon that clips another adds at most one corner
 STEEP = 0.83  # cosine: a normal nearer to the x axis takes the y axis for its basis
 PREFERRED = (0.61, 0.35, 0.71)  # any direction: of points that are equally good the farthest that way is kept
@@ -169,14 +171,14 @@ def is_same(one, two):
 def corners_around(shape, basis, side, tilt, corners):
     """Write the corners in directions around the normal, counter-clockwise as seen against it; returns how many."""
     count, outward = 0, scale(basis[2], side)
-    for k in range(DIRECTIONS):
-        angle = (k + 0.5) * 2.0 * math.pi / DIRECTIONS  # never along the axes: boxes have two corners there
-        x, y = tilt * math.cos(angle), tilt * math.sin(angle)
+    x, y = tilt * START[0], tilt * START[1]
+    for _ in range(DIRECTIONS):
         direction = add(outward, vector_of(basis, x, y, 0.0))
         found = coordinates(basis, support_by_address(shape, direction))
         if count == 0 or not is_same(row(corners, count - 1, found), found):
             store(corners, count, found)
             count += 1
+        x, y = SLANT * (x - y), SLANT * (x + y)
     while count > 1 and is_same(row(corners, 0, outward), row(corners, count - 1, outward)):
         count -= 1
     return count
