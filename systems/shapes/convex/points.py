@@ -26,6 +26,8 @@ START = math.cos(math.pi / 8), math.sin(math.pi / 8)  # the first: off the axes,
 SLANT = math.sqrt(0.5)  # sine and cosine of the way from one to the next
 ROOM = 2 * DIRECTIONS  # each edge of a convex polygon that clips another adds at most one corner
 STEEP = 0.83  # cosine: a normal nearer to the x axis takes the y axis for its basis
+AS_DEEP = 1e-3  # of the size of what is shared: points are about as deep as each other
+PREFERENCE = 0.01  # how much of that size is worth a place farther
 PREFERRED = (0.61, 0.35, 0.71)  # any direction: of points that are equally good the farthest that way is kept
 
 
@@ -329,11 +331,18 @@ def best_of(values, scores, count, slack):
 
 @part
 def reduce(found, gaps, count, preferred):
-    """Keep four points in their order: the deepest, the farthest from it, the widest on both sides of that line."""
+    """Keep four points in their order: one of the deepest, the farthest from it, the widest on both sides of that line.
+
+    Of those that are about as deep the one farthest out: edges that nearly lie on each other cross anywhere.
+    """
     values, scores, size = stack_array(ROOM, 0.0), stack_array(ROOM, 0.0), size_of(found, count)
+    x = y = 0.0
     for k in range(count):
-        values[k], scores[k] = -gaps[k], dot(preferred, (found[k, 0], found[k, 1], 0.0))
-    one = best_of(values, scores, count, FLAT * size)
+        x, y = x + found[k, 0] / count, y + found[k, 1] / count
+    for k in range(count):
+        out = (found[k, 0] - x) * (found[k, 0] - x) + (found[k, 1] - y) * (found[k, 1] - y)
+        values[k], scores[k] = -gaps[k], out + PREFERENCE * size * dot(preferred, (found[k, 0], found[k, 1], 0.0))
+    one = best_of(values, scores, count, AS_DEEP * size)
     x, y = found[one, 0], found[one, 1]
     for k in range(count):
         values[k] = (found[k, 0] - x) * (found[k, 0] - x) + (found[k, 1] - y) * (found[k, 1] - y)
