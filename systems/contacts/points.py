@@ -5,8 +5,10 @@ from __future__ import annotations
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.stack_arrays import stack_array
-from ...framework.vectors import add, add_scaled, length, row, scale, store, sub
-from ..narrow_phase.manifolds import centre_offset_at_start, evaluate_pair, has_manifold
+from ...framework.vectors import add, add_scaled, dot, length, row, scale, store, sub
+from ..ccd.turns import first_touch_of_turn
+from ..integration.turning import turn_of_arm
+from ..narrow_phase.manifolds import centre_offset_at_start, evaluate_pair, forget_manifold, has_manifold
 from ..shapes.convex.points import MOST_POINTS, contact_points
 from ..shapes.linking.convex_by_address import convex_at, rounding_by_address
 from ..shapes.tolerances import turning_margin
@@ -71,3 +73,37 @@ def lay_arms(state, dt, r, gap):
         solver.core_b[k] = add_scaled(solver.arm_b[k], normal, round_b)
 
 
+
+
+@part
+def lay_first_touch(state, r):
+    """The rows of a pair of which one body turns far, if it touches on the way: at one point, as they are turned then.
+
+    The gap and the arms are those of the moment of touch, led back to where the shapes stand in the other rows.
+    """
+    solver, pairs, bodies = state.solver, state.pairs, state.bodies
+    c, k = solver.pair[r], solver.slot[r]
+    a, b = pairs.a[c], pairs.b[c]
+    touches, share, gap, normal, point = first_touch_of_turn(state, a, b)
+    if not touches:
+        return
+    start = sub(bodies.previous_position[b], bodies.previous_position[a])
+    travel = sub(sub(bodies.position[b], bodies.position[a]), start)
+    left_a, left_b = scale(bodies.turn[a], share - 1.0), scale(bodies.turn[b], share - 1.0)
+    arm_a = add(add(bodies.offset[a], turn_of_arm(left_a, bodies.offset[a])), add_scaled(point, normal, -0.5 * gap))
+    arm_b = sub(add(arm_a, scale(normal, gap)), add_scaled(start, travel, share))
+    if bodies.rolling_radius[a] > 0.0:
+        arm_a = scale(normal, bodies.rolling_radius[a])
+    if bodies.rolling_radius[b] > 0.0:
+        arm_b = scale(normal, -bodies.rolling_radius[b])
+    core_a, core_b = add_scaled(arm_a, normal, -rounding_of(state, a)), add_scaled(arm_b, normal, rounding_of(state, b))
+    core_a = add(core_a, turn_of_arm(scale(left_a, -1.0), core_a))
+    core_b = add(core_b, turn_of_arm(scale(left_b, -1.0), core_b))
+    before = add(scale(travel, share), sub(turn_of_arm(left_b, core_b), turn_of_arm(left_a, core_a)))
+    for e in range(points_of(state, c)):
+        one = solver.slot[r + e]
+        solver.normal[one], solver.apart[one], solver.parting[one] = normal, True, False
+        solver.arm_a[one], solver.arm_b[one], solver.core_a[one], solver.core_b[one] = arm_a, arm_b, core_a, core_b
+        solver.gap[one] = gap - dot(before, normal) if e == 0 else UNREACHED * solver.extent[one]
+    solver.place[k], pairs.normal[c] = point, normal
+    forget_manifold(pairs, c)

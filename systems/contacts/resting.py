@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add_scaled, dot, item, length, replace, sub
 from ..ccd.search_bounds import FAST, is_swept
+from ..ccd.turns import first_touch_of_turn, turns_far
 from ..codes import OK
 from ..impacts.impulses import STOPPED, is_rattling
 from ..narrow_phase.manifolds import (
@@ -23,7 +26,7 @@ from ..narrow_phase.manifolds import (
 from ..shapes.dispatch import both_convex, mix, mix_friction
 from ..shapes.tolerances import SAME_PLACE, contact_margin, slop_for, slop_of, smaller_extent, turning_margin
 from .approach import first_touch_on_segment, meets_at_corner, segment_start
-from .points import lay_arms, points_of
+from .points import lay_arms, lay_first_touch, points_of
 
 ENTRY_ITERATIONS = 24
 APART = 1e-11  # of the extent: a smaller gap is none, not even as seen past a round corner
@@ -54,6 +57,9 @@ def deepest(state, dt, c, d):
     way there; else by its manifold or its function."""
     pairs, bodies = state.pairs, state.bodies
     a, b = pairs.a[c], pairs.b[c]
+    if state.spinning and turns_far(state, a, b):
+        touches, _, _, normal, _ = first_touch_of_turn(state, a, b)
+        return slop_of(state, a, b) if touches else -math.inf, normal, touches
     far, gap, normal = touch_of_long_way(state, dt, a, b, d)
     if far:
         return -gap - dot(sub(d, centre_offset_at_start(bodies, a, b)), normal), normal, True
@@ -101,12 +107,13 @@ def is_resting(state, dt, c):
     if not pairs.near_contact[c] and not hit and not carried:
         return False
     margin, d = turning_margin(state, dt, a, b), centre_offset(bodies, a, b)
-    if pairs.early[c] and not hit and is_at_manifold(pairs, c, d, smaller_extent(bodies, a, b)):  # usual
+    turns = state.spinning and turns_far(state, a, b)
+    if pairs.early[c] and not hit and not turns and is_at_manifold(pairs, c, d, smaller_extent(bodies, a, b)):  # usual
         depth, normal, far = depth_by_plane(pairs, c, d), pairs.normal[c], False
     else:
         depth, normal, far = deepest(state, dt, c, d)
     was_near = pairs.near_contact[c] and has_manifold(pairs, c)  # not so pairs that were found within the step
-    if depth < -margin and (hit or not was_near):  # the prediction may push too much
+    if depth < -margin and (hit or turns or not was_near):  # the prediction may push too much
         return False
     if depth >= 0.0:
         pairs.near_contact[c] = True
@@ -217,6 +224,8 @@ def linearise(state, dt):
     for r in range(solver.contacts if state.spinning else 0):
         if solver.point[r] == 0:
             lay_arms(state, dt, r, solver.gap[solver.slot[r]])
+            if turns_far(state, pairs.a[solver.pair[r]], pairs.b[solver.pair[r]]):
+                lay_first_touch(state, r)
     return OK
 
 

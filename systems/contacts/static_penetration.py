@@ -11,6 +11,7 @@ from __future__ import annotations
 from ...framework.compilation import part
 from ...framework.vectors import add_scaled, dot, item, length, sub
 from ..ccd.search_bounds import FAST
+from ..ccd.turns import turns_far
 from ..codes import OK
 from ..impacts.impulses import STOPPED
 from ..integration.trajectory import along, path_of
@@ -34,6 +35,9 @@ def how_deep(state, c, a, b):
     travel = sub(d, start)
     way, allowed = length(travel), ALLOWED * extent
     found, depth, normal = False, 0.0, travel
+    if state.spinning and turns_far(state, a, b):  # where it started says nothing of the shapes at the end
+        _, depth, normal, _ = evaluate_pair(state, a, b, d)
+        return depth - allowed, normal
     if way > FAST * extent:
         found, gap, normal = first_touch_on_segment(state, a, b, start, travel, FAST * extent)
         depth = -gap - dot(travel, normal)

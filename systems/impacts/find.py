@@ -12,6 +12,7 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST, is_swept
 from ..ccd.time_of_impact import APART, AT_CORNER, TOUCHES, bounds_stay_disjoint, clear_of_rounding
+from ..ccd.turns import turns_far
 from ..integration.trajectory import (
     ROUNDING,
     along,
@@ -72,6 +73,8 @@ def find_touch(state, c, a, b, path, since, restitution, dt):
     impacts, bodies, zero = state.impacts, state.bodies, zero_of(state)
     swept, overlaps, end_normal, nothing = False, False, zero, (dt, zero, zero, zero)
     limits = slop_of(state, a, b), dt, -math.inf
+    if state.spinning and bodies.inverse_mass[a] * bodies.inverse_mass[b] == 0.0 and turns_far(state, a, b):
+        return NO_TOUCH, nothing  # contacts at rest know what a mill meets on its way
     if impacts.sweeps:
         since = max(since, bodies.last_impact[a], bodies.last_impact[b])
         passive, travel = not state.pairs.is_solid[c], travel_of(path, dt)

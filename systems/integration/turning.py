@@ -6,8 +6,12 @@ first component is the angular velocity, about the axis that leads out of the pl
 
 from __future__ import annotations
 
+import math
+
 from ...framework.compilation import inlined
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
+
+SMALL_TURN = 1e-4  # rad: its cube is nothing beside 1
 
 
 @inlined
@@ -70,9 +74,12 @@ def spin_energy(bodies, i, u, v):
 
 @inlined
 def turn_of_arm(turn, arm):
-    """By how much the end of an arm moves as it turns, to the second order."""
-    once = cross_spin(turn, arm)
-    return add_scaled(once, cross_spin(turn, once), 0.5)
+    """By how much the end of an arm moves as it turns; in space about the direction of the turn."""
+    once, square = cross_spin(turn, arm), dot(turn, turn)
+    if square < SMALL_TURN * SMALL_TURN:
+        return add_scaled(once, cross_spin(turn, once), 0.5)
+    size = math.sqrt(square)
+    return add_scaled(scale(once, math.sin(size) / size), cross_spin(turn, once), (1.0 - math.cos(size)) / square)
 
 
 @inlined

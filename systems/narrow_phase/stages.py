@@ -5,12 +5,12 @@ from __future__ import annotations
 from ...framework.compilation import inlined, part
 from ...framework.vectors import dot, length, sub
 from ..codes import NEED_ORDER, NEED_PAIRS, OK, RUN_BROAD
-from ..integration.turning import is_mill
 from ..shapes.dispatch import evaluate_batch
 from .manifolds import is_near, mark_early
 
 # Candidates are sorted by comparison if there are so many times more bodies, else by counting.
 BODIES_PER_CANDIDATE = 64
+FOLLOWED = 1.0  # rad in a step
 SURE = 1.0 - 1e-12  # factor that makes a number less than the exact one, whatever the rounding
 
 
@@ -161,13 +161,11 @@ def find_hasty(state, dt):
 
 
 @part
-def find_fast_turns(state, dt):
-    """Note a mill whose far end moves by more than the thinnest of all that moves is thick: shapes are looked at as
-    they are turned where the step ends."""
+def find_fast_turns(state):
+    """Note a body that turns farther in a step than contacts can follow: their rows stand for one moment of it."""
     bodies = state.bodies
-    for i in range(state.dynamic, state.moving):
-        reach = length(bodies.half_extents[i]) + length(bodies.offset[i])
-        if is_mill(bodies, i) and length(bodies.spin[i]) * dt * reach > state.thinnest_moving:
+    for i in range(state.first, state.moving):
+        if bodies.rolling_radius[i] == 0.0 and length(bodies.turn[i]) > FOLLOWED:
             state.turns_too_far = i + 1
 
 
@@ -184,7 +182,7 @@ def select_pairs(state, dt):
     state.too_fast_for_discrete, state.turns_too_far = False, 0
     find_hasty(state, dt)
     if state.spinning:
-        find_fast_turns(state, dt)
+        find_fast_turns(state)
     shape, kind, starts = bodies.shape, candidates.kind, candidates.bucket_starts
     for k in range(shapes.count * shapes.count + 2):
         starts[k] = 0

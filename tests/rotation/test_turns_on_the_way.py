@@ -1,0 +1,55 @@
+"""What turns far in a step meets what it passes, against poses sampled throughout the step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from carom.components import RigidBody, SphereCollider, Transform
+from carom.framework import Settings, World
+from carom.plugins import Physics
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
+
+PAIRS, APART, POSES = 250, 40.0, 4000
+HALF = np.array((1.0, 0.01))
+
+
+def least_gaps(places, velocities, angles, spins, radii, dt):
+    """Of each pair, by looks at so many times: the gap of a ball from a bar about the origin, negative inside."""
+    least = np.full(len(places), np.inf)
+    for t in np.linspace(0.0, dt, POSES):
+        angle, at = angles + spins * t, places + velocities * t
+        c, s = np.cos(angle), np.sin(angle)
+        own = np.abs(np.stack((c * at[:, 0] + s * at[:, 1], c * at[:, 1] - s * at[:, 0]), 1)) - HALF
+        outside = np.hypot(*np.maximum(own, 0.0).T)
+        least = np.minimum(least, outside + np.minimum(own.max(axis=1), 0.0) - radii)
+    return least
+
+
+@pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
+@pytest.mark.parametrize("fastest", [50.0, 500.0])
+@pytest.mark.parametrize("seed", range(2))
+def test_a_thin_bar_passes_through_no_ball_and_strikes_none_that_it_does_not_meet(seed, fastest, mode):
+    random, dt = np.random.default_rng(seed), 1 / 60
+    spins, angles = random.uniform(-fastest, fastest, PAIRS), random.uniform(-3, 3, PAIRS)
+    velocities, radii = random.uniform(-5, 5, (PAIRS, 2)), random.uniform(0.02, 0.2, PAIRS)
+    direction, far = random.uniform(-np.pi, np.pi, PAIRS), random.uniform(0.1, 1.4, PAIRS)
+    places = far[:, None] * np.stack((np.cos(direction), np.sin(direction)), 1)
+    free = least_gaps(places, velocities, angles, spins, radii, 0.0) > 0.02  # apart where the step starts
+    spins, angles, velocities, radii, places = (x[free] for x in (spins, angles, velocities, radii, places))
+    gaps = least_gaps(places, velocities, angles, spins, radii, dt)
+    with World(Physics(2, gravity=0), Rotation(), settings=Settings(collision=mode, on_fault="ignore")) as world:
+        balls = []
+        for k, place in enumerate(places):
+            centre = np.array((k * APART, 0.0))
+            world.create_entity(
+                Transform(centre, angles[k]), RigidBody(kind="kinematic"), Spin(spins[k]), BoxCollider(HALF)
+            )
+            body = RigidBody(linear_velocity=velocities[k])
+            balls.append(world.create_entity(Transform(centre + place), body, SphereCollider(radii[k])))
+        world.step()
+        after = np.array([world.component_for_entity(entity, RigidBody).linear_velocity for entity in balls])
+    struck = np.abs(after - velocities).max(axis=1) > 1e-9
+    assert struck[gaps < -1e-3].all()
+    assert not struck[gaps > 1e-3].any()
+    assert min((gaps < -1e-3).sum(), (gaps > 1e-3).sum()) > 15
