@@ -149,9 +149,9 @@ def _plugins_in(module: ModuleType, target: str) -> list[Plugin]:
 def needed_by(plugin: Plugin) -> list[Plugin]:
     """Other plugins whose shapes its pairs use: those in the modules of these shapes."""
     needed: dict[Plugin, None] = {}
-    for component in {component for pair in plugin.pairs for component in pair}:
+    for component in {component for pair in plugin.pairs for component in pair if component not in plugin.shapes}:
         module = module_of(component)
         for value in vars(module).values() if module is not None else ():
-            if isinstance(value, Plugin) and value is not plugin and component in value.shapes:
+            if isinstance(value, Plugin) and component in value.shapes:
                 needed[value] = None
     return sorted(needed, key=lambda each: each.name)

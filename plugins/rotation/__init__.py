@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from ...components.spin import Spin
 from ...framework import Plugin
-from .box import BoxCollider, boxes
+from .box import BoxCollider
+from .box_pairs import boxes
 from .stages import spinning
 
 
@@ -13,7 +14,7 @@ class Rotation(Plugin):
 
     def __init__(self) -> None:
         super().__init__("rotation", version="1.0")
-        self.shapes, self.stages = dict(boxes.shapes), dict(spinning.stages)
+        self.shapes, self.pairs, self.stages = dict(boxes.shapes), dict(boxes.pairs), dict(spinning.stages)
 
 
 __all__ = ["BoxCollider", "Rotation", "Spin"]

@@ -1,0 +1,132 @@
+"""How boxes that turn meet balls and other boxes: in a plane from their faces and corners, without a search."""
+
+from __future__ import annotations
+
+import collections
+import math
+
+from ...components import AABBCollider, SphereCollider
+from ...framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, scale
+from ...systems.shapes.convex.pair import convex_convex, middle_of_overlap
+from ..standard_shapes import sphere_box
+from .box import BoxCollider, boxes
+
+CLOSE = 1e-14  # of the coordinates: nearer than that a distance has no direction, as for any two convex shapes
+
+Level = collections.namedtuple("Level", "half_extents axes")  # a box that never turns, as one that does
+ball_and_box = boxes.kernel(sphere_box)
+
+
+@boxes.kernel
+def level(box, like):
+    """A box that never turns, with the axes of the world."""
+    if len(like) == 2:
+        return Level(box.half_extents, ((1.0, 0.0), (0.0, 1.0)))
+    return Level(box.half_extents, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+
+
+@boxes.kernel
+def support(box, direction):
+    """The corner that lies farthest in a direction."""
+    corner = scale(direction, 0.0)
+    for j in range(len(direction)):
+        half = item(box.half_extents, j)
+        corner = add_scaled(corner, box.axes[j], half if dot(box.axes[j], direction) >= 0.0 else -half)
+    return corner
+
+
+@boxes.kernel
+def sharp(box):
+    """Boxes are not rounded."""
+    return 0.0
+
+
+@boxes.kernel
+def along_axes(box, vector):
+    """A vector of the world along the axes of a box."""
+    result = vector
+    for k in range(len(vector)):
+        result = replace(result, k, dot(box.axes[k], vector))
+    return result
+
+
+@boxes.kernel
+def in_world(box, vector):
+    """The vector of the world that leads so far along the axes of a box."""
+    result = scale(vector, 0.0)
+    for k in range(len(vector)):
+        result = add_scaled(result, box.axes[k], item(vector, k))
+    return result
+
+
+@boxes.kernel
+def farthest_face(a, b, d):
+    """In a plane: (distance, outward normal) of the face of a that all of b lies farthest beyond."""
+    most, outward = -math.inf, d
+    for k in range(len(d)):
+        at = dot(a.axes[k], d)
+        gap = abs(at) - item(a.half_extents, k)
+        for j in range(len(d)):
+            gap -= item(b.half_extents, j) * abs(dot(a.axes[k], b.axes[j]))
+        if gap > most:
+            most, outward = gap, scale(a.axes[k], 1.0 if at >= 0.0 else -1.0)
+    return most, outward
+
+
+@boxes.kernel
+def to_nearest_corner(a, b, d):
+    """In a plane: from the point of a that comes nearest to a corner of b, to that corner."""
+    least, nearest = math.inf, d
+    for k in range(4):
+        x = item(b.half_extents, 0) * (1.0 if k < 2 else -1.0)
+        y = item(b.half_extents, 1) * (1.0 if k % 2 == 0 else -1.0)
+        corner = along_axes(a, add(d, add_scaled(scale(b.axes[0], x), b.axes[1], y)))
+        for j in range(len(d)):
+            at, half = item(corner, j), item(a.half_extents, j)
+            corner = replace(corner, j, at - min(max(at, -half), half))
+        if dot(corner, corner) < least:
+            least, nearest = dot(corner, corner), corner
+    return in_world(a, nearest)
+
+
+@boxes.kernel
+def apart_in_plane(a, b, d, normal, distance):
+    """(distance, normal) of two boxes which a face parts by ``distance``: that of two corners, if no corner is above
+    that face."""
+    one, other = to_nearest_corner(a, b, d), negative(to_nearest_corner(b, a, negative(d)))
+    way = one if length(one) <= length(other) else other
+    true = length(way)
+    return (true, divided(way, true)) if true > distance * (1.0 + CLOSE) else (distance, normal)
+
+
+@boxes.kernel
+def two_boxes(a, b, d):
+    """In a plane the way out is across a face of one of them; apart, a face or two corners are nearest."""
+    if len(d) == 3:
+        return convex_convex(a, b, d, support, support, sharp, sharp)
+    distance, normal = farthest_face(a, b, d)
+    other, inward = farthest_face(b, a, negative(d))
+    if other > distance:
+        distance, normal = other, negative(inward)
+    size = length(d) + length(a.half_extents) + length(b.half_extents)
+    if distance > CLOSE * size:
+        distance, normal = apart_in_plane(a, b, d, normal, distance)
+    point = middle_of_overlap((a, b, support, support, 1.0), d, normal)
+    return distance <= 0.0, -distance, normal, add_scaled(point, normal, 0.5 * distance)
+
+
+boxes.pair(BoxCollider, BoxCollider)(two_boxes)
+
+
+@boxes.pair(AABBCollider, BoxCollider)
+def level_and_turned_box(a, b, d):
+    """Two boxes, one of which has the axes of the world."""
+    return two_boxes(level(a, d), b, d)
+
+
+@boxes.pair(SphereCollider, BoxCollider)
+def sphere_turned_box(a, b, d):
+    """As a box that never turns, seen along its axes; the point is in the middle of the overlap."""
+    hit, depth, normal, _ = ball_and_box(a, b, along_axes(b, d))
+    normal = in_world(b, normal)
+    return hit, depth, normal, scale(normal, a.radius - 0.5 * depth)
