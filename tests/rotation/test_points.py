@@ -222,6 +222,17 @@ def test_what_has_no_face_there_touches_in_the_point_of_the_pair(d):
             assert np.abs(places[0]).max() < 1.5
 
 
+@pytest.mark.parametrize(("turn", "count"), [(0.0, 1), (0.5, 2)])
+def test_a_polygon_of_many_edges_lies_on_one_of_them_or_on_a_corner(turn, count):
+    """Though several are within the tilt: what rolls on them is held by none that is not on the ground yet."""
+    edge = 2 * math.pi / 400
+    wheel = ConvexPolygonCollider.regular(400, 1.0)
+    with Pair(HalfSpaceCollider((0, 1)), wheel, 2, (None, -math.pi / 2 + turn * edge)) as pair:
+        depth, _, places, gaps = pair.at((0, 0.999))
+        assert np.allclose(gaps, -depth, atol=1e-12)
+        assert np.allclose(sorted(places[:, 0]), [0.0] if count == 1 else (-0.5 * edge, 0.5 * edge), atol=1e-6)
+
+
 def test_edges_lie_on_faces_and_along_each_other_in_two_points():
     """In 3D: a box on its edge, and capsules beside each other, level, askew by little, and by more."""
     edge, level = rotation(0, 0, math.pi / 4), rotation(0, 0, math.pi / 2)
