@@ -13,9 +13,10 @@ from carom.framework.compilation import kernel
 from carom.framework.jit.records.record_type import record_at, zero_of
 from carom.framework.jit.stack_arrays import stack_array
 from carom.framework.vectors import row, store
-from carom.plugins import Physics, capsule, convex_polygon, half_space
+from carom.plugins import Physics, capsule, convex_polygon, half_space, tile_grid
 from carom.plugins.half_space import HalfSpaceCollider
 from carom.plugins.rotation import Rotation
+from carom.plugins.tile_grid import TileGridCollider
 from carom.systems.records import STATE
 from carom.systems.shapes.convex.points import contact_points
 from carom.systems.shapes.dispatch import evaluate
@@ -52,12 +53,12 @@ class Pair:
     def __init__(self, one, two, d, turn=None, margin=MARGIN, tilt=TILT):
         self.world = World(
             Physics(d, gravity=0), Rotation(), capsule.plugin, half_space.plugin,
-            *([convex_polygon.plugin] if d == 2 else []),
+            *([convex_polygon.plugin, tile_grid.plugin] if d == 2 else []),
         )  # fmt: skip
         self.d, self.within, rows = d, np.array((margin, tilt)), []
         turns = (None, None) if turn is None else turn
         for k, (shape, angle) in enumerate(zip((one, two), turns, strict=True)):
-            ground = isinstance(shape, HalfSpaceCollider)
+            ground = isinstance(shape, (HalfSpaceCollider, TileGridCollider))
             place = (np.eye(d)[0] * k + np.eye(d)[1] * (-1 if ground else 1)) * FAR
             body = [RigidBody(kind="static")] if ground else [RigidBody(1.0)]
             rows.append(

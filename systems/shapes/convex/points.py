@@ -13,7 +13,7 @@ import math
 
 from ....framework.compilation import inlined, part
 from ....framework.jit.stack_arrays import stack_array
-from ....framework.vectors import add, add_scaled, dot, item, row, scale, store, sub
+from ....framework.vectors import add, add_scaled, dot, item, negative, replace, row, scale, store, sub
 from ..linking.convex_by_address import convex_at, rounding_by_address, support_by_address
 from .gjk import cross
 
@@ -46,7 +46,7 @@ def contact_points(state, rows, d, met, within, places, gaps):
     depth, _, point = met
     parameters, shape, count = state.shapes.parameters, state.bodies.shape, 0
     a, b = convex_at(parameters[shape[rows[0]]], rows[0]), convex_at(parameters[shape[rows[1]]], rows[1])
-    if (a[0] != 0 or is_plane(state, rows[0])) and (b[0] != 0 or is_plane(state, rows[1])):
+    if may_have_face(state, a, d) and may_have_face(state, b, d):
         if len(d) == 2:
             count = points_2d((a, b), d, met, within, places, gaps)
         else:
@@ -59,12 +59,27 @@ def contact_points(state, rows, d, met, within, places, gaps):
 
 
 @inlined
-def is_plane(state, i):
-    """Whether a shape without a support counts as a plane: it is convex and has no end on any side."""
-    half, endless = state.bodies.half_extents[i], not state.shapes.concave[state.bodies.shape[i]]
+def may_have_face(state, shape, like):
+    """Not balls, whose core is a point, nor what has neither a support nor the form of a plane: convex without end."""
+    if shape[0] != 0:
+        way = like
+        for k in range(len(like)):
+            way = replace(way, k, PREFERRED[k])
+        return not (
+            rounding_by_address(shape) > 0.0
+            and is_same(support_by_address(shape, way), support_by_address(shape, negative(way)))
+        )
+    half, endless = state.bodies.half_extents[shape[3]], not state.shapes.concave[state.bodies.shape[shape[3]]]
     for k in range(len(half)):
         endless = endless and item(half, k) == math.inf
     return endless
+
+
+@inlined
+def is_same(one, two):
+    """Whether two corners are one."""
+    way = sub(two, one)
+    return dot(way, way) <= SAME * SAME * dot(one, one)
 
 
 @inlined
@@ -160,13 +175,6 @@ def coordinates(basis, vector):
 def vector_of(basis, x, y, height):
     """The vector of the world with these coordinates."""
     return add_scaled(add_scaled(scale(basis[0], x), basis[1], y), basis[2], height)
-
-
-@inlined
-def is_same(one, two):
-    """Whether two corners are one."""
-    way = sub(two, one)
-    return dot(way, way) <= SAME * SAME * dot(one, one)
 
 
 @part
