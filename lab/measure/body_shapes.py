@@ -1,4 +1,4 @@
-"""The spheres and boxes of a world as plain arrays, for pictures and measurements, and how deep they overlap."""
+"""The shapes of a world as plain arrays, for pictures and measurements, and how deep they overlap."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...components import AABBCollider, SphereCollider
+from ...components.spin import Spin
 from ...framework import World
 from ...systems.shapes.rotation import axes_of
+from .outlines import OUTLINES, SIGNS, depths, outlines_of
 
 Floats = NDArray[np.float64]
 QUIET = np.errstate(over="ignore", invalid="ignore")  # bodies out of range are reported without warnings
@@ -18,10 +20,13 @@ QUIET = np.errstate(over="ignore", invalid="ignore")  # bodies out of range are 
 
 @dataclass(frozen=True)
 class Shapes:
-    """One row per collider. A box has half extents (d); a sphere has its radius in each of them.
+    """One row per collider. ``half``: half extents of the box around it; a sphere has its radius in each of them.
 
     ``entity (n,)``, ``centre (n, d)``, ``half (n, d)``, ``speed (n,)``, ``round (n,)`` true for spheres,
     ``static (n,)`` true for static bodies, ``sensor (n,)`` true for sensors.
+    ``outline (n,)``: of what turns in a plane its corners as they are turned, (m, 2) about the centre, of others None;
+    ``rounding (n,)``: how far it goes beyond these, of spheres the radius; ``size (n,)``: the smallest extent.
+    ``hand (n, d)``: of a sphere that spins in a plane the way from its centre to a point on it, of others NaN.
     """
 
     entity: NDArray[np.int64]
@@ -31,6 +36,10 @@ class Shapes:
     round: NDArray[np.bool_]
     static: NDArray[np.bool_]
     sensor: NDArray[np.bool_]
+    outline: NDArray[np.object_]
+    rounding: Floats
+    size: Floats
+    hand: Floats
 
     @property
     def lower(self) -> Floats:
@@ -41,13 +50,28 @@ class Shapes:
         return self.centre + self.half
 
     @property
+    def turns(self) -> NDArray[np.bool_]:
+        """Which rows have an outline."""
+        return np.array([outline is not None for outline in self.outline], bool)
+
+    @property
+    def corners(self) -> list[Floats]:
+        """In a plane, of each row (m, 2) about its centre, without the rounding."""
+        rows = zip(self.outline, self.round, SIGNS * self.half[:, None], strict=True)
+        return [(np.zeros((1, 2)) if ball else box) if turning is None else turning for turning, ball, box in rows]
+
+    @property
     def typical_diameter(self) -> float:
         """The median diameter; 0 without shapes."""
         return float(2 * np.median(self.half.max(axis=1))) if len(self.entity) else 0.0
 
-    def at(self, places: Floats) -> Shapes:
-        """A single shape, repeated at each of the places (m, d)."""
+    def at(self, places: Floats, turns: Floats) -> Shapes:
+        """A single shape, repeated at each of the places (m, d), turned on by angles (m,) in a plane."""
         repeated = {name: np.repeat(getattr(self, name), len(places), axis=0) for name in self.__dataclass_fields__}
+        if places.shape[1] == 2:
+            for k, axes in enumerate(axes_of(turns, 2)):
+                repeated["hand"][k] = axes @ self.hand[0]
+                repeated["outline"][k] = None if self.outline[0] is None else self.outline[0] @ axes.T
         return Shapes(**{**repeated, "centre": places})
 
     def where(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Shapes:
@@ -62,35 +86,47 @@ def dimensions_of(world: World) -> int:
 
 @QUIET
 def shapes_of(world: World) -> Shapes:
-    """All built-in colliders of ``world`` in its present state; a turned box has the half extents of what encloses
-    it."""
+    """All built-in colliders of ``world`` in its present state, in a plane capsules and polygons too; a turned
+    AABBCollider has the half extents of what encloses it."""
     bodies, d = world.bodies, dimensions_of(world)
     fixed = np.arange(len(bodies)) >= bodies.kinematic.rows.stop
     axes = axes_of(np.asarray(bodies.rotation), d)
     speeds = np.where(fixed, 0.0, np.linalg.norm(bodies.linear_velocity, axis=1))
+    spins = bodies.has(Spin) & (d == 2)
     parts: list[tuple[Any, ...]] = []
-    for collider, name in ((SphereCollider, "sphere_collider"), (AABBCollider, "aabb_collider")):
+    for collider in (SphereCollider, AABBCollider, *(OUTLINES if d == 2 else ())):
         has = np.asarray(bodies.has(collider), bool)
         if not has.any():  # there may be no such columns
             continue
-        columns, turned = getattr(bodies, name), axes[has]
+        columns, turned, count = getattr(bodies, collider.prefix[:-1]), axes[has], int(has.sum())
+        outline, rounding, hand = np.full(count, None), np.zeros(count), np.full((count, d), np.nan)
         if collider is SphereCollider:
-            half = np.repeat(columns.radius[has, None], d, axis=1)
-        else:
+            rounding = np.array(columns.radius[has])
+            half, size = np.repeat(rounding[:, None], d, axis=1), 2 * rounding
+            hand[spins[has]] = (rounding[:, None] * turned[:, :, 0])[spins[has]]
+        elif collider is AABBCollider:
             half = np.einsum("nij,nj->ni", np.abs(turned), columns.half_extents[has])
+            size = 2 * half.min(axis=1)
+        else:
+            corners, rounding, size = outlines_of(world, collider, bodies.entity[has])
+            for k in range(count):
+                outline[k] = corners[k] @ turned[k].T
+            half = np.array([np.abs(one).max(axis=0) for one in outline]) + rounding[:, None]
         centre = bodies.position[has] + np.einsum("nij,nj->ni", turned, columns.offset[has])
-        rounds = np.full(len(half), collider is SphereCollider)
-        parts.append((bodies.entity[has], centre, half, speeds[has], rounds, fixed[has], columns.sensor[has]))
+        rounds = np.full(count, collider is SphereCollider)
+        first = bodies.entity[has], centre, half, speeds[has], rounds, fixed[has], columns.sensor[has]
+        parts.append((*first, outline, rounding, size, hand))
     if not parts:
-        empty, none = np.zeros((0, d)), np.zeros(0, bool)
-        return Shapes(np.zeros(0, np.int64), empty, empty, np.zeros(0), none, none, none)
+        empty, none, nothing = np.zeros((0, d)), np.zeros(0, bool), np.zeros(0)
+        first = np.zeros(0, np.int64), empty, empty, nothing, none, none, none
+        return Shapes(*first, np.zeros(0, object), nothing, nothing, empty)
     return Shapes(*(np.concatenate([np.asarray(column) for column in columns]) for columns in zip(*parts, strict=True)))
 
 
 def sizes_of(world: World) -> dict[int, float]:
-    """The smallest extent of each entity that has a built-in shape, m."""
+    """The smallest extent of each entity that has such a shape, m."""
     shapes = shapes_of(world)
-    return dict(zip(shapes.entity.tolist(), (2 * shapes.half.min(axis=1)).tolist(), strict=True))
+    return dict(zip(shapes.entity.tolist(), shapes.size.tolist(), strict=True))
 
 
 def dynamic_by_id(world: World) -> tuple[Floats, Floats, Floats]:
@@ -112,8 +148,8 @@ def sensor_entities(world: World) -> NDArray[np.int64]:
 
 
 def overlaps_of(world: World) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
-    """The pairs of solid spheres and boxes that overlap where they are now: the entities of both, (k,) each, and how
-    deep, in sizes of the smaller one.
+    """The pairs of solid shapes that overlap where they are now: the entities of both, (k,) each, and how deep, in
+    sizes of the smaller one.
 
     Pairs that layers keep apart are included; pairs of two static bodies are not.
     """
@@ -123,8 +159,9 @@ def overlaps_of(world: World) -> tuple[NDArray[np.int64], NDArray[np.int64], Flo
     hits = world.query_aabbs(solid.lower[moving], solid.upper[moving])
     asked, order = np.repeat(moving, np.diff(hits.offsets)), np.argsort(solid.entity, kind="stable")
     ids, places = solid.entity[order], np.searchsorted(solid.entity[order], hits.entities)
-    rows = []
-    for place in (places, places + 1):  # an entity may have a sphere and a box
+    rows = [(asked[:0], order[:0])]
+    for further in range(np.bincount(np.unique(ids, return_inverse=True)[1]).max(initial=0)):  # each has several
+        place = places + further
         there = ids.take(place, mode="clip") == hits.entities
         there &= place < len(ids)
         rows.append((asked[there], order[place[there]]))
@@ -145,7 +182,13 @@ def _depths(a: Shapes, b: Shapes) -> Floats:
     balls = a.half[:, 0] + b.half[:, 0] - np.linalg.norm(apart, axis=1)
     boxes = (a.half + b.half - apart).min(axis=1)
     depth = np.where(a.round & b.round, balls, np.where(a.round | b.round, ball_and_box, boxes))
-    return depth / (2 * np.minimum(a.half, b.half).min(axis=1))
+    turning = np.flatnonzero(a.turns | b.turns)
+    if len(turning):
+        depth[turning] = boxes[turning]
+        near = turning[boxes[turning] >= 0]
+        one, other = a.where(near), b.where(near)
+        depth[near] = depths(one.corners, other.corners, other.centre - one.centre, one.rounding + other.rounding)
+    return depth / np.minimum(a.size, b.size)
 
 
 # -- bodies that escaped ---------------------------------------------------------------------------------

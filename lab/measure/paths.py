@@ -30,7 +30,8 @@ class PathImpact:
 
 @dataclass(frozen=True)
 class Traces:
-    """Paths: ``positions`` (samples, bodies, d), NaN where no body was; ``entities`` (bodies,), ascending.
+    """Paths: ``positions`` (samples, bodies, d), NaN where no body was; ``entities`` (bodies,), ascending; in a plane
+    ``angles`` (samples, bodies), else 0.
 
     ``moved``: number of all bodies that moved, including these. ``impacts``: the impacts of the run, if all steps are
     shown, else None.
@@ -38,6 +39,7 @@ class Traces:
 
     entities: NDArray[np.int64]
     positions: NDArray[Any]
+    angles: NDArray[Any]
     moved: int = 0
     impacts: list[PathImpact] | None = None
 
@@ -68,7 +70,8 @@ class Traces:
         travelled = np.nan_to_num(np.linalg.norm(ways, axis=2)).sum(axis=0)
         moved = int((travelled > 0).sum())
         chosen = np.sort(np.argsort(-travelled, kind="stable")[: min(count, moved)])
-        return replace(self, entities=self.entities[chosen], positions=self.positions[:, chosen], moved=moved)
+        positions, angles = self.positions[:, chosen], self.angles[:, chosen]
+        return replace(self, entities=self.entities[chosen], positions=positions, angles=angles, moved=moved)
 
 
 class Recorder:
@@ -78,7 +81,7 @@ class Recorder:
         self.world = world
         self.impacts: list[PathImpact] | None = [] if step_by_step else None
         self.entities: NDArray[np.int64] = np.empty(0, np.int64)  # in the order they appeared
-        self.samples: list[NDArray[np.float32]] = []  # positions of the entities known at that time
+        self.samples: list[NDArray[np.float32]] = []  # positions of the entities known at that time, and angles
 
     @QUIET
     def record(self) -> None:
@@ -92,18 +95,20 @@ class Recorder:
         if len(new) > room:
             new = np.sort(np.random.default_rng(0).choice(new, room, replace=False))
         self.entities = np.concatenate([self.entities, new])
-        sample = np.full((len(self.entities), dimensions_of(self.world)), np.nan, np.float32)
+        d = dimensions_of(self.world)
+        sample = np.full((len(self.entities), d + 1), np.nan, np.float32)
         _, mine, rows = np.intersect1d(self.entities, ids, assume_unique=True, return_indices=True)
-        sample[mine] = bodies.position[rows]
+        sample[mine, :d], sample[mine, d] = bodies.position[rows], bodies.rotation[rows] if d == 2 else 0.0
         self.samples.append(sample)
 
     def traces(self) -> Traces:
         """The recorded paths, NaN where a body did not exist."""
-        positions = np.full((len(self.samples), *self.samples[-1].shape), np.nan, np.float32)
+        places = np.full((len(self.samples), *self.samples[-1].shape), np.nan, np.float32)
         for number, sample in enumerate(self.samples):
-            positions[number, : len(sample)] = sample
+            places[number, : len(sample)] = sample
         order = np.argsort(self.entities, kind="stable")
-        return Traces(self.entities[order], positions[:, order], impacts=self.impacts)
+        places = places[:, order]
+        return Traces(self.entities[order], places[..., :-1], places[..., -1], impacts=self.impacts)
 
 
 def _impacts(world: World, after: int) -> list[PathImpact]:

@@ -9,6 +9,7 @@ from matplotlib.collections import EllipseCollection, LineCollection, PolyCollec
 from matplotlib.colors import to_rgba_array
 
 from ..measure.body_shapes import Floats, Shapes
+from ..measure.outlines import rounded
 from . import canvas
 from .canvas import Sheet
 from .projection import Projection, corners, edges, faces
@@ -142,10 +143,22 @@ def _draw_flat(sheet: Sheet, shapes: Shapes, colours: Floats, edge: str, outline
     style: dict[str, Any] = {"edgecolors": edge, "linewidths": outline, "zorder": zorder}
     if len(discs.entity):
         _ellipses(sheet, discs.centre, 2 * discs.half[:, 0], facecolors=colours[shapes.round], **style)
+        _draw_hands(sheet, discs, colours[shapes.round, 3], zorder)
     if len(boxes.entity):
-        signs = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
-        polygons = list(boxes.centre[:, None] + signs * boxes.half[:, None])
+        around = zip(boxes.centre, boxes.corners, boxes.rounding, strict=True)
+        polygons = [centre + rounded(corners, rounding) for centre, corners, rounding in around]
         sheet.axes.add_collection(PolyCollection(polygons, facecolors=colours[~shapes.round], **style))
+
+
+def _draw_hands(sheet: Sheet, discs: Shapes, opacity: Floats, zorder: float) -> None:
+    """A line from the centre to the rim of each that spins, to see how far it has turned."""
+    spins = np.isfinite(discs.hand).all(axis=1) & (2 * discs.rounding * sheet.points > OUTLINED)
+    if spins.any():
+        some = discs.where(spins)
+        colours = to_rgba_array(np.full(len(some.hand), canvas.PANEL), opacity[spins])
+        widths = np.clip(0.14 * some.rounding * sheet.points, 0.8, 3.0)
+        hands = list(np.stack([some.centre, some.centre + some.hand], axis=1))
+        _lines(sheet, hands, colors=colours, linewidths=widths, capstyle="butt", zorder=zorder)
 
 
 def _ellipses(sheet: Sheet, centres: Floats, widths: Floats, **style: Any) -> None:

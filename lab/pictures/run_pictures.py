@@ -165,8 +165,9 @@ def _draw_ghosts(sheet: Sheet, traces: Traces, followed: Shapes, colours: Floats
     positions = traces.positions
     when = np.unique(np.linspace(0, len(positions) - 1, GHOSTS).round().astype(int))[:-1]
     for row, entity in enumerate(followed.entity):
-        places = positions[when, np.searchsorted(traces.entities, entity)]
-        places = places[np.isfinite(places).all(axis=1)]
+        body = np.searchsorted(traces.entities, entity)
+        shown = when[np.isfinite(positions[when, body]).all(axis=1)]
+        places, turns = positions[shown, body], traces.angles[shown, body] - traces.angles[-1, body]
         repeated = np.tile(colours[row], (len(places), 1))
         repeated[:, 3] = np.linspace(0.12, 0.4, len(places))
-        draw_bodies(sheet, followed.where(np.array([row])).at(places), repeated, projection, zorder=2.7)
+        draw_bodies(sheet, followed.where(np.array([row])).at(places, turns), repeated, projection, zorder=2.7)

@@ -10,12 +10,19 @@ import numpy as np
 import pytest
 from helpers_cli import refusal, report_of
 from helpers_processes import run_python
+from matplotlib.collections import LineCollection
 from PIL import Image
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
+from carom.lab.measure.body_shapes import overlaps_of, shapes_of, sizes_of
 from carom.lab.measure.run import FEW_BODIES, FEW_STEPS, run
-from carom.plugins import Physics
+from carom.lab.pictures.projection import Projection
+from carom.lab.pictures.run_pictures import GHOSTS, Still, draw_final, draw_traces
+from carom.plugins import Physics, capsule, convex_polygon
+from carom.plugins.capsule import CapsuleCollider
+from carom.plugins.convex_polygon import ConvexPolygonCollider
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 carom, ball = helpers_cli.carom, helpers_cli.ball  # fixtures
 
@@ -165,3 +172,111 @@ def test_longer_runs_and_larger_worlds_are_not_followed_step_by_step(bodies, ste
     world.close()
     assert traces.impacts is None
     np.testing.assert_array_equal(traces.corners, traces.positions)
+
+
+# -- what turns ----------------------------------------------------------------------------------------------------
+
+
+def colours_of(sheet):
+    """A function: the colour (3,) that the picture has at a place."""
+    picture = sheet.pixels(100)
+
+    def colour_at(place):
+        x, y = sheet.axes.transData.transform(place)
+        return picture[len(picture) - 1 - int(y), int(x)].astype(int)
+
+    return colour_at
+
+
+def final_picture(world, steps, lower, upper):
+    done = run(world, steps)
+    projection = Projection.of(np.asarray(lower, float), np.asarray(upper, float))
+    return colours_of(draw_final(done, Still.of(done), projection, projection.frame()))
+
+
+def test_the_mark_of_a_ball_turns_with_it():
+    """Two balls side by side: one has turned by 2.5 rad and has a line there; one has no Spin and is plain."""
+    with World(Physics(dimensions=2, gravity=(0.0, 0.0)), Rotation()) as world:
+        world.create_entity(Transform((0, 0)), RigidBody(), Spin(2.5), SphereCollider(1.0))
+        world.create_entity(Transform((4, 0)), RigidBody(), SphereCollider(1.0))
+        colour_at = final_picture(world, 60, (-2, -2), (6, 2))
+    plain = colour_at((4, -0.5))
+    marked = []
+    for angle in np.linspace(0, 2 * np.pi, 60, endpoint=False) + 2.5:
+        direction = np.array([np.cos(angle), np.sin(angle)])
+        np.testing.assert_array_equal(colour_at((4, 0) + 0.7 * direction), plain)
+        marked.append(np.abs(colour_at(0.7 * direction) - plain).max() > 50)
+    assert marked[0]
+    assert sum(marked) <= 3  # the line alone, with its neighbours
+
+
+def test_what_turns_is_drawn_as_it_is_turned():
+    """A box, a capsule and a square of 4 by 1 or so, turned by 60 degrees: inside and outside, along and across."""
+    plugins = capsule.plugin, convex_polygon.plugin
+    shapes = {
+        0: BoxCollider((2, 0.5)),
+        8: CapsuleCollider(0.5, 1.5),
+        16: ConvexPolygonCollider([(-1.5, 0), (1.5, 0), (0, 0.3)], corner_radius=0.5),
+        24: BoxCollider((2, 0.5), offset=(1, 0)),
+    }
+    with World(Physics(dimensions=2, gravity=(0.0, 0.0)), Rotation(), *plugins) as world:
+        for x, shape in shapes.items():
+            upright = np.pi / 2 if isinstance(shape, CapsuleCollider) else 0.0
+            body = RigidBody(kind="kinematic")
+            world.create_entity(Transform((x, 0), rotation=upright), body, Spin(np.pi / 3), shape)
+        colour_at = final_picture(world, 60, (-4, -4), (30, 4))
+    along = np.array([0.5, np.sqrt(0.75)])
+    across = np.array([-along[1], along[0]])
+    for x in shapes:
+        centre = np.array((x, 0.0)) + (along if x == 24 else 0.0)
+        inside = [centre, centre + 1.8 * along, centre - 1.8 * along, centre - 0.4 * across]
+        outside = [centre + 2.2 * along, centre - 2.2 * along, centre - 0.7 * across, centre + np.array((1.8, 0))]
+        body, background = colour_at(centre), colour_at((x + 4, -3))
+        assert np.abs(body - background).max() > 50
+        for place in inside:
+            np.testing.assert_array_equal(colour_at(place), body)
+        for place in outside:
+            np.testing.assert_array_equal(colour_at(place), background)
+
+
+def test_the_repeated_shapes_of_a_path_are_turned_as_they_were():
+    """A disc that rolls: the point of its rim that was in front is on a cycloid."""
+    with World(Physics(dimensions=2, gravity=(0.0, 0.0)), Rotation()) as world:
+        world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(1, 0)), Spin(-1.0), SphereCollider(1.0))
+        done = run(world, 180)
+        projection = Projection.of(np.array((-2.0, -2.0)), np.array((6.0, 2.0)))
+        sheet = draw_traces(done, Still.of(done), projection, projection.frame())
+    hands = [
+        line for part in sheet.axes.collections if isinstance(part, LineCollection) for line in part.get_segments()
+    ]
+    rims = [line for line in hands if len(line) == 2 and np.isclose(np.linalg.norm(line[1] - line[0]), 1.0)]
+    assert len(rims) == GHOSTS
+    for centre, rim in rims:
+        turned = centre[0]
+        np.testing.assert_allclose(rim, (turned + np.cos(turned), -np.sin(turned)), rtol=0, atol=1e-5)
+
+
+def test_overlaps_of_what_turns_are_those_of_their_projections():
+    """The depth is the least overlap of the projections over all directions: here 20,000, 3e-4 rad apart."""
+    random = np.random.default_rng(1)
+    angles = np.linspace(0, 2 * np.pi, 20_000)
+    directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    found = 0
+    for _ in range(60):
+        half, radius, turns = random.uniform(0.2, 1, 2), random.uniform(0.2, 1), random.uniform(0, 6, 2)
+        places = random.uniform(-0.9, 0.9, (2, 2))
+        polygon = ConvexPolygonCollider.regular(int(random.integers(3, 7)), 0.6, corner_radius=0.2 * radius)
+        others = [BoxCollider(half[::-1]), SphereCollider(radius), CapsuleCollider(0.4 * radius, half[0]), polygon]
+        other = others[int(random.integers(4))]
+        with World(Physics(dimensions=2), Rotation(), capsule.plugin, convex_polygon.plugin) as world:
+            for place, turn, shape in zip(places, turns, (BoxCollider(half), other), strict=True):
+                world.create_entity(Transform(place, rotation=turn), RigidBody(), shape)
+            depths = overlaps_of(world)[2] * min(sizes_of(world).values())
+            shapes = shapes_of(world)
+        corners = [centre + corners for centre, corners in zip(shapes.centre, shapes.corners, strict=True)]
+        order = np.argsort(shapes.entity)
+        tops, bottoms = ([getattr(corners[k] @ directions.T, of)(axis=0) for k in order] for of in ("max", "min"))
+        least = (tops[0] - bottoms[1]).min() + shapes.rounding.sum()
+        found += least > 0
+        assert depths.tolist() == pytest.approx([least] * int(least > 0), abs=5e-4)
+    assert found > 20
