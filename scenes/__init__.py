@@ -3,7 +3,7 @@
 Every scene follows one protocol, ``build(settings, seed=0) -> World``; ``settings=None`` selects the scene's
 own default. A file given to ``carom run FILE.py`` follows the same protocol.
 
-The scenes are in folders by subject: motion, impacts, gases, rest and levels. All can be imported from here.
+The scenes are in folders by subject: motion, impacts, gases, rest, levels and turning. All can be imported from here.
 
 >>> from carom import scenes
 >>> world = scenes.get("billiards").build(seed=3)
@@ -15,6 +15,7 @@ from .levels import conveyor, lift, maze, platforms, player, static_world
 from .motion import freefall, jump, orbit, spring
 from .protocol import Build, Scene
 from .rest import few, pile, pile2d, pile3d, pyramid, stack
+from .turning import billiards_spin, dominoes, flipper, rubble, tumbler
 
 _SCENES: dict[str, Scene] = {
     scene.name: scene
@@ -49,6 +50,11 @@ _SCENES: dict[str, Scene] = {
         oblique.SCENE,
         thermal_gas.SCENE,
         drops.SCENE,
+        billiards_spin.SCENE,
+        flipper.SCENE,
+        dominoes.SCENE,
+        tumbler.SCENE,
+        rubble.SCENE,
     )
 }
 
@@ -71,12 +77,15 @@ __all__ = [
     "Scene",
     "asteroids",
     "billiards",
+    "billiards_spin",
     "bouncing",
     "bullets",
     "conveyor",
     "cradle",
+    "dominoes",
     "drops",
     "fastgas",
+    "flipper",
     "freefall",
     "galperin",
     "gas2d",
@@ -96,9 +105,11 @@ __all__ = [
     "player",
     "player_query",
     "pyramid",
+    "rubble",
     "shots",
     "spring",
     "stack",
     "static_world",
     "thermal_gas",
+    "tumbler",
 ]

@@ -20,6 +20,7 @@ from ...framework.schedule.profile_report import Stats, Totals
 from ..engines.adapters import CaromEngine
 from .body_shapes import QUIET, dimensions_of
 from .observation import Observer
+from .outlines import OUTLINES
 from .paths import Recorder, Traces
 
 TRACED_BODIES = 200  # in a picture
@@ -265,12 +266,12 @@ def plain_settings(world: World) -> dict[str, Any]:
 
 
 def _restitutions(bodies: Any) -> NDArray[np.float64]:
-    """Of all spheres and boxes of ``bodies``."""
+    """Of all colliders of ``bodies`` that :func:`shapes_of` knows."""
     found = []
-    for name, collider in (("sphere_collider", SphereCollider), ("aabb_collider", AABBCollider)):
+    for collider in (SphereCollider, AABBCollider, *OUTLINES):
         has = np.asarray(bodies.has(collider), bool)
         if has.any():  # else there may be no such columns
-            found.append(getattr(bodies, name).restitution[has])
+            found.append(getattr(bodies, collider.prefix[:-1]).restitution[has])
     return np.concatenate([np.zeros(0), *found])
 
 

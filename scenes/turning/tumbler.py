@@ -1,0 +1,55 @@
+"""A tumbler: small boxes in a square drum that turns.
+
+The drum is four kinematic bodies at the same place, each with a wall beside it, which turn together.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...components import RigidBody, Transform
+from ...components.spin import Spin
+from ...framework import Settings, World
+from ...plugins import Physics
+from ...plugins.rotation import BoxCollider, Rotation
+from ..protocol import Scene
+from ..sizes import ceil_root, whole
+
+BOXES = 300
+HALF, THICKNESS = 10.0, 1.0  # of the drum
+TURN = math.pi / 6  # rad/s
+SIDE, DENSITY = 0.25, 1.0  # of a box
+FILLED = 12.0  # m: the side of the square in which they start
+FRICTION = 0.6
+GRAVITY = 9.81
+
+
+def build(settings: Settings | None = None, seed: int = 0, *, n: int = BOXES) -> World:
+    """``n`` boxes in rows, at rest in the middle of a drum that turns; ``seed`` changes nothing."""
+    n = whole(n, "n")
+    world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), Rotation(), settings=settings or Settings.balanced())
+    for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+        half = (THICKNESS / 2, HALF) if x else (HALF, THICKNESS / 2)
+        wall = BoxCollider(half, offset=(HALF * x, HALF * y), friction=FRICTION)
+        world.create_entity(Transform((0.0, 0.0)), RigidBody(kind="kinematic"), Spin(TURN), wall)
+    side, index = ceil_root(n, 2), np.arange(n)
+    places = (np.stack([index % side, index // side], axis=1) - 0.5 * (side - 1)) * FILLED / side
+    world.create_entities(
+        n,
+        Transform.many(places),
+        RigidBody.many(mass=DENSITY * SIDE**2),
+        Spin.many(0.0),
+        BoxCollider.many(half_extents=(SIDE / 2, SIDE / 2), friction=FRICTION),
+    )
+    return world
+
+
+SCENE = Scene(
+    name="tumbler",
+    description="three hundred small boxes in a drum that turns",
+    build=build,
+    seconds=12.0,
+    view=((-15.0, -15.0), (15.0, 15.0)),
+)
