@@ -17,8 +17,8 @@ from ..sizes import real, whole
 from ..walls import block
 
 DOMINOES = 50
-HALF_EXTENTS = (0.1, 1.0)
-MASS = 0.4
+HALF_EXTENTS = (0.15, 1.0)
+MASS = 0.6
 SPACING = 0.8  # from centre to centre
 PUSH = 2.0  # rad/s
 FRICTION = 0.6

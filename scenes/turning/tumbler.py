@@ -18,10 +18,10 @@ from ..protocol import Scene
 from ..sizes import ceil_root, whole
 
 BOXES = 300
-HALF, THICKNESS = 10.0, 1.0  # of the drum
+HALF, THICKNESS = 12.0, 1.0  # of the drum
 TURN = math.pi / 6  # rad/s
-SIDE, DENSITY = 0.25, 1.0  # of a box
-FILLED = 12.0  # m: the side of the square in which they start
+SIDE, DENSITY = 0.5, 1.0  # of a box
+PITCH = 0.65  # of the lattice on which they start
 FRICTION = 0.6
 GRAVITY = 9.81
 
@@ -35,7 +35,7 @@ def build(settings: Settings | None = None, seed: int = 0, *, n: int = BOXES) ->
         wall = BoxCollider(half, offset=(HALF * x, HALF * y), friction=FRICTION)
         world.create_entity(Transform((0.0, 0.0)), RigidBody(kind="kinematic"), Spin(TURN), wall)
     side, index = ceil_root(n, 2), np.arange(n)
-    places = (np.stack([index % side, index // side], axis=1) - 0.5 * (side - 1)) * FILLED / side
+    places = (np.stack([index % side, index // side], axis=1) - 0.5 * (side - 1)) * PITCH
     world.create_entities(
         n,
         Transform.many(places),
@@ -51,5 +51,5 @@ SCENE = Scene(
     description="three hundred small boxes in a drum that turns",
     build=build,
     seconds=12.0,
-    view=((-15.0, -15.0), (15.0, 15.0)),
+    view=((-18.0, -18.0), (18.0, 18.0)),
 )

@@ -60,7 +60,6 @@ def test_all_dominoes_fall_one_after_the_other():
     assert angles[-1] == pytest.approx(-np.pi / 2, abs=0.01)
 
 
-@pytest.mark.slow
 def test_the_tumbler_carries_its_boxes_up_and_loses_none():
     with tumbler.build(n=40) as world:
         highest = -np.inf
@@ -72,7 +71,7 @@ def test_the_tumbler_carries_its_boxes_up_and_loses_none():
             assert np.hypot(*boxes.T).max() < np.sqrt(2) * tumbler.HALF
         turn = world.bodies.kinematic.rotation
     np.testing.assert_allclose(turn, 12.0 * tumbler.TURN, rtol=1e-9)
-    assert highest > -2.0  # the bottom is at -10, or the corner at -14
+    assert highest > -3.0  # the bottom is at -12, or the corner at -17
 
 
 def test_rubble_comes_to_rest():
