@@ -6,6 +6,7 @@ from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add_scaled, dot, length, sub
 from ..integration.trajectory import ROUNDING, along, relative_path
+from ..integration.turning import is_turned
 from ..narrow_phase.manifolds import centre_offset, centre_offset_at_start, evaluate_pair
 from ..shapes.dispatch import both_convex, both_sharp, has_corner_rule, is_corner_touch
 from ..shapes.tolerances import slop_of
@@ -17,8 +18,10 @@ STAYS_SLOPS = 1e-3  # slops: two bodies that go less far past each other in a st
 @part
 def meets_at_corner(state, a, b, d, slop):
     """Whether the two touch at a corner only. Shapes without a rule of their own are looked at if they move past each
-    other: what stays where it is does not catch."""
+    other: what stays where it is does not catch. Two that turn may lean on each other's corners."""
     bodies, shape = state.bodies, state.bodies.shape
+    if state.spinning and is_turned(bodies, a) and is_turned(bodies, b):
+        return False
     if not has_corner_rule(state, shape[a], shape[b]):
         if not both_sharp(state, shape[a], shape[b]):
             return False

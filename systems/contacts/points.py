@@ -7,7 +7,7 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, length, row, scale, store, sub
 from ..ccd.turns import first_touch_of_turn
-from ..integration.turning import turn_of_arm
+from ..integration.turning import is_turned, turn_of_arm
 from ..narrow_phase.manifolds import centre_offset_at_start, evaluate_pair, forget_manifold, has_manifold
 from ..shapes.convex.points import MOST_POINTS, contact_points
 from ..shapes.linking.convex_by_address import convex_at, rounding_by_address
@@ -15,12 +15,6 @@ from ..shapes.tolerances import turning_margin
 from .constants import UNREACHED
 
 TILT = 0.1  # rad: faces whose normals are so near that of the contact touch along their length, or soon will
-
-
-@inlined
-def is_turned(bodies, i):
-    """Whether contacts turn body i by pushing along their normals: it is not round."""
-    return length(bodies.inverse_inertia[i]) > 0.0 and bodies.rolling_radius[i] == 0.0
 
 
 @inlined

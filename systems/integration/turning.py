@@ -126,6 +126,12 @@ def turn_at(bodies, sides, normal, impulse, left):
 
 
 @inlined
+def is_turned(bodies, i):
+    """Whether contacts turn body i by pushing along their normals: it is not round."""
+    return length(bodies.inverse_inertia[i]) > 0.0 and bodies.rolling_radius[i] == 0.0
+
+
+@inlined
 def is_mill(bodies, i):
     """Whether body i turns by itself and is not round, so that its surface moves along its normal too."""
     return bodies.inverse_mass[i] == 0.0 and bodies.rolling_radius[i] == 0.0 and length(bodies.spin[i]) > 0.0

@@ -7,9 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from carom.components import RigidBody, Transform
+from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
-from carom.plugins import Physics
+from carom.plugins import Physics, capsule, convex_polygon
+from carom.plugins.capsule import CapsuleCollider
+from carom.plugins.convex_polygon import ConvexPolygonCollider
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 MODES = ("discrete", "continuous", "event_driven")
@@ -127,3 +129,136 @@ def test_boxes_that_fall_askew_come_to_rest():
         assert energy < 1e-9
         assert all(pose(world, entity)[1] > 0.45 for entity in entities)
         assert world.contacts.depth.max() < 0.02
+
+
+# -- piles ----------------------------------------------------------------------------------------
+
+
+def kinetic(world):
+    """J, of what moves along."""
+    moving = world.bodies.dynamic
+    return 0.5 * float((moving.mass * (moving.linear_velocity**2).sum(axis=1)).sum())
+
+
+@pytest.mark.parametrize("seconds", [10, pytest.param(60, marks=pytest.mark.slow)])
+def test_a_pyramid_of_fifty_rows_stands_still(seconds):
+    """1,275 boxes: from 5 s on none creeps by a millimetre, and none overlaps by .0125."""
+    with ground(friction=0.6) as world:
+        rows, half = 50, 0.25
+        for row in range(rows):
+            for k in range(rows - row):
+                box(world, ((k - (rows - row - 1) / 2) * 0.52, half + 2 * half * row), (half, half), friction=0.6)
+        for _ in range(300):
+            world.step()
+        before = np.array(world.bodies.dynamic.position)
+        for _ in range(60 * seconds - 300):
+            world.step()
+        assert np.abs(world.bodies.dynamic.position - before).max() < 1e-3
+        assert kinetic(world) < 1e-6
+        assert world.contacts.depth.max() < 0.0125
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_house_of_cards_stands(seed):
+    """Five storeys of cards that lean on each other's corners, about 20 degrees from upright, for 10 s."""
+    lean, thick, long = math.radians(20 + np.random.default_rng(seed).uniform(-1, 1)), 0.02, 0.5
+    with ground(friction=0.6) as world:
+        high = 2 * (long * math.cos(lean) + thick * math.sin(lean))
+        wide = 2 * (long * math.sin(lean) + thick * math.cos(lean))
+        base = 0.0
+        for storey in range(5):
+            for k in range(5 - storey):
+                x = (k - (4 - storey) / 2) * 2 * wide
+                for side in (-1, 1):
+                    box(world, (x + side * wide / 2, base + high / 2), (thick, long), side * lean, friction=0.6)
+            base += high
+            for k in range(4 - storey):
+                box(world, ((k - (3 - storey) / 2) * 2 * wide, base + thick), (0.98 * wide, thick), friction=0.6)
+            base += 2 * thick
+        before = np.array(world.bodies.dynamic.position)
+        for _ in range(600):
+            world.step()
+        assert np.abs(world.bodies.dynamic.position - before).max() < 2e-3
+        assert kinetic(world) < 1e-5
+
+
+@pytest.mark.parametrize(("lightest", "left"), [(1.0, 1e-3), (0.1, 0.1)])
+@pytest.mark.parametrize("seed", range(2))
+def test_mixed_shapes_between_walls_come_to_rest_and_nobody_leaves(seed, lightest, left):
+    """200 boxes, balls, capsules and polygons, also of masses from 1 / 10 to 10 kg, after 20 s."""
+    random = np.random.default_rng(seed)
+    with World(Physics(2, gravity=(0, -G)), Rotation(), capsule.plugin, convex_polygon.plugin) as world:
+        for place, half in (((0, -1), (60, 1)), ((-7, 50), (1, 51)), ((7, 50), (1, 51))):
+            world.create_entity(Transform(place), RigidBody(kind="static"), BoxCollider(half, friction=0.5))
+        for k in range(200):
+            shape = (
+                BoxCollider(random.uniform(0.15, 0.4, 2), friction=0.5),
+                SphereCollider(random.uniform(0.2, 0.4), friction=0.5),
+                CapsuleCollider(0.2, random.uniform(0.1, 0.25), friction=0.5),
+                ConvexPolygonCollider.regular(3 + k % 4, random.uniform(0.25, 0.45), friction=0.5),
+            )[k % 4]
+            place = k % 11 - 5 + random.uniform(-0.05, 0.05), 0.6 + 1.05 * (k // 11)
+            mass = lightest ** random.uniform(-1, 1)
+            world.create_entity(Transform(place, random.uniform(-3, 3)), RigidBody(mass=mass), Spin(), shape)
+        for _ in range(1200):
+            world.step()
+        x, y = world.bodies.dynamic.position.T
+        assert np.abs(x).max() < 6.0
+        assert y.min() > 0.0
+        assert kinetic(world) < left
+        assert world.contacts.depth.max() < 0.1
+
+
+# -- in space -------------------------------------------------------------------------------------
+
+
+def ground_3d(friction=0.5):
+    world = World(Physics(3, gravity=(0, -G, 0)), Rotation())
+    world.create_entity(Transform((0, -1, 0)), RigidBody(kind="static"), BoxCollider((50, 1, 50), friction=friction))
+    return world
+
+
+def cube(world, place, rotation=(1, 0, 0, 0)):
+    return world.create_entity(
+        Transform(place, rotation), RigidBody(mass=1), Spin(), BoxCollider((0.5, 0.5, 0.5), friction=0.5)
+    )
+
+
+def test_ten_cubes_stand():
+    """Turned by less than 2.5e-4 after 10 s."""
+    with ground_3d() as world:
+        for k in range(10):
+            cube(world, (0, 0.5 + k, 0))
+        for _ in range(600):
+            world.step()
+        moving = world.bodies.dynamic
+        assert 2 * np.abs(moving.rotation[:, 1:]).max() < 2.5e-4
+        assert kinetic(world) < 1e-8
+
+
+def test_a_pyramid_of_cubes_rests():
+    """204 of them, 8 x 8 below: 1e-10 J after 3 s."""
+    with ground_3d() as world:
+        for row in range(8):
+            for i in range(8 - row):
+                for k in range(8 - row):
+                    cube(world, ((i - (7 - row) / 2) * 1.05, 0.5 + row, (k - (7 - row) / 2) * 1.05))
+        for _ in range(180):
+            world.step()
+        assert kinetic(world) < 1e-10
+
+
+def test_a_cube_that_falls_askew_comes_to_lie_on_a_side():
+    random = np.random.default_rng(5)
+    for _ in range(5):
+        with ground_3d() as world:
+            turn = random.normal(size=4)
+            entity = cube(world, (0, 1.2, 0), turn / np.linalg.norm(turn))
+            for _ in range(300):
+                world.step()
+            transform = world.component_for_entity(entity, Transform)
+            w, x, y, z = transform.rotation
+            up = np.array((2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)))  # in its own axes
+            assert transform.position[1] == pytest.approx(0.5, abs=1e-4)
+            assert np.sort(np.abs(up)) == pytest.approx((0, 0, 1), abs=1e-3)
+            assert kinetic(world) < 1e-9
