@@ -269,6 +269,12 @@ class Contacts(ContactRows):
         return self._own_columns
 
     @property
+    def manifold(self) -> ContactRows:
+        """The points in which they touch, several for what lies on its face and turns: ``contact`` is the row of
+        theirs, ``normal_impulse`` what each of them has given. Made when it is read."""
+        return ContactRows(self._source.points(self._columns), self._membership)
+
+    @property
     def begin(self) -> ContactRows:
         """Pairs that began to touch, since the start of the last ``step()`` or ``advance()``."""
         return self._history("begin")

@@ -125,6 +125,31 @@ class RecordedContacts:
             self._state.impacts_recorded = True
             self.record("impacts", self.impacts())
 
+    def points(self, columns: Columns) -> Columns:
+        """The same contacts, a row for each of their points, with its place in the columns; those of a pair of which
+        the solver knows none, or one, are as they are."""
+        state, memory, now = self._state, self._state.warm_start, self._state.warm_start.now
+        count = int(memory.counts[now]) if state.spinning else 0
+        entity_a, entity_b = memory.entity_a[now, :count], memory.entity_b[now, :count]
+        place = {pair: row for row, pair in enumerate(_pairs(columns))}
+        found = zip(entity_a.tolist(), entity_b.tolist(), strict=True)
+        rows = np.array([place.get(pair, -1) for pair in found], np.int64)
+        known, alone = rows >= 0, np.ones(len(columns["entity_a"]), bool)
+        alone[rows[known]] = False
+        entity, bodies = state.bodies.entity[: state.count], state.bodies
+        order = np.argsort(entity)
+        first = order[np.searchsorted(entity, entity_a[known], sorter=order)]
+        point = bodies.position[first] + bodies.offset[first] + memory.place[now, :count][known]
+        impulse = (memory.push[now, :count][known] * memory.normal[now, :count][known]).sum(axis=1)
+        row = np.concatenate((rows[known], np.flatnonzero(alone)))
+        sort = np.argsort(row, kind="stable")
+        return {
+            **{name: columns[name][row[sort]] for name in ("entity_a", "entity_b", "normal", "depth", "step")},
+            "point": np.concatenate((point, columns["point"][alone]))[sort],
+            "normal_impulse": np.concatenate((impulse, columns["normal_impulse"][alone]))[sort],
+            "contact": row[sort],
+        }
+
     def _rows(self, slot: int, rows: Any) -> Columns:
         """Copies of some contacts."""
         columns = self._touching.columns()

@@ -131,6 +131,25 @@ def test_boxes_that_fall_askew_come_to_rest():
         assert world.contacts.depth.max() < 0.02
 
 
+@pytest.mark.plain
+def test_the_manifold_has_the_corners_that_bear_it():
+    """Two in a plane; their impulses are its weight, and that of what stands on one side is at that corner."""
+    with ground() as world:
+        low = box(world, (0, 0.5), (1, 0.5), mass=2.0)
+        high = box(world, (0.75, 1.25), (0.25, 0.25), mass=1.0)
+        world.create_entity(Transform((5, 0.5)), RigidBody(mass=1.0), SphereCollider(0.5))
+        for _ in range(60):
+            world.step()
+        points = world.contacts.manifold
+        assert points.contact.tolist() == [0, 0, 1, 2, 2]
+        of_low = points.entity_b == low
+        assert np.sort(points.point[of_low][:, 0]) == pytest.approx((-1, 1), abs=1e-4)
+        left, right = points.normal_impulse[of_low][np.argsort(points.point[of_low][:, 0])] * 60 / G
+        assert (left, right) == pytest.approx((1 + 0.125, 1 + 0.875), rel=1e-3)
+        assert points.normal_impulse[points.entity_b == high].sum() * 60 / G == pytest.approx(1.0, rel=1e-3)
+        assert [contact.entity_a for contact in points] == points.entity_a.tolist()
+
+
 # -- piles ----------------------------------------------------------------------------------------
 
 
