@@ -25,7 +25,7 @@ from ..integration.trajectory import (
     travel_of,
 )
 from ..linking.parts import FIRST_TOUCH, call_first_touch
-from ..shapes.tolerances import contact_margin, smaller_extent
+from ..shapes.tolerances import contact_margin, is_turning, smaller_extent, turning_travel
 from .time_of_impact import APART, bounds_stay_disjoint
 
 DISCRETE, CONTINUOUS, EVENT_DRIVEN = range(3)
@@ -197,8 +197,8 @@ def sweep_pairs(state, dt):
         a, b = pairs.a[c], pairs.b[c]
         if not pairs.near_contact[c]:
             path = relative_path(state, a, b)
-            travel = travel_of(path, dt)
-            if not is_swept(state, a, b, travel) or bounds_stay_disjoint(state, a, b, path, 0.0, dt):
+            travel, turns = travel_of(path, dt) + turning_travel(state, dt, a, b), is_turning(state, dt, a, b)
+            if not is_swept(state, a, b, travel) or (not turns and bounds_stay_disjoint(state, a, b, path, 0.0, dt)):
                 continue
             small = FAST * smaller_extent(bodies, a, b)
             limits = min(contact_margin(state, dt, a, b), small), small / travel * dt, 0.0

@@ -23,7 +23,8 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import absolute, add, add_scaled, dot, item, length, scale, sub
 from ..integration.trajectory import ROUNDING, along, bend_of, first_root, rate_along
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, sweep
-from ..shapes.tolerances import smaller_extent
+from ..shapes.tolerances import is_turning, smaller_extent
+from .turning_touch import touch_of_turning
 
 MOST_STRIDES = 4096  # looks at concave shapes in a step
 LOOKS = 100  # a graze takes about 30; whatever is still closing in after that counts as touching
@@ -62,6 +63,9 @@ def first_touch(state, a, b, path, straight, since, until, limits):
     limits: (slop; stride, seconds between looks at concave shapes; approach speed below which these have no touch).
     """
     shape_a, shape_b = state.bodies.shape[a], state.bodies.shape[b]
+    if is_turning(state, until, a, b):
+        found, (t, normal, point, at) = touch_of_turning(state, a, b, path, since, until, limits)
+        return (TOUCHES if found else APART), t, normal, point, at
     if not both_convex(state, shape_a, shape_b):
         return march(state, a, b, path, since, until, limits)
     t, known, met, share = since, False, False, 0.0

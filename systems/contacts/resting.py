@@ -10,7 +10,9 @@ from ...framework.vectors import add_scaled, dot, item, length, replace, sub
 from ..ccd.search_bounds import FAST, is_swept
 from ..ccd.turns import first_touch_of_turn, turns_far
 from ..codes import OK
+from ..impacts.find import is_beyond_cap
 from ..impacts.impulses import STOPPED, is_rattling
+from ..integration.turning import arms_to, closing_by_spin
 from ..narrow_phase.manifolds import (
     centre_offset,
     centre_offset_at_start,
@@ -24,7 +26,16 @@ from ..narrow_phase.manifolds import (
     make_manifold,
 )  # fmt: skip
 from ..shapes.dispatch import both_convex, mix, mix_friction
-from ..shapes.tolerances import SAME_PLACE, contact_margin, slop_for, slop_of, smaller_extent, turning_margin
+from ..shapes.tolerances import (
+    SAME_PLACE,
+    contact_margin,
+    is_turning,
+    slop_for,
+    slop_of,
+    smaller_extent,
+    turning_margin,
+    turning_travel,
+)  # fmt: skip
 from .approach import first_touch_on_segment, meets_at_corner, segment_start
 from .points import lay_arms, lay_first_touch, points_of
 
@@ -39,13 +50,14 @@ def touch_of_long_way(state, dt, a, b, end):
     """As :func:`first_touch_on_segment`, on the last stretch of the way of a pair, to ``end``, that goes so far on it
     that its end may say nothing; the gap is that at the start of the step.
 
-    In a discrete world only as far as forces lead: what is faster than that passes through what is thin.
+    In a discrete world only as far as forces lead: what is faster than that passes through what is thin. What turns has
+    another shape on its way; its impacts are searched with that.
     """
     bodies, edge, nothing = state.bodies, FAST * smaller_extent(state.bodies, a, b), zero_of(state)
     d, margin = segment_start(state, a, b), contact_margin(state, dt, a, b)
     travel = sub(end, d)
     way = length(travel)
-    if not (way > edge and (is_swept(state, a, b, way) or way <= margin)):
+    if not (way > edge and (is_swept(state, a, b, way) or way <= margin)) or turning_travel(state, dt, a, b) > edge:
         return False, 0.0, nothing
     found, gap, normal = first_touch_on_segment(state, a, b, d, travel, min(edge, margin))
     return found, gap + dot(sub(centre_offset_at_start(bodies, a, b), d), normal), normal
@@ -57,9 +69,9 @@ def deepest(state, dt, c, d):
     way there; else by its manifold or its function."""
     pairs, bodies = state.pairs, state.bodies
     a, b = pairs.a[c], pairs.b[c]
-    if state.spinning and turns_far(state, a, b):
+    if turns_far(state, a, b):
         touches, _, _, normal, _ = first_touch_of_turn(state, a, b)
-        return slop_of(state, a, b) if touches else -math.inf, normal, touches
+        return 2.0 * slop_of(state, a, b) if touches else -math.inf, normal, touches
     far, gap, normal = touch_of_long_way(state, dt, a, b, d)
     if far:
         return -gap - dot(sub(d, centre_offset_at_start(bodies, a, b)), normal), normal, True
@@ -84,6 +96,12 @@ def still_bounces(state, dt, c, depth, normal):
     slop, fixed, extent = slop_of(state, a, b), state.restitution_threshold, smaller_extent(bodies, a, b)
     threshold = fixed if fixed >= 0.0 else (contact_margin(state, dt, a, b) - slop) / dt
     speed = dot(sub(velocity[b], velocity[a]), normal)
+    if state.spinning and length(bodies.spin[a]) + length(bodies.spin[b]) > 0.0:
+        d = centre_offset(bodies, a, b)
+        _, _, _, point = evaluate_pair(state, a, b, d)
+        speed += closing_by_spin(bodies, a, b, arms_to(bodies, a, b, normal, point, d), normal)
+        if depth <= slop and abs(speed) > threshold and is_turning(state, dt, a, b) and not is_beyond_cap(state, a, b):
+            return True  # its next impact is searched with the shapes as they are turned then
     touches = depth > (SAME_PLACE * extent if pairs.impulse[c] == 0.0 else 0.0)
     if not touches and speed < -threshold:
         return True  # the next step's impact
@@ -107,7 +125,9 @@ def is_resting(state, dt, c):
     if not pairs.near_contact[c] and not hit and not carried:
         return False
     margin, d = turning_margin(state, dt, a, b), centre_offset(bodies, a, b)
-    turns = state.spinning and turns_far(state, a, b)
+    turns = turns_far(state, a, b)
+    if turns and state.impacts.sweeps and pairs.impulse[c] > 0.0:  # that was its touch
+        return False
     if pairs.early[c] and not hit and not turns and is_at_manifold(pairs, c, d, smaller_extent(bodies, a, b)):  # usual
         depth, normal, far = depth_by_plane(pairs, c, d), pairs.normal[c], False
     else:

@@ -23,14 +23,15 @@ from ..integration.trajectory import (
     relative_path,
     travel_of,
 )
-from ..integration.turning import carried, surface_velocity, turning_mass
+from ..integration.turning import arms_to, closing_by_spin
 from ..linking.parts import FIRST_TOUCH, call_first_touch
 from ..narrow_phase.manifolds import is_at_manifold
 from ..narrow_phase.stages import rank_rows
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, mix, mix_friction
-from ..shapes.tolerances import contact_margin, slop_of, smaller_extent
+from ..shapes.tolerances import contact_margin, is_turning, slop_of, smaller_extent, turning_travel
 from .heap import heap_push
 from .impulses import BOUNCE, CROSS, FREE, SLIDE, STOP, STOPPED, TOUCHDOWN, is_deflected, is_rattling
+from .turning import respond
 
 QUICK = 1e-3  # of the step: inelastic impacts closer than this in time are treated as inelastic collapse
 MOST_PLASTIC = 1000  # impacts of a body in a step after which those beyond the cap are none any more
@@ -72,12 +73,10 @@ def find_touch(state, c, a, b, path, since, restitution, dt):
     a time on. What is not swept, or touches at a corner, has none unless it overlaps where the step ends."""
     impacts, bodies, zero = state.impacts, state.bodies, zero_of(state)
     swept, overlaps, end_normal, nothing = False, False, zero, (dt, zero, zero, zero)
-    limits = slop_of(state, a, b), dt, -math.inf
-    if state.spinning and bodies.inverse_mass[a] * bodies.inverse_mass[b] == 0.0 and turns_far(state, a, b):
-        return NO_TOUCH, nothing  # contacts at rest know what a mill meets on its way
+    limits = slop_of(state, a, b), dt, bounce_threshold(state, a, b) if is_turning(state, dt, a, b) else -math.inf
     if impacts.sweeps:
         since = max(since, bodies.last_impact[a], bodies.last_impact[b])
-        passive, travel = not state.pairs.is_solid[c], travel_of(path, dt)
+        passive, travel = not state.pairs.is_solid[c], travel_of(path, dt) + turning_travel(state, dt, a, b)
         swept = is_swept(state, a, b, travel)
         if passive and (not swept or state.pairs.crossed[c]):
             return NO_TOUCH, nothing
@@ -85,6 +84,8 @@ def find_touch(state, c, a, b, path, since, restitution, dt):
             stride = FAST * smaller_extent(bodies, a, b) / travel * dt if travel > 0.0 else dt
             limits = rest_edge(state, a, b, dt), stride, bounce_threshold(state, a, b)
     if not swept:
+        if turns_far(state, a, b):  # contacts at rest know what a mill meets on its way
+            return NO_TOUCH, nothing
         if restitution > 0.0:
             overlaps, end_normal = overlap_at_end(state, a, b, path, dt)
         if not overlaps:
@@ -154,7 +155,7 @@ def closing_speed(state, a, b, path, touch, kind, dt):
     bodies, impacts, (t, normal, point, apart) = state.bodies, state.impacts, touch
     speed = dot(rate_along(path, t), normal)
     if state.spinning:
-        speed += dot(carried(bodies, a, b, point, apart), normal)
+        speed += closing_by_spin(bodies, a, b, arms_to(bodies, a, b, normal, point, apart), normal)
     threshold, rounding = bounce_threshold(state, a, b), 0.0
     if impacts.sweeps:  # else a plastic impact would be one again, by a rounding error
         rounding = ROUNDING * (length(bodies.path_velocity[a]) + length(bodies.path_velocity[b]))
@@ -225,21 +226,19 @@ def is_beyond_cap(state, a, b):
 @part
 def queue_event(state, c, kind, path, touch, speed, restitution):
     """Put an event into the queue."""
-    impacts, pairs, bodies, (t, normal, point, apart) = state.impacts, state.pairs, state.bodies, touch
+    impacts, pairs, bodies, (t, normal, point, _) = state.impacts, state.pairs, state.bodies, touch
     a, b = pairs.a[c], pairs.b[c]
-    slot, pull = bodies.collider_slot, zero_of(state)
+    slot, change, pull = bodies.collider_slot, -(1.0 + restitution) * speed, zero_of(state)
     friction = state.colliders.friction
     mu = mix_friction(state, state.friction_rule, friction[slot[a], a], friction[slot[b], b])
-    if mu > 0.0:  # Coulomb: stops what slides, with at most mu times the normal impulse
-        w, share = rate_along(path, t), 1.0
-        if state.spinning:
-            w = add(add(w, carried(bodies, a, b, point, apart)), surface_velocity(bodies, a, b, normal))
-            light = bodies.inverse_mass[a] + bodies.inverse_mass[b]
-            share = light / (light + turning_mass(bodies, a, b))
+    if state.spinning and kind != CROSS:
+        change, pull = respond(state, (a, b), touch, (rate_along(path, t), speed), restitution, mu)
+    elif mu > 0.0:  # Coulomb: stops what slides, with at most mu times the normal impulse
+        w = rate_along(path, t)
         sliding = add_scaled(w, normal, -dot(w, normal))
         fast = length(sliding)
         if fast > 0.0:
-            pull = scale(sliding, -min(share, -mu * (1.0 + restitution) * speed / fast))
+            pull = scale(sliding, -min(1.0, -mu * (1.0 + restitution) * speed / fast))
     if state.ranks_version != state.version:
         rank_rows(state)
     event = impacts.heap[impacts.waiting]
@@ -247,7 +246,7 @@ def queue_event(state, c, kind, path, touch, speed, restitution):
     impacts.event_count_a[event], impacts.event_count_b[event] = bodies.impact_count[a], bodies.impact_count[b]
     impacts.event_time[event] = t
     impacts.event_key[event] = bodies.rank[a] * state.count + bodies.rank[b]
-    impacts.event_change[event], impacts.event_normal[event] = -(1.0 + restitution) * speed, normal
+    impacts.event_change[event], impacts.event_normal[event] = change, normal
     impacts.event_point[event], impacts.event_pull[event] = add(centre_at(state, a, t), point), pull
     heap_push(impacts)
 
@@ -261,11 +260,12 @@ def queue_next_impact(state, c, since, dt):
     pairs, bodies, impacts = state.pairs, state.bodies, state.impacts
     a, b, passive = pairs.a[c], pairs.b[c], not pairs.is_solid[c]
     path = relative_path(state, a, b)
-    if impacts.sweeps and bounds_stay_disjoint(state, a, b, path, since, dt):
+    turns = is_turning(state, dt, a, b)
+    if impacts.sweeps and not turns and bounds_stay_disjoint(state, a, b, path, since, dt):
         return
     slot, restitutions = bodies.collider_slot, state.colliders.restitution
     e = mix(state, state.restitution_rule, restitutions[slot[a], a], restitutions[slot[b], b])
-    rested = pairs.early[c] and not passive and e < 1.0
+    rested = pairs.early[c] and not passive and e < 1.0 and not turns
     if rested and is_at_manifold(pairs, c, along(path, dt), smaller_extent(bodies, a, b)):  # it stays there
         return
     kind, touch = find_touch(state, c, a, b, path, since, e, dt)

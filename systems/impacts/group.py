@@ -15,12 +15,13 @@ import math
 
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
+from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, scale, sub
 from ..integration.trajectory import rate_along, relative_path
-from ..integration.turning import surface_velocity, turn_at, turning_mass
+from ..integration.turning import compliance, is_turned, velocity_by_spin
 from ..shapes.dispatch import mix_friction
 from .exact_sum import exact_sum
 from .impulses import FREE, deflect, log_impact, stands_still
+from .turning import arms_of, turn_by_impact
 
 PASSES, LEAST_PASSES = 1000, 8  # over the impacts of a group
 WORK = 1 << 16  # impacts in all passes of a step: a heap of bodies that overlap is not worth more
@@ -186,6 +187,16 @@ def shoots(state, count):
 
 
 @part
+def turns(state, count):
+    """Whether impulses along their normals turn a body of the group."""
+    impacts, pairs, bodies, any_turned = state.impacts, state.pairs, state.bodies, False
+    for g in range(count if state.spinning else 0):
+        c = impacts.event_pair[impacts.member[impacts.group[g]]]
+        any_turned |= is_turned(bodies, pairs.a[c]) or is_turned(bodies, pairs.b[c])
+    return any_turned
+
+
+@part
 def solve_friction(state, count):
     """Find the impulses of friction, into ``friction_impulse``; returns whether there are any.
 
@@ -202,14 +213,17 @@ def solve_friction(state, count):
         if mu > 0.0 and impacts.ahead[m] > 0.0:
             w = rate_along(relative_path(state, a, b), impacts.now)
             w = add(w, sub(impacts.gained[b], impacts.gained[a]))
+            arms = normal, normal
             if state.spinning:
-                w = add(w, surface_velocity(state.bodies, a, b, normal))
+                arms = arms_of(state, impacts.member[m])
+                w = add(w, velocity_by_spin(state.bodies, a, b, arms))
             sliding = add_scaled(w, normal, -dot(w, normal))
             fast, light = length(sliding), 0.0
-            for side in range(2):
-                i = a if side == 0 else b
+            for side in range(2 if fast > 0.0 else 0):
+                i, arm, turns = (a, arms[0], 0.0) if side == 0 else (b, arms[1], 0.0)
                 entry = impacts.first_member[i] if inverse_mass[i] > 0.0 else -1
-                turns = turning_mass(state.bodies, i, i) * 0.5 if state.spinning else 0.0
+                if state.spinning:
+                    turns = compliance(state.bodies, i, arm, divided(sliding, fast))
                 while entry >= 0:
                     light, entry = light + inverse_mass[i] + turns, impacts.next_member[entry]
             if fast > 0.0:
@@ -226,6 +240,10 @@ def push_group(state, count, dt):
     rubs = solve_friction(state, count)
     if rubs:
         push_bodies(state, count, True)
+    for g in range(count if rubs and state.spinning else 0):
+        m = impacts.group[g]
+        event = impacts.member[m]
+        turn_by_impact(state, event, arms_of(state, event), 0.0, impacts.friction_impulse[m], dt)
     for g in range(count):
         m = impacts.group[g]
         event = impacts.member[m]
@@ -237,9 +255,6 @@ def push_group(state, count, dt):
             if inverse_mass[i] > 0.0 and impacts.ahead[m] > 0.0:
                 bodies.impact_count[i] += 1
                 bodies.counted_impacts[i] += 0 if impacts.event_kind[event] == FREE else 1
-        if rubs and state.spinning:
-            sides, left = (pairs.a[c], pairs.b[c]), dt - impacts.now
-            turn_at(bodies, sides, impacts.event_normal[event], impacts.friction_impulse[m], left)
         if impacts.ahead[m] > 0.0:
             impacts.event_time[event] = impacts.now
             log_impact(state, event, impacts.ahead[m])

@@ -14,8 +14,8 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST
 from ..integration.trajectory import along, path_of, rate_along
-from ..integration.turning import turn_at
 from ..narrow_phase.manifolds import forget_manifold
+from .turning import arms_of, turn_by_impact
 
 STOPPED = 1 << 30  # added to a body's impacts: it moves no more in this step, and the solver leaves it alone
 
@@ -79,6 +79,9 @@ def bounce(state, event, dt):
     mass = 1.0 / (inverse_mass[a] + inverse_mass[b])
     # of the bodies' relative velocity, with what friction adds to it
     change = add(scale(impacts.event_normal[event], impacts.event_change[event]), impacts.event_pull[event])
+    if state.spinning:
+        impulse, friction = impacts.event_change[event] * mass, scale(impacts.event_pull[event], mass)
+        turn_by_impact(state, event, arms_of(state, event), impulse, friction, dt)
     for side in range(2):
         i = a if side == 0 else b
         if inverse_mass[i] > 0.0:  # what cannot be moved is as it was: its other impacts stand, and no cap is on it
@@ -87,8 +90,6 @@ def bounce(state, event, dt):
             if impacts.sweeps:
                 bodies.caught[i] = bodies.caught[i] + 1 if stands_still(bodies, a + b - i) else 0
             deflect(state, i, scale(change, (-mass if side == 0 else mass) * inverse_mass[i]), now, dt)
-    if state.spinning:
-        turn_at(bodies, (a, b), impacts.event_normal[event], scale(impacts.event_pull[event], mass), dt - now)
     log_impact(state, event, impacts.event_change[event] * mass)
 
 
@@ -125,13 +126,14 @@ def stop(state, i, now):
 
 
 @part
-def slide(state, i, normal, now, dt):
+def slide(state, i, normal, rate, dt):
     """A body that is caught in a slot little wider than itself keeps its velocity, but moves only along the slot until
-    the step ends: its impacts in between would be too many to count, and end where they began."""
-    bodies = state.bodies
+    the step ends, or as what turns there carries it: its impacts in between would be too many to count, and end where
+    they began. rate: m/s, of that along the normal."""
+    bodies, now = state.bodies, state.impacts.now
     x0, x1, x2, x3 = path_of(state, i)
     old = x0, x1, x2, x3
-    x1 = add_scaled(x1, normal, -dot(x1, normal))
+    x1 = add_scaled(x1, normal, rate - dot(x1, normal))
     x2, x3 = add_scaled(x2, normal, -dot(x2, normal)), add_scaled(x3, normal, -dot(x3, normal))
     x0 = add(x0, sub(along(old, now), along((x0, x1, x2, x3), now)))
     bodies.position[i] = add(bodies.position[i], sub(along((x0, x1, x2, x3), dt), along(old, dt)))

@@ -15,6 +15,7 @@ from .bounds_exit import update_bounds_exit_time
 from .find import queue_next_impact
 from .heap import heap_pop
 from .impulses import CROSS, SLIDE, STOPPED, TOUCHDOWN, bounce, slide, stop
+from .turning import mill_speed
 from .together import EQUAL, holds, put_back
 from .worklist import lacks_room, list_contacts, list_landings, list_neighbours, list_pair, list_pairs_of
 
@@ -117,7 +118,8 @@ def take_swept_event(state, event, dt):
         impacts.capped += 1 if kind == SLIDE else 0
         a, b = pairs.a[c], pairs.b[c]
         if bodies.inverse_mass[a] * bodies.inverse_mass[b] == 0.0:
-            slide(state, a if bodies.inverse_mass[a] > 0.0 else b, impacts.event_normal[event], impacts.now, dt)
+            rate = mill_speed(state, event) if state.spinning else 0.0
+            slide(state, a if bodies.inverse_mass[a] > 0.0 else b, impacts.event_normal[event], rate, dt)
     else:
         impacts.capped += 1
         pairs.crossed[c] = True

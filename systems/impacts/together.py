@@ -15,7 +15,7 @@ from ..ccd.time_of_impact import clear_of_rounding
 from ..codes import NEED_EVENTS, OK
 from ..integration.trajectory import rate_along, relative_path
 from .bounds_exit import update_bounds_exit_time
-from .group import WORK, is_affordable, push_group, shoots, solve_group
+from .group import WORK, is_affordable, push_group, shoots, solve_group, turns
 from .heap import heap_pop, heap_push
 from .impulses import BOUNCE, CROSS, FREE, bounce
 from .worklist import list_landings, list_pairs_of
@@ -179,16 +179,18 @@ def take_group(state, m, dt):
     """Carry out the impact of member m, and those that are connected with it.
 
     In a discrete world what overlaps when a step ends only seems to be at one time. There these impacts come one after
-    the other where all at once would shoot a body through a wall; so they do if there are too many for this step.
+    the other where all at once would shoot a body through a wall; so they do if there are too many for this step,
+    and where normals turn a body.
     """
     impacts, pairs, bodies, logged = state.impacts, state.pairs, state.bodies, state.impacts.logged
     first = impacts.member[m]
     impacts.now = impacts.event_time[first]
     count = find_group(state, m)
-    solves = count > 1 and is_affordable(impacts, count)
+    single = count == 1 or turns(state, count)
+    solves = not single and is_affordable(impacts, count)
     if solves:
         solves = solve_group(state, count)
-    elif count > 1:
+    elif not single:
         impacts.group_visits = WORK
     if solves and not (shoots(state, count) and not impacts.sweeps):
         push_group(state, count, dt)

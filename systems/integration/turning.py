@@ -11,7 +11,7 @@ import math
 from ...framework.compilation import inlined
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 
-SMALL_TURN = 1e-4  # rad: its cube is nothing beside 1
+SMALL_TURN = 1e-6  # rad: its cube is nothing beside 1
 
 
 @inlined
@@ -90,62 +90,41 @@ def compliance(bodies, i, arm, along):
 
 
 @inlined
-def surface_velocity(bodies, a, b, normal):
-    """How much faster than its centre the surface of b moves there, as the surface of a sees it; ``normal`` from a to
-    b."""
-    both = add_scaled(scale(bodies.spin[a], bodies.rolling_radius[a]), bodies.spin[b], bodies.rolling_radius[b])
-    return scale(cross_spin(both, normal), -1.0)
-
-
-@inlined
-def turning_mass(bodies, a, b):
-    """1 / kg that an impulse along the surface moves beside the bodies' inverse masses."""
-    r_a, r_b = bodies.rolling_radius[a], bodies.rolling_radius[b]
-    return item(bodies.inverse_inertia[a], 0) * r_a * r_a + item(bodies.inverse_inertia[b], 0) * r_b * r_b
-
-
-@inlined
-def turn_by(bodies, a, b, normal, impulse):
-    """An impulse along the surface, on b and back on a, changes the spins of both."""
-    turned = twist(normal, impulse)
-    w_a, w_b = item(bodies.inverse_inertia[a], 0), item(bodies.inverse_inertia[b], 0)
-    if w_a > 0.0:
-        bodies.spin[a] = add_scaled(bodies.spin[a], turned, -w_a * bodies.rolling_radius[a])
-    if w_b > 0.0:
-        bodies.spin[b] = add_scaled(bodies.spin[b], turned, -w_b * bodies.rolling_radius[b])
-
-
-@inlined
-def turn_at(bodies, sides, normal, impulse, left):
-    """The same where ``left`` seconds of the step are left, in which both turn with their new spins."""
-    a, b = sides
-    spin_a, spin_b = bodies.spin[a], bodies.spin[b]
-    turn_by(bodies, a, b, normal, impulse)
-    bodies.turn[a] = add_scaled(bodies.turn[a], sub(bodies.spin[a], spin_a), left)
-    bodies.turn[b] = add_scaled(bodies.turn[b], sub(bodies.spin[b], spin_b), left)
-
-
-@inlined
 def is_turned(bodies, i):
     """Whether contacts turn body i by pushing along their normals: it is not round."""
     return length(bodies.inverse_inertia[i]) > 0.0 and bodies.rolling_radius[i] == 0.0
 
 
 @inlined
-def is_mill(bodies, i):
-    """Whether body i turns by itself and is not round, so that its surface moves along its normal too."""
-    return bodies.inverse_mass[i] == 0.0 and bodies.rolling_radius[i] == 0.0 and length(bodies.spin[i]) > 0.0
+def arms_to(bodies, a, b, normal, place, d):
+    """(arm of a, arm of b) to where the two touch. place: of that, from the centre of a's shape; d: from there to that
+    of b's; ``normal`` from a to b. What touches a round body does so at its surface, to which its arm leads along the
+    normal.
+    """
+    r_a, r_b = bodies.rolling_radius[a], bodies.rolling_radius[b]
+    place_a = add_scaled(d, normal, -r_b) if r_b > 0.0 else place
+    place_b = scale(normal, r_a) if r_a > 0.0 else place
+    arm_a = scale(normal, r_a) if r_a > 0.0 else add(bodies.offset[a], place_a)
+    arm_b = scale(normal, -r_b) if r_b > 0.0 else add(bodies.offset[b], sub(place_b, d))
+    return arm_a, arm_b
 
 
 @inlined
-def carried(bodies, a, b, point, d):
-    """The velocity of b's point, as that of a sees it, beside that of their centres, where one of the two is a mill.
-
-    point: of the contact, from the centre of a's shape; d: from there to that of b's.
+def lever(bodies, i, arm, normal):
+    """What an impulse of 1 along the normal twists at the end of an arm: nothing of a round body, not even by rounding.
     """
-    result = scale(d, 0.0)
-    if is_mill(bodies, a):
-        result = sub(result, cross_spin(bodies.spin[a], add(bodies.offset[a], point)))
-    if is_mill(bodies, b):
-        result = add(result, cross_spin(bodies.spin[b], add(bodies.offset[b], sub(point, d))))
-    return result
+    return scale(arm, 0.0) if bodies.rolling_radius[i] > 0.0 else twist(arm, normal)
+
+
+@inlined
+def closing_by_spin(bodies, a, b, arms, normal):
+    """How fast b's point moves away from a's along the normal, beside their bodies."""
+    arm_a, arm_b = arms
+    apart = dot(bodies.spin[b], lever(bodies, b, arm_b, normal))
+    return apart - dot(bodies.spin[a], lever(bodies, a, arm_a, normal))
+
+
+@inlined
+def velocity_by_spin(bodies, a, b, arms):
+    """The velocity of b's point as that of a sees it, beside that of their bodies."""
+    return sub(cross_spin(bodies.spin[b], arms[1]), cross_spin(bodies.spin[a], arms[0]))

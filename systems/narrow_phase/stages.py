@@ -162,9 +162,10 @@ def find_hasty(state, dt):
 
 @part
 def find_fast_turns(state):
-    """Note a body that turns farther in a step than contacts can follow: their rows stand for one moment of it."""
+    """Note a body that turns farther in a step than contacts can follow where no pair is swept: rows stand for one
+    moment of it."""
     bodies = state.bodies
-    for i in range(state.first, state.moving):
+    for i in range(state.first, state.moving if not state.sweeping else 0):
         if bodies.rolling_radius[i] == 0.0 and length(bodies.turn[i]) > FOLLOWED:
             state.turns_too_far = i + 1
 

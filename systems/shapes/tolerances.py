@@ -48,12 +48,24 @@ def reach_of(bodies, i):
 
 
 @inlined
-def turning_margin(state, dt, a, b):
-    """How near a pair is looked at before it touches: the same, and how far corners come by turning."""
-    margin, bodies = contact_margin(state, dt, a, b), state.bodies
+def turning_travel(state, span, a, b):
+    """How far points of the two come nearer by turning, at most; what is round comes no nearer."""
+    bodies, travel = state.bodies, 0.0
     if state.spinning:
         if bodies.rolling_radius[a] == 0.0:
-            margin += dt * length(bodies.spin[a]) * reach_of(bodies, a)
+            travel += span * length(bodies.spin[a]) * reach_of(bodies, a)
         if bodies.rolling_radius[b] == 0.0:
-            margin += dt * length(bodies.spin[b]) * reach_of(bodies, b)
-    return margin
+            travel += span * length(bodies.spin[b]) * reach_of(bodies, b)
+    return travel
+
+
+@inlined
+def is_turning(state, dt, a, b):
+    """Whether the pair has another shape at other times of the step."""
+    return turning_travel(state, dt, a, b) > SAME_PLACE * smaller_extent(state.bodies, a, b)
+
+
+@inlined
+def turning_margin(state, dt, a, b):
+    """How near a pair is looked at before it touches: the same, and how far corners come by turning."""
+    return contact_margin(state, dt, a, b) + turning_travel(state, dt, a, b)

@@ -1,0 +1,61 @@
+"""When two bodies of which one turns, and is not round, first touch where they also approach: by conservative
+advancement, with both shapes turned as they are at each time.
+
+The gap closes no faster than the bodies approach along its normal, plus the speed by spin of the farthest point of
+each. A touch counts only if its point approaches: after an impact the two still touch, and another corner may come in.
+(B. Mirtich, "Impulse-based dynamic simulation of rigid body systems", 1996.)
+"""
+
+from __future__ import annotations
+
+from ...framework.compilation import part
+from ...framework.jit.records.record_type import zero_of
+from ...framework.vectors import add, dot, length, scale, sub
+from ..integration.trajectory import along, rate_along, travel_of
+from ..integration.turning import arms_to, closing_by_spin
+from ..shapes.dispatch import both_convex, evaluate, is_corner_touch
+from ..shapes.poses import turn_shape
+from ..shapes.tolerances import smaller_extent, turning_travel
+
+LOOKS, EXACT_LOOKS = 250, 60
+NEAR = 1e-6  # of the extent: a smaller gap is a touch
+GRAZE = 0.125  # slops: as far as points move between looks at a pair that touches and parts, or after EXACT_LOOKS
+
+
+@part
+def touch_of_turning(state, a, b, path, since, until, limits):
+    """(whether they touch; time, normal, point, from a's centre to b's) as of :func:`time_of_impact.first_touch`, until
+    the end of the step. limits: (slop, -, speed of approach of the point below which a touch is one only if no faster
+    one follows)."""
+    bodies, slop, threshold = state.bodies, limits[0], limits[2]
+    spin_a, spin_b, shape_a, shape_b = bodies.spin[a], bodies.spin[b], bodies.shape[a], bodies.shape[b]
+    near, turning = NEAR * smaller_extent(bodies, a, b), turning_travel(state, 1.0, a, b)
+    graze = max(GRAZE * slop, (turning * (until - since) + travel_of(path, until)) / (LOOKS - EXACT_LOOKS))
+    bend = 2.0 * length(path[2]) + 6.0 * length(path[3]) * until
+    convex, ends = both_convex(state, shape_a, shape_b), sub(bodies.offset[b], bodies.offset[a])
+    touch, found, t, posed = (until, zero_of(state), zero_of(state), zero_of(state)), False, since, until
+    for look in range(LOOKS):
+        turn_shape(state, a, scale(spin_a, t - posed))
+        turn_shape(state, b, scale(spin_b, t - posed))
+        posed = t
+        d = add(along(path, t), sub(sub(bodies.offset[b], bodies.offset[a]), ends))
+        _, depth, normal, point = evaluate(state, shape_a, a, shape_b, b, d)
+        w = rate_along(path, t)
+        near = graze if look == EXACT_LOOKS else near
+        fastest, touches = turning + length(w) + bend * (until - t), -depth <= near
+        if touches:
+            rate = dot(w, normal) + closing_by_spin(bodies, a, b, arms_to(bodies, a, b, normal, point, d), normal)
+            closes = rate < 0.0 and (rate < -threshold or not found)
+            if closes and not is_corner_touch(state, shape_a, a, shape_b, b, d, slop):
+                touch, found = (t, normal, point, d), True
+                if rate < -threshold:
+                    break
+        elif convex:
+            fastest += max(0.0, -dot(w, normal)) - length(w)
+        if t >= until:
+            break
+        further = t + (max(graze, -depth) if touches else max(-depth - 0.5 * near, 0.5 * near)) / fastest
+        t = further if further < until else until
+    turn_shape(state, a, scale(spin_a, until - posed))
+    turn_shape(state, b, scale(spin_b, until - posed))
+    return found, touch
