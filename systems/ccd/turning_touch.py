@@ -12,7 +12,7 @@ from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, dot, length, scale, sub
 from ..integration.trajectory import along, rate_along, travel_of
-from ..integration.turning import arms_to, closing_by_spin
+from ..integration.turning import arms_to, closing_by_spin, is_turned
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch
 from ..shapes.poses import turn_shape
 from ..shapes.tolerances import smaller_extent, turning_travel
@@ -32,6 +32,7 @@ def touch_of_turning(state, a, b, path, since, until, limits):
     near, turning = NEAR * smaller_extent(bodies, a, b), turning_travel(state, 1.0, a, b)
     graze = max(GRAZE * slop, (turning * (until - since) + travel_of(path, until)) / (LOOKS - EXACT_LOOKS))
     bend = 2.0 * length(path[2]) + 6.0 * length(path[3]) * until
+    corners = is_turned(bodies, a) and is_turned(bodies, b)  # what turns meets those of others, too
     convex, ends = both_convex(state, shape_a, shape_b), sub(bodies.offset[b], bodies.offset[a])
     touch, found, t, posed = (until, zero_of(state), zero_of(state), zero_of(state)), False, since, until
     for look in range(LOOKS):
@@ -46,7 +47,7 @@ def touch_of_turning(state, a, b, path, since, until, limits):
         if touches:
             rate = dot(w, normal) + closing_by_spin(bodies, a, b, arms_to(bodies, a, b, normal, point, d), normal)
             closes = rate < 0.0 and (rate < -threshold or not found)
-            if closes and not is_corner_touch(state, shape_a, a, shape_b, b, d, slop):
+            if closes and (corners or not is_corner_touch(state, shape_a, a, shape_b, b, d, slop)):
                 touch, found = (t, normal, point, d), True
                 if rate < -threshold:
                     break

@@ -23,7 +23,7 @@ from ..integration.trajectory import (
     relative_path,
     travel_of,
 )
-from ..integration.turning import arms_to, closing_by_spin
+from ..integration.turning import arms_to, closing_by_spin, is_turned
 from ..linking.parts import FIRST_TOUCH, call_first_touch
 from ..narrow_phase.manifolds import is_at_manifold
 from ..narrow_phase.stages import rank_rows
@@ -46,7 +46,8 @@ def overlap_at_end(state, a, b, path, dt):
     """(whether they overlap at the end of their motion, and not at a corner only; the normal there)."""
     shape_a, shape_b, d = state.bodies.shape[a], state.bodies.shape[b], along(path, dt)
     hit, _, normal, _ = evaluate(state, shape_a, a, shape_b, b, d)
-    return hit and not is_corner_touch(state, shape_a, a, shape_b, b, d, slop_of(state, a, b)), normal
+    corners = state.spinning and is_turned(state.bodies, a) and is_turned(state.bodies, b)
+    return hit and (corners or not is_corner_touch(state, shape_a, a, shape_b, b, d, slop_of(state, a, b))), normal
 
 
 @part
