@@ -23,7 +23,16 @@ from ...framework.compilation import log
 from ...scenes import gas, player_query
 from ..cli.usage_errors import Problem
 from ..engines.pymunk_space import INDEXES, PymunkSpace
-from ..measure.body_shapes import Enclosure, Floats, dynamic_by_id, overlaps_of, shapes_of
+from ..measure.body_shapes import (
+    Enclosure,
+    Floats,
+    dynamic_by_id,
+    inertia_by_id,
+    moving_rows,
+    overlaps_of,
+    shapes_of,
+    turns_by_id,
+)
 from ..measure.run import plain_settings
 from ..measure.timing import Spread, no_garbage_collection, timed
 from ..reporting.progress import NO_PROGRESS, Progress
@@ -50,6 +59,10 @@ class CaromWorld:
     def state(self) -> tuple[Floats, Floats]:
         """Positions and velocities of the dynamic bodies, (n, 2) each, ascending by entity id."""
         return dynamic_by_id(self.world)[:2]
+
+    def turns(self) -> tuple[Floats, Floats]:
+        """Angles and angular velocities of these, (n,) each; then those of the kinematic bodies."""
+        return turns_by_id(self.world)
 
 
 Engines = dict[str, CaromWorld | PymunkSpace]
@@ -144,7 +157,7 @@ def _run_windows(case: Case, other: World, engines: Engines) -> None:
         seconds = _run_window(case, window, engines, quality)
         case.timed[window.name] = window.last - window.first
         for name, engine in engines.items():
-            case.note(window.name, name, seconds[name], quality[name].figures(*engine.state()))
+            case.note(window.name, name, seconds[name], quality[name].figures(*engine.state(), engine.turns()[1]))
         taken = window.last
 
 
@@ -164,7 +177,7 @@ def _run_window(case: Case, window: Window, engines: Engines, quality: dict[str,
                     for name in names:
                         seconds[name].append(taken[name][0])
         for name, engine in engines.items():
-            quality[name].sample(engine.state()[0])
+            quality[name].sample(engine.state()[0], engine.turns()[0])
     if not seconds[CAROM]:
         raise Problem(f"{case.subject.name}: kernels were compiled in all steps; run it once more")
     return seconds
@@ -191,7 +204,7 @@ def _rows(case: Case) -> list[Row]:
 
 def _together(figures: Sequence[dict[str, float]]) -> dict[str, float]:
     """Combine the repeats: the maximum of error figures, the mean of the others."""
-    worst = ("overlap_max", "escaped", "drift", "sink")
+    worst = ("overlap_max", "escaped", "drift", "sink", "creep")
     return {name: float((max if name in worst else np.mean)([one[name] for one in figures])) for name in figures[0]}
 
 
@@ -300,29 +313,40 @@ class Quality:
         self._order = np.argsort(world.bodies.dynamic.entity, kind="stable")
         self.start, _, self.mass = dynamic_by_id(world)
         self.kinetic, self.enclosure = world.kinetic_energy(), Enclosure.around(world)
+        self.inertia = inertia_by_id(world)
         self.begin()
 
     def begin(self) -> None:
         """Discard the overlaps of the previous window."""
-        self.overlap_means, self.overlap_most = [], 0.0
+        self.overlap_means, self.overlap_most, self.first = [], 0.0, None
 
-    def sample(self, position: Floats) -> None:
-        """Record the overlaps at ``position`` (n, 2)."""
+    def sample(self, position: Floats, angle: Floats) -> None:
+        """Record the overlaps at ``position`` (n, 2) and ``angle`` (m,), also of the kinematic bodies."""
         self.world.bodies.dynamic.position[self._order] = position
+        if np.isfinite(self.inertia).any():
+            self.world.bodies.rotation[moving_rows(self.world)] = angle
+        self.world.refresh_queries()
+        self.first = position if self.first is None else self.first
         depths = overlaps_of(self.world)[2]
         self.overlap_means.append(float(depths.mean()) if len(depths) else 0.0)
         self.overlap_most = max(self.overlap_most, float(depths.max(initial=0.0)))
 
-    def figures(self, position: Floats, velocity: Floats) -> dict[str, float]:
-        """Energies in J, overlaps in diameters, drift (sideways) and sink (downwards) in m since the start."""
+    def figures(self, position: Floats, velocity: Floats, spin: Floats) -> dict[str, float]:
+        """Energies in J, overlaps in diameters, drift (sideways) and sink (downwards) in m since the start, creep in m
+        since the first sample of the window."""
         finite = np.isfinite(position).all(axis=1) & np.isfinite(velocity).all(axis=1)
         way = (position - self.start)[finite]
+        spins = np.isfinite(self.inertia) & finite
+        energy = self.mass[finite] @ (velocity[finite] ** 2).sum(axis=1)
+        energy += self.inertia[spins] @ spin[: len(spins)][spins] ** 2
+        crept = 0.0 if self.first is None else np.linalg.norm(position - self.first, axis=1)[finite].max(initial=0.0)
         return {
             "kinetic_start": self.kinetic,
-            "kinetic_end": float(0.5 * self.mass[finite] @ (velocity[finite] ** 2).sum(axis=1)),
+            "kinetic_end": float(0.5 * energy),
             "overlap_mean": float(np.mean(self.overlap_means)) if self.overlap_means else 0.0,
             "overlap_max": self.overlap_most,
             "escaped": float(self.enclosure.outside(position[finite]) + (~finite).sum()),
             "drift": float(np.abs(way[:, 0]).max(initial=0.0)),
             "sink": float((-way[:, 1]).max(initial=0.0)),
+            "creep": float(crept),
         }

@@ -28,14 +28,17 @@ NAMES = ", ".join(dict.fromkeys(subject.scene for subject in SUITE))
 )  # fmt: skip
 @click.option(
     "--sizes", metavar="N,N", callback=listed("--sizes", "whole numbers from 1", whole_number),
-    help=f"Numbers of bodies (default: {SIZES[0]:,} and {SIZES[1]:,}) of scenes that come in sizes; pyramid, "
-    "static_world, fastgas and freefall have their own.",
+    help=f"Numbers of bodies (default: {SIZES[0]:,} and {SIZES[1]:,}) of scenes that come in sizes; few, pyramid, "
+    "static_world, fastgas, freefall and those that turn have their own.",
 )  # fmt: skip
 @click.option(
     "--repeats", type=click.IntRange(min=1), help=f"Runs of everything; the median counts (default: {REPEATS})."
 )
 @click.option("--large", is_flag=True, help=f"{LARGE:,} bodies too: takes long, above all pile2d.")
-@click.option("--quick", is_flag=True, help=f"{QUICK_SIZES[0]:,} bodies only, {QUICK_REPEATS} repeats.")
+@click.option(
+    "--quick", is_flag=True,
+    help=f"{QUICK_SIZES[0]:,} bodies only, {QUICK_REPEATS} repeats, and no scenes of many bodies that turn.",
+)  # fmt: skip
 @click.option("--no-peer", is_flag=True, help="carom alone, without pymunk.")
 @out_option("Draw a chart into this folder.")
 @shown_options
@@ -46,7 +49,7 @@ def bench_command(
     """Time scenes of the library in carom and in pymunk, on the same bodies, in one process."""
     if quick and (sizes or large):
         raise Problem("--quick chooses the sizes: leave out --sizes and --large")
-    wanted = subjects(scene_names or ())
+    wanted = subjects(scene_names or (), quick)
     asked = QUICK_SIZES if quick else tuple(sorted(sizes)) if sizes else SIZES
     if large:
         asked = tuple(sorted({*asked, LARGE}))

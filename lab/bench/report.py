@@ -75,9 +75,10 @@ def quality(rows: list[Row]) -> TextTable:
 
 def motion(rows: list[Row]) -> TextTable:
     """The largest displacement of bodies that should come to rest."""
-    cells = [(row.label, of_both(row, "drift"), of_both(row, "sink")) for row in rows]
-    title = f"farthest way from the start, {' / '.join(rows[0].quality)}: sideways and downwards, in m"
-    return TextTable(title, ("scene", "sideways", "downwards"), cells)
+    cells = [(row.label, *(of_both(row, name) for name in ("drift", "sink", "creep"))) for row in rows]
+    engines = " / ".join(rows[0].quality)
+    title = f"farthest way from the start, {engines}: sideways and downwards; after a tenth of the steps: in all, in m"
+    return TextTable(title, ("scene", "sideways", "downwards", "after a tenth"), cells)
 
 
 def answers(rows: list[Row]) -> TextTable:
@@ -103,7 +104,7 @@ def remarks(result: Result) -> list[str]:
                     lines[-1] += f"; {scene}: {', '.join(f'{name} {_value(value)}' for name, value in values.items())}"
     if "pymunk" in result.settings:
         lines[-1] += (
-            "; moments infinite; index: its tree of boxes or its spatial hash (cells of two"
+            "; moments of what does not spin infinite; index: its tree of boxes or its spatial hash (cells of two"
             " diameters), whichever was faster in the first repeat"
         )
     return lines

@@ -40,6 +40,7 @@ class Subject:
     ``sizes``: the numbers of bodies, if they differ from the requested ones
     ``energy``: "kept": kinetic energy must be conserved, shown as a percentage; "left": it must be dissipated, shown in
     joules; "": neither
+    ``quick``: it is part of a quick comparison
     """
 
     scene: str
@@ -50,6 +51,7 @@ class Subject:
     settings: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     sizes: tuple[int, ...] | None = None
     size_option: str = "n"
+    quick: bool = True
 
     @property
     def name(self) -> str:
@@ -67,9 +69,9 @@ def _few(what: str, n: int, **options: Any) -> Subject:
     return Subject("few", (Window("", 10, 200),), "", what, options=options, sizes=(n,))
 
 
-def _pyramid(friction: float) -> Subject:
-    options, variant = {"friction": friction}, f"friction {friction:g}"
-    return Subject("pyramid", (Window("", 0, 500),), "left", variant, options, sizes=(50,), size_option="rows")
+def _pyramid(variant: str, quick: bool = True, **options: Any) -> Subject:
+    windows = (Window("", 0, 500),)
+    return Subject("pyramid", windows, "left", variant, options, sizes=(50,), size_option="rows", quick=quick)
 
 
 SUITE: tuple[Subject, ...] = (
@@ -80,8 +82,12 @@ SUITE: tuple[Subject, ...] = (
     Subject("gas2d", AFTER_START),
     Subject("mixed2d", AFTER_START),
     Subject("pile2d", (Window("falling", 0, 300), Window("settled", 600, 900)), energy="left"),
-    _pyramid(0.6),
-    _pyramid(0.0),
+    _pyramid("friction 0.6", friction=0.6),
+    _pyramid("friction 0", friction=0.0),
+    _pyramid("turning", quick=False, spins=True),
+    Subject("dominoes", (Window("", 0, 500),), "left", sizes=(500,)),
+    Subject("tumbler", (Window("", 60, 360),), "left", sizes=(1000,), quick=False),
+    Subject("rubble", (Window("falling", 0, 300), Window("settled", 600, 900)), "left", sizes=(1000,), quick=False),
     Subject("static_world", AFTER_START, sizes=(1000,)),
     Subject("fastgas", AFTER_START, variant="continuous", settings={"collision": "continuous"}, sizes=(1000,)),
     Subject("fastgas", AFTER_START, variant="discrete", sizes=(1000,)),
@@ -90,14 +96,17 @@ SUITE: tuple[Subject, ...] = (
 )
 
 
-def subjects(scenes: Iterable[str] = ()) -> tuple[Subject, ...]:
-    """The subjects of ``scenes`` in suite order; all if none are named. Problem for a scene that is not measured."""
+def subjects(scenes: Iterable[str] = (), quick: bool = False) -> tuple[Subject, ...]:
+    """The subjects of ``scenes`` in suite order; if none are named, all, or all ``quick`` ones. Problem for a scene
+    that is not measured."""
     wanted = list(scenes)
     known = list(dict.fromkeys(subject.scene for subject in SUITE))
     for name in wanted:
         if name not in known:
             raise Problem(f"--scenes: {name!r} is not measured{did_you_mean(name, known)}")
-    return tuple(subject for subject in SUITE if not wanted or subject.scene in wanted)
+    if not wanted:
+        return tuple(subject for subject in SUITE if subject.quick or not quick)
+    return tuple(subject for subject in SUITE if subject.scene in wanted)
 
 
 def sizes_of(subject: Subject, asked: tuple[int, ...]) -> tuple[int, ...]:

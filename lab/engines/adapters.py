@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from ...components.spin import Spin
 from ...framework import World
-from ..measure.body_shapes import Enclosure, Floats, overlaps_of, sensor_entities, sizes_of
+from ..measure.body_shapes import Enclosure, Floats, moving_rows, overlaps_of, sensor_entities, sizes_of
 from ..measure.timing import timed
 from ..trading.records import PYMUNK
 from .pymunk_space import PymunkSpace
@@ -242,6 +243,7 @@ class PymunkEngine(Engine):
         self._mirror()
 
     def overlaps(self) -> Floats:
+        self.world.refresh_queries()
         return overlaps_of(self.world)[2]
 
     def _push(self) -> None:
@@ -259,6 +261,9 @@ class PymunkEngine(Engine):
         dynamic = self.world.bodies.dynamic
         dynamic.position[self._order] = position
         dynamic.linear_velocity[self._order] = velocity
+        if self.world.bodies.has(Spin).any():
+            rows = moving_rows(self.world)
+            self.world.bodies.rotation[rows], self.world.bodies.spin.angular_velocity[rows] = self.space.turns()
 
     def counts(self) -> dict[str, float]:
         return {

@@ -1,6 +1,7 @@
 """A world of carom translated to pymunk with the same bodies, as pymunk's manual recommends.
 
-Static shapes are attached to the space's static body, moments of inertia are infinite (no rotation), sleeping is off.
+Static shapes are attached to the space's static body, bodies without a Spin have infinite moments of inertia, sleeping
+is off.
 """
 
 from __future__ import annotations
@@ -13,9 +14,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...components import AABBCollider, SphereCollider
+from ...components.spin import Spin
 from ...framework import World
+from ...systems.shapes.rotation import axes_of
 from ..cli.usage_errors import Problem
 from ..measure.body_shapes import Floats
+from ..measure.outlines import OUTLINES, SIGNS, outlines_of
 
 INDEXES = ("tree", "hash")  # pymunk's two broad phases: a tree of bounding boxes, or a spatial hash
 ITERATIONS = 10
@@ -30,56 +34,81 @@ class NotPlainError(ValueError):
 class Bodies(NamedTuple):
     """One row per body, ascending by entity id.
 
-    ``half (n, 2)`` half extents, the radius in both for a disc; ``round (n,)`` true for discs, ``shaped (n,)`` false
-    without a collider; ``restitution`` and ``friction (n,)``, NaN: the other body's.
+    ``shaped (n,)`` false without a collider; ``corners``: of each collider (m, 2), about the body's position and along
+    its axes, a disc has one; ``rounding (n,)``: how far it goes beyond these; ``restitution`` and ``friction (n,)``,
+    NaN: the other body's; ``moment (n,)``: infinite for what does not spin.
     """
 
+    corners: list[Floats]
     position: Floats
     velocity: Floats
+    angle: Floats
+    spin: Floats
     mass: Floats
-    half: Floats
-    round: np.ndarray
+    moment: Floats
     shaped: np.ndarray
+    rounding: Floats
     restitution: Floats
     friction: Floats
 
 
-def moving_and_fixed(world: World) -> tuple[Bodies, Bodies]:
-    """The dynamic and the static bodies of ``world`` in their present state; NotPlainError if not representable."""
+def moving_and_fixed(world: World) -> tuple[Bodies, Bodies, Bodies]:
+    """The dynamic, kinematic and static bodies of ``world`` in their present state; NotPlainError if not
+    representable."""
     if world.dimensions != 2:
         raise NotPlainError(f"a world of {world.dimensions} dimensions, not 2")
-    _refuse("kinematic bodies", len(world.bodies.kinematic))
-    dynamic = world.bodies.dynamic
-    moving = _plain(dynamic)
-    order = np.argsort(dynamic.entity, kind="stable")
-    _refuse("offsets of moving bodies' colliders", moving.position != dynamic.position[order])
-    return moving, _plain(world.bodies.static)
+    dynamic, kinematic, fixed = world.bodies.dynamic, world.bodies.kinematic, world.bodies.static
+    _refuse("kinematic bodies without a Spin", ~kinematic.has(Spin))
+    return _plain(world, dynamic), _plain(world, kinematic), _plain(world, fixed)
 
 
-def _plain(bodies: Any) -> Bodies:
-    count = len(bodies)
-    position, half = np.array(bodies.position), np.zeros((count, 2))
-    friction, restitution = np.full(count, np.nan), np.zeros(count)
-    rounds, boxes = (np.asarray(bodies.has(collider), bool) for collider in (SphereCollider, AABBCollider))
-    for has, name in ((rounds, "sphere_collider"), (boxes, "aabb_collider")):
+def _plain(world: World, bodies: Any) -> Bodies:
+    count, angle, moves = len(bodies), np.array(bodies.rotation), np.isin(bodies.entity, world.bodies.dynamic.entity)
+    friction, restitution, rounding = np.full(count, np.nan), np.zeros(count), np.zeros(count)
+    corners, shaped = [np.zeros((1, 2))] * count, np.zeros(count, bool)
+    for collider in (SphereCollider, AABBCollider, *OUTLINES):
+        has = np.asarray(bodies.has(collider), bool)
         if not has.any():
             continue
-        columns = getattr(bodies, name)
-        half[has] = columns.radius[has, None] if has is rounds else columns.half_extents[has]
-        friction[has], restitution[has] = columns.friction[has], columns.restitution[has]
-        position[has] += columns.offset[has]
+        columns = getattr(bodies, collider.prefix[:-1])
+        _refuse("bodies with two colliders", shaped & has)
         _refuse("sensors", columns.sensor[has])
         _refuse("layers and masks", (columns.layer[has] != 1) | (columns.mask[has] & 1 == 0))
-    _refuse("bodies with two colliders", rounds & boxes)
-    _refuse("turned boxes", bodies.rotation[boxes])
+        _refuse("turned boxes", (collider is AABBCollider) * angle[has])
+        shaped |= has
+        friction[has], restitution[has] = columns.friction[has], columns.restitution[has]
+        if collider in OUTLINES:
+            found, rounding[has], _ = outlines_of(world, collider, bodies.entity[has])
+        elif collider is SphereCollider:
+            found, rounding[has] = np.zeros((has.sum(), 1, 2)), columns.radius[has]
+        else:
+            found = SIGNS * columns.half_extents[has][:, None]
+        for k, own, offset in zip(np.flatnonzero(has).tolist(), found, columns.offset[has], strict=True):
+            corners[k] = own + offset
+            _refuse("offsets of moving bodies' colliders", offset * moves[k])
     _refuse("damping", bodies.linear_damping)
     _refuse("constant forces", bodies.constant_force)
     _refuse("a gravity scale", bodies.gravity_scale != 1)
     _refuse("limits of speed", ~np.isnan(bodies.max_linear_speed))
-    order, shaped = np.argsort(bodies.entity, kind="stable"), rounds | boxes
-    velocity, mass = np.array(bodies.linear_velocity), np.array(bodies.mass)
-    rows: tuple[Any, ...] = (position, velocity, mass, half, rounds, shaped, restitution, friction)
-    return Bodies(*(column[order] for column in rows))
+    spin, moment = _spins(world, bodies, moves)
+    order = np.argsort(bodies.entity, kind="stable")
+    position, velocity, mass = np.array(bodies.position), np.array(bodies.linear_velocity), np.array(bodies.mass)
+    columns: tuple[Any, ...] = position, velocity, angle, spin, mass, moment, shaped, rounding, restitution, friction
+    return Bodies([corners[k] for k in order], *(column[order] for column in columns))
+
+
+def _spins(world: World, bodies: Any, moves: np.ndarray) -> tuple[Floats, Floats]:
+    """Angular velocities (n,), and moments of inertia (n,), which are infinite for what does not spin."""
+    spin, moment, has = np.zeros(len(bodies)), np.full(len(bodies), np.inf), bodies.has(Spin)
+    if has.any():
+        columns = bodies.spin
+        spin[has] = columns.angular_velocity[has]
+        _refuse("damping of spins", columns.angular_damping[has])
+        _refuse("constant torques", columns.constant_torque[has])
+        _refuse("limits of spins", ~np.isnan(columns.max_angular_speed[has]))
+        for k in np.flatnonzero(has & moves).tolist():
+            moment[k] = world.component_for_entity(int(bodies.entity[k]), Spin).moments
+    return spin, moment
 
 
 def _refuse(what: str, found: Any) -> None:
@@ -104,38 +133,31 @@ class PymunkSpace:
 
     def __init__(self, world: World, index: str = "tree") -> None:
         pymunk = pymunk_module()
-        moving, fixed = moving_and_fixed(world)
-        restitution, friction, fixed_friction = _materials(world, moving, fixed)
+        moving, turning, fixed = moving_and_fixed(world)
+        restitution, *frictions = _materials(world, moving, turning, fixed)
         self.space: Any = pymunk.Space()
         self.space.iterations = ITERATIONS
         self.space.gravity = tuple(map(float, world.gravity))
         self.dt = world.settings.dt
-        self.bodies: list[Any] = []
-        for k in range(len(moving.mass)):
-            body = pymunk.Body(float(moving.mass[k]), float("inf"))
-            body.position = tuple(map(float, moving.position[k]))
-            body.velocity = tuple(map(float, moving.velocity[k]))
-            self.bodies.append(body)
-            self.space.add(body)
-            if moving.shaped[k]:
-                self._add_shape(pymunk, body, moving, k, (0.0, 0.0), restitution, float(friction[k]))
-        for k in np.flatnonzero(fixed.shaped).tolist():
-            place = tuple(map(float, fixed.position[k]))
-            self._add_shape(pymunk, self.space.static_body, fixed, k, place, restitution, float(fixed_friction[k]))
+        self.bodies = [pymunk.Body(*map(float, row)) for row in zip(moving.mass, moving.moment, strict=True)]
+        self.kinematic = [pymunk.Body(body_type=pymunk.Body.KINEMATIC) for _ in turning.mass]
+        for rows, bodies in ((moving, self.bodies), (turning, self.kinematic)):
+            for k, body in enumerate(bodies):
+                body.position, body.angle = tuple(map(float, rows.position[k])), float(rows.angle[k])
+                body.velocity, body.angular_velocity = tuple(map(float, rows.velocity[k])), float(rows.spin[k])
+                self.space.add(body)
+        static = [self.space.static_body] * len(fixed.mass)
+        placed = fixed._replace(corners=_in_world(fixed))
+        groups = zip((moving, turning, placed), (self.bodies, self.kinematic, static), frictions, strict=True)
+        for rows, bodies, friction in groups:
+            for k in np.flatnonzero(rows.shaped).tolist():
+                shape = _shape(pymunk, bodies[k], rows.corners[k].tolist(), float(rows.rounding[k]))
+                shape.elasticity, shape.friction = restitution, float(friction[k])
+                self.space.add(shape)
         if index == "hash":
-            size = HASH_CELL * 2 * float(moving.half.max())
+            reach = np.array([np.abs(corners).max() for corners in moving.corners]) + moving.rounding
+            size = HASH_CELL * 2 * float(reach.max())
             self.space.use_spatial_hash(size, HASH_CELLS_PER_BODY * (len(moving.mass) + len(fixed.mass)))
-
-    def _add_shape(
-        self, pymunk: ModuleType, body: Any, rows: Bodies, k: int, offset: tuple[float, ...], e: float, f: float
-    ) -> None:
-        if rows.round[k]:
-            shape = pymunk.Circle(body, float(rows.half[k, 0]), offset)
-        else:
-            (x, y), (w, h) = offset, map(float, rows.half[k])
-            shape = pymunk.Poly(body, [(x - w, y - h), (x + w, y - h), (x + w, y + h), (x - w, y + h)])
-        shape.elasticity, shape.friction = e, f
-        self.space.add(shape)
 
     def step(self, count: int) -> None:
         """Take ``count`` steps."""
@@ -148,6 +170,11 @@ class PymunkSpace:
         both = [(*body.position, *body.velocity) for body in self.bodies]
         state = np.array(both, float).reshape(-1, 4)
         return state[:, :2], state[:, 2:]
+
+    def turns(self) -> tuple[Floats, Floats]:
+        """Angles and angular velocities, (n,) each, likewise; then those of the kinematic bodies."""
+        both = np.array([(body.angle, body.angular_velocity) for body in (*self.bodies, *self.kinematic)], float)
+        return both.reshape(-1, 2)[:, 0], both.reshape(-1, 2)[:, 1]
 
     def settings(self) -> dict[str, Any]:
         """The settings of the space."""
@@ -183,20 +210,34 @@ class PymunkSpace:
         return np.array([1.0 if hit is None else hit.alpha for hit in hits])
 
 
-def _materials(world: World, moving: Bodies, fixed: Bodies) -> tuple[float, Floats, Floats]:
-    """One restitution for all shapes and the friction of each, chosen so that pymunk's products match carom's rules."""
-    shaped, fixed_shaped = moving.restitution[moving.shaped], fixed.restitution[fixed.shaped]
+def _in_world(rows: Bodies) -> list[Floats]:
+    """The corners where the bodies have them."""
+    axes = axes_of(rows.angle, 2)
+    return [place + corners @ turn.T for place, corners, turn in zip(rows.position, rows.corners, axes, strict=True)]
+
+
+def _shape(pymunk: ModuleType, body: Any, corners: list[tuple[float, float]], rounding: float) -> Any:
+    if len(corners) == 1:
+        return pymunk.Circle(body, rounding, corners[0])
+    if len(corners) == 2:
+        return pymunk.Segment(body, *corners, rounding)
+    return pymunk.Poly(body, corners, radius=rounding)
+
+
+def _materials(world: World, moving: Bodies, *others: Bodies) -> tuple[Any, ...]:
+    """One restitution for all shapes and the friction of each, of the moving and of the other bodies, chosen so that
+    pymunk's products match carom's rules."""
+    shaped, values = moving.restitution[moving.shaped], moving.friction[moving.shaped]
     largest = float(shaped.max(initial=0.0))
-    if (shaped != largest).any() or (fixed_shaped > largest).any():
+    if (shaped != largest).any() or any((rows.restitution[rows.shaped] > largest).any() for rows in others):
         raise NotPlainError("restitutions that differ")
     if world.settings.restitution_mixing != "max" or world.settings.friction_mixing != "geometric_mean":
         raise NotPlainError("other rules of mixing than the default ones")
-    own, others = moving.friction, fixed.friction
-    values = own[moving.shaped]
-    if np.isnan(values).any() and not (np.isnan(values).all() and np.isnan(others).all()):
+    theirs = np.concatenate([rows.friction[rows.shaped] for rows in others])
+    if np.isnan(values).any() and not (np.isnan(values).all() and np.isnan(theirs).all()):
         raise NotPlainError("friction that is the partner's")
     partner = float(np.nanmax(values)) if np.isfinite(values).any() else 0.0
-    if len(np.unique(values[~np.isnan(values)])) > 1 and np.isnan(others[fixed.shaped]).any():
+    if len(np.unique(values[~np.isnan(values)])) > 1 and np.isnan(theirs).any():
         raise NotPlainError("friction that is the partner's")
-    own, others = np.where(np.isnan(own), 0.0, own), np.where(np.isnan(others), partner, others)
-    return largest**0.5, np.sqrt(own), np.sqrt(others)
+    own = np.sqrt(np.where(np.isnan(moving.friction), 0.0, moving.friction))
+    return largest**0.5, own, *(np.sqrt(np.where(np.isnan(rows.friction), partner, rows.friction)) for rows in others)

@@ -136,6 +136,29 @@ def dynamic_by_id(world: World) -> tuple[Floats, Floats, Floats]:
     return dynamic.position[order], dynamic.linear_velocity[order], dynamic.mass[order]
 
 
+def inertia_by_id(world: World) -> Floats:
+    """Moments of inertia (n,) of the dynamic bodies of a plane, likewise; infinite for what does not spin."""
+    dynamic = world.bodies.dynamic
+    inertia = np.full(len(dynamic), np.inf)
+    for k in np.flatnonzero(dynamic.has(Spin)).tolist():
+        inertia[k] = world.component_for_entity(int(dynamic.entity[k]), Spin).moments
+    return inertia[np.argsort(dynamic.entity, kind="stable")]
+
+
+def turns_by_id(world: World) -> tuple[Floats, Floats]:
+    """In a plane, the angles and angular velocities (m,) of the dynamic bodies by id, then of the kinematic ones."""
+    bodies, order = world.bodies, moving_rows(world)
+    spins = bodies.spin.angular_velocity if bodies.has(Spin).any() else np.zeros(len(bodies))
+    return np.array(bodies.rotation)[order], np.array(spins)[order]
+
+
+def moving_rows(world: World) -> NDArray[np.int64]:
+    """Of the dynamic bodies, ascending by entity id, then of the kinematic ones, likewise."""
+    dynamic, kinematic = world.bodies.dynamic, world.bodies.kinematic
+    some = [bodies.rows.start + np.argsort(bodies.entity, kind="stable") for bodies in (dynamic, kinematic)]
+    return np.concatenate(some)
+
+
 def sensor_entities(world: World) -> NDArray[np.int64]:
     """The ids of entities with a sensor collider."""
     bodies = world.bodies
@@ -151,11 +174,12 @@ def overlaps_of(world: World) -> tuple[NDArray[np.int64], NDArray[np.int64], Flo
     """The pairs of solid shapes that overlap where they are now: the entities of both, (k,) each, and how deep, in
     sizes of the smaller one.
 
-    Pairs that layers keep apart are included; pairs of two static bodies are not.
+    Pairs that layers keep apart are included; pairs of two immovable bodies are not.
     """
     shapes = shapes_of(world)
     solid = shapes.where(~shapes.sensor & np.isfinite(shapes.centre).all(axis=1))
-    moving = np.flatnonzero(~solid.static)
+    movable = np.isin(solid.entity, world.bodies.dynamic.entity)
+    moving = np.flatnonzero(movable)
     hits = world.query_aabbs(solid.lower[moving], solid.upper[moving])
     asked, order = np.repeat(moving, np.diff(hits.offsets)), np.argsort(solid.entity, kind="stable")
     ids, places = solid.entity[order], np.searchsorted(solid.entity[order], hits.entities)
@@ -166,7 +190,7 @@ def overlaps_of(world: World) -> tuple[NDArray[np.int64], NDArray[np.int64], Flo
         there &= place < len(ids)
         rows.append((asked[there], order[place[there]]))
     a, b = (np.concatenate(some) for some in zip(*rows, strict=True))
-    once = (solid.entity[a] != solid.entity[b]) & (solid.static[b] | (a < b))
+    once = (solid.entity[a] != solid.entity[b]) & (~movable[b] | (a < b))
     a, b = a[once], b[once]
     depth = _depths(solid.where(a), solid.where(b))
     return solid.entity[a][depth > 0], solid.entity[b][depth > 0], depth[depth > 0]

@@ -1,7 +1,7 @@
 """A pyramid of unit boxes: each row has one box less than the row below and is offset by half a box.
 
 Restitution 0, mass 1, gravity 9.81. It must stand, with friction 0.6 and without. A spacing
-of 1.1 leaves gaps between the boxes of a row.
+of 1.1 leaves gaps between the boxes of a row. With ``spins`` the boxes can turn.
 """
 
 from __future__ import annotations
@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...components import AABBCollider, RigidBody, Transform
+from ...components.spin import Spin
 from ...framework import Settings, World
 from ...plugins import Physics
+from ...plugins.rotation import BoxCollider, Rotation
 from ..protocol import Scene
 from ..sizes import real, whole
 from ..walls import block
@@ -36,10 +38,12 @@ def build(
     rows: int = ROWS,
     friction: float = FRICTION,
     spacing: float = 1.0,
+    spins: bool = False,
 ) -> World:
     """``rows`` rows, ``spacing`` >= 1 metre from centre to centre in a row; ``seed`` changes nothing."""
     rows, friction, spacing = whole(rows, "rows"), real(friction, "friction"), real(spacing, "spacing", 1.0)
-    world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings or Settings.balanced())
+    plugins = [Physics(dimensions=2, gravity=(0.0, -GRAVITY)), *[Rotation()] * spins]
+    world = World(*plugins, settings=settings or Settings.balanced())
     reach = max(GROUND / 2, rows * spacing)
     block(world, (-reach, -1.0), (reach, 0.0), friction=friction)
     positions = initial_positions(rows, spacing)
@@ -47,7 +51,8 @@ def build(
         len(positions),
         Transform.many(positions),
         RigidBody.many(mass=1.0),
-        AABBCollider.many(half_extents=(0.5, 0.5), friction=friction),
+        (BoxCollider if spins else AABBCollider).many(half_extents=(0.5, 0.5), friction=friction),
+        *[Spin.many(0.0)] * spins,
     )
     return world
 

@@ -117,6 +117,12 @@ def test_steps_in_which_kernels_came_do_not_count(monkeypatch):
         bench([subject], (10,), repeats=1)
 
 
+def test_a_quick_comparison_leaves_out_what_turns_slowly_unless_it_is_named():
+    left_out = {subject.name for subject in subjects()} - {subject.name for subject in subjects(quick=True)}
+    assert left_out == {"pyramid, turning", "tumbler", "rubble"}
+    assert {subject.scene for subject in subjects(["rubble"], quick=True)} == {"rubble"}
+
+
 def test_progress_ends_where_it_said():
     class Recorder(Progress):
         total = 0.0

@@ -16,7 +16,10 @@ from carom.lab.bench.suite import SUITE
 from carom.lab.engines import pymunk_space as peer_pymunk
 from carom.lab.engines.pymunk_space import NotPlainError, PymunkSpace, moving_and_fixed
 from carom.lab.measure.body_shapes import overlaps_of
-from carom.plugins import Physics
+from carom.plugins import Physics, capsule, convex_polygon
+from carom.plugins.capsule import CapsuleCollider
+from carom.plugins.convex_polygon import ConvexPolygonCollider
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
 from carom.scenes.walls import enclose
 
 
@@ -28,17 +31,23 @@ def plane(gravity=(0.0, 0.0)) -> World:
 
 
 def test_every_subject_translates():
-    """Number, positions, velocities and kinetic energy of the bodies are those of the scene, in both engines."""
+    """Number, positions, velocities, turns, moments and kinetic energy of the bodies are those of the scene, in both
+    engines; what has no Spin does not turn."""
     for subject in SUITE:
         size = 5 if subject.size_option == "rows" else 40
         world = scenes.get(subject.scene).build(None, 3, **subject.build_options(size))  # type: ignore[call-arg]
         own, peer = CaromWorld(world), PymunkSpace(world)
-        for ours, theirs in zip(own.state(), peer.state(), strict=True):
+        for ours, theirs in zip((*own.state(), *own.turns()), (*peer.state(), *peer.turns()), strict=True):
             np.testing.assert_array_equal(ours, theirs)
         mass = np.array([body.mass for body in peer.bodies])
         assert 0.5 * mass @ (peer.state()[1] ** 2).sum(axis=1) == pytest.approx(world.kinetic_energy())
         assert len(peer.space.shapes) == sum(int(part.shaped.sum()) for part in moving_and_fixed(world))
-        assert all(math.isinf(body.moment) for body in peer.bodies)
+        moments = {
+            entity: world.component_for_entity(entity, Spin).moments if spins else math.inf
+            for entity, spins in zip(world.bodies.entity.tolist(), world.bodies.has(Spin), strict=True)
+        }
+        bodies = np.sort(world.bodies.dynamic.entity).tolist()
+        assert [body.moment for body in peer.bodies] == [moments[entity] for entity in bodies]
         own.world.close()
 
 
@@ -63,6 +72,29 @@ def test_a_disc_and_a_box_fall_and_bounce_alike(index):
     assert np.all(lowest < [0.75, 0.5])
     np.testing.assert_allclose(peer.state()[0], [(0, 3.5), (4, 3.25)], atol=0.3)
     own.world.close()
+
+
+def test_what_turns_turns_alike():
+    """A box turned by .3 and one of each other kind fall into a corner of a drum that turns for a second, which holds
+    them: pymunk's bodies have the mass, the shapes and the angles of carom's."""
+    plugins = Physics(dimensions=2, gravity=(0.0, -9.81)), Rotation(), capsule.plugin, convex_polygon.plugin
+    world = World(*plugins)
+    for x, y in ((1, 0), (0, -1)):
+        half = (0.5, 4) if x else (4, 0.5)
+        wall = BoxCollider(half, offset=(4 * x, 4 * y), friction=0.5)
+        world.create_entity(Transform((0, 0)), RigidBody(kind="kinematic"), Spin(-0.5), wall)
+    shapes = BoxCollider((0.5, 0.25)), CapsuleCollider(0.25, 0.5), ConvexPolygonCollider.regular(5, 0.5), None
+    for k, shape in enumerate(shapes):
+        shape = shape or SphereCollider(0.5)
+        shape.friction = 0.5
+        world.create_entity(Transform((1.2 * k - 2, -2.5), rotation=0.3), RigidBody(), Spin(), shape)
+    own, peer = CaromWorld(world), PymunkSpace(world)
+    own.step(60)
+    peer.step(60)
+    np.testing.assert_allclose(own.state()[0], peer.state()[0], atol=0.25)
+    np.testing.assert_allclose(own.turns()[0], peer.turns()[0], atol=0.3)
+    np.testing.assert_allclose(own.turns()[0][-2:], -0.5, rtol=0, atol=1e-9)
+    world.close()
 
 
 def test_friction_means_the_same_in_both_engines():
@@ -171,12 +203,29 @@ def test_quality_counts_what_left_and_how_far_it_went():
     seen = Quality(world)
     after = np.array([(1.5, 0.75), (50.0, 5.0), (math.nan, 0.0)])
     seen.begin()
-    seen.sample(np.array([(1.5, 0.25), (5, 5), (8, 8)]))  # 0.25 in the floor: a quarter of a diameter
-    seen.sample(after)
-    figures = seen.figures(after, np.array([(3.0, 0.0), (0.0, 0.0), (0.0, 0.0)]))
+    seen.sample(np.array([(1.5, 1), (5, 5), (8, 8)]), np.zeros(3))
+    seen.sample(np.array([(1.5, 0.25), (5, 5), (8, 8)]), np.zeros(3))  # 0.25 in the floor: a quarter of a diameter
+    seen.sample(after, np.zeros(3))
+    figures = seen.figures(after, np.array([(3.0, 0.0), (0.0, 0.0), (0.0, 0.0)]), np.zeros(3))
     assert figures["escaped"] == 2
     assert figures["kinetic_end"] == pytest.approx(9.0)
     assert figures["overlap_max"] == pytest.approx(0.25)
-    assert figures["overlap_mean"] == pytest.approx(0.125)
-    assert (figures["drift"], figures["sink"]) == (45.0, 0.25)
+    assert figures["overlap_mean"] == pytest.approx(0.25 / 3)
+    assert (figures["drift"], figures["sink"], figures["creep"]) == (45.0, 0.25, 45.0)
+    world.close()
+
+
+def test_quality_sees_how_bodies_are_turned_and_that_they_spin():
+    """Two boxes of side 2 side by side, .1 apart; one turns by 45 degrees, with its corner then in the other."""
+    world = World(Physics(dimensions=2), Rotation())
+    for x in (0.0, 2.1):
+        world.create_entity(Transform((x, 0)), RigidBody(mass=3.0), Spin(), BoxCollider((1, 1)))
+    seen = Quality(world)
+    places = np.array([(0.0, 0.0), (2.1, 0.0)])
+    seen.sample(places, np.zeros(2))
+    assert seen.overlap_most == 0.0
+    seen.sample(places, np.array([0.0, math.pi / 4]))
+    figures = seen.figures(places, np.zeros((2, 2)), np.array([0.0, 2.0]))
+    assert figures["overlap_max"] == pytest.approx((math.sqrt(2) - 1.1) / 2)
+    assert figures["kinetic_end"] == pytest.approx(0.5 * (3.0 * 4 / 6) * 2.0**2)  # m side^2 / 6
     world.close()
