@@ -93,8 +93,8 @@ def _plain(world: World, bodies: Any) -> Bodies:
     spin, moment = _spins(world, bodies, moves)
     order = np.argsort(bodies.entity, kind="stable")
     position, velocity, mass = np.array(bodies.position), np.array(bodies.linear_velocity), np.array(bodies.mass)
-    columns: tuple[Any, ...] = position, velocity, angle, spin, mass, moment, shaped, rounding, restitution, friction
-    return Bodies([corners[k] for k in order], *(column[order] for column in columns))
+    kept: tuple[Any, ...] = position, velocity, angle, spin, mass, moment, shaped, rounding, restitution, friction
+    return Bodies([corners[k] for k in order], *(column[order] for column in kept))
 
 
 def _spins(world: World, bodies: Any, moves: np.ndarray) -> tuple[Floats, Floats]:
