@@ -15,8 +15,8 @@ from .bounds_exit import update_bounds_exit_time
 from .find import queue_next_impact
 from .heap import heap_pop
 from .impulses import CROSS, SLIDE, STOPPED, TOUCHDOWN, bounce, slide, stop
-from .turning import mill_speed
 from .together import EQUAL, holds, put_back
+from .turning import mill_speed
 from .worklist import lacks_room, list_contacts, list_landings, list_neighbours, list_pair, list_pairs_of
 
 BLOCK = 256  # bodies that are looked at before one that bounces is enough

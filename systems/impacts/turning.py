@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from ...framework.compilation import inlined, part
+from ...framework.compilation import part
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, scale, sub
 from ..integration.trajectory import along, path_of
 from ..integration.turning import arms_to, change_of_spin, compliance, cross_spin, lever, twist, velocity_by_spin
@@ -115,8 +115,8 @@ def mill_speed(state, event):
     impacts, bodies, arms = state.impacts, state.bodies, arms_of(state, event)
     c = impacts.event_pair[event]
     a, b = state.pairs.a[c], state.pairs.b[c]
-    moving = cross_spin(bodies.spin[b], arms[1]) if bodies.inverse_mass[a] > 0.0 else cross_spin(bodies.spin[a], arms[0])
-    return dot(moving, impacts.event_normal[event])
+    q, arm = (b, arms[1]) if bodies.inverse_mass[a] > 0.0 else (a, arms[0])
+    return dot(cross_spin(bodies.spin[q], arm), impacts.event_normal[event])
 
 
 @part

@@ -25,6 +25,7 @@ from ..constants import (
     MOST_SAG,
     MOST_SUBSTEPS,
     OWN_SAG,
+    SAG,
     STRIKE,
     STRUCK,
     SUBSTEP_WORK,
@@ -137,7 +138,7 @@ def choose_substeps(solver, t, usual, dt):
     most substeps cannot bear counts as lighter, see ``bears``. From masses, not from impulses, which would change with
     the substeps; by factors of two, so that it seldom changes.
     """
-    sag = solver.sag * solver.most_change[t] * dt
+    sag = SAG * solver.most_change[t] * dt
     own = sag * solver.own[t] / OWN_SAG
     need = sag * solver.stiff[t] / (solver.lightest[t] * MOST_SAG)
     hard = own > float(usual * usual)
