@@ -21,6 +21,7 @@ from ...systems.shapes.dispatch import second_moments
 from .free_rotation import diagonalised, product, rotate, turn_freely
 
 TRIPLE = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))  # of the step: the outer two of Yoshida's three
+PARALLEL = 1e-9  # square of the sine between spin and angular momentum: less is none
 SLOW = 1e-4  # rad in a step: what turns slower may fall asleep, if it is dynamic
 NOT_FINITE = (
     f"Spin.angular_velocity must be finite, at most {FASTEST_TURN:g} rad/s: it, a torque or the damping is none"
@@ -140,8 +141,8 @@ def set_rotation(state, i, q):
 
 
 @part
-def turn_in_space(state, spin, i, h):
-    """The rotation and the angular velocity of a dynamic body after a step."""
+def principal_moments(state, spin, i):
+    """(principal moments of inertia, 1 / these, unit quaternion from these axes to the body's own)."""
     xx, yy, zz, xy, xz, yz = inertia_of(state, spin, i)
     principal, own = (xx, yy, zz), (1.0, 0.0, 0.0, 0.0)
     if xy != 0.0 or xz != 0.0 or yz != 0.0:
@@ -151,6 +152,13 @@ def turn_in_space(state, spin, i, h):
         1.0 / principal[1] if principal[1] > 0.0 else 0.0,
         1.0 / principal[2] if principal[2] > 0.0 else 0.0,
     )
+    return principal, inverse, own
+
+
+@part
+def turn_in_space(state, spin, i, h):
+    """The rotation and the angular velocity of a dynamic body after a step."""
+    principal, inverse, own = principal_moments(state, spin, i)
     w, speed = (
         (spin.angular_velocity[i, 0], spin.angular_velocity[i, 1], spin.angular_velocity[i, 2]),
         spin.angular_velocity,
@@ -330,6 +338,34 @@ def find_round(state, dt, spin, sphere):
             bodies.rolling_radius[i] = sphere.radius[i]
 
 
+@part
+def turn_on_in_space(state, spin, i, angle, dt):
+    """Impacts have changed the spin of a body, which is to turn by ``angle`` beyond where the step has turned it: as
+    near to that as turning freely and about the angular momentum lead, which keep energy and momentum."""
+    principal, inverse, own = principal_moments(state, spin, i)
+    w = spin.angular_velocity[i, 0], spin.angular_velocity[i, 1], spin.angular_velocity[i, 2]
+    d, square = (item(angle, 0), item(angle, 1), item(angle, len(angle) - 1)), product_of(w, w)
+    if square == 0.0 or principal[0] == principal[1] == principal[2]:
+        turn_about(state, i, angle)
+        return
+    q = product(rotation_in_space(state, i), own)
+    along = rotate(q, w, True)
+    m = along[0] * principal[0], along[1] * principal[1], along[2] * principal[2]
+    momentum = rotate(q, m, False)
+    both, size = product_of(w, momentum), product_of(momentum, momentum)
+    free, about, apart = product_of(d, w) / square, 0.0, square * size - both * both
+    if apart > PARALLEL * square * size:
+        free = (product_of(d, w) * size - product_of(d, momentum) * both) / apart
+        about = (product_of(d, momentum) * square - product_of(d, w) * both) / apart
+    q, m = turn_freely(q, m, inverse, min(max(free, -dt), dt))
+    set_rotation(state, i, product(q, (own[0], -own[1], -own[2], -own[3])))
+    axis = replace(replace(replace(angle, 0, momentum[0]), 1, momentum[1]), len(angle) - 1, momentum[2])
+    turn_about(state, i, scale(axis, about))
+    q = product(rotation_in_space(state, i), own)
+    w = rotate(q, (m[0] * inverse[0], m[1] * inverse[1], m[2] * inverse[2]), False)
+    spin.angular_velocity[i, 0], spin.angular_velocity[i, 1], spin.angular_velocity[i, 2] = w[0], w[1], w[2]
+
+
 @spinning.stage(
     after="resolve_static_penetration",
     records=(Spin,),
@@ -349,9 +385,13 @@ def take_spins(state, dt, spin):
             changed |= new != old or item(bodies.turn[i], k) != old * dt
             further = replace(further, k, item(bodies.turn[i], k) - old * dt)
             spin.angular_velocity[i, k] = new
-        if changed:
+        if not changed:
+            continue
+        if parts == 1 or (state.solver.contacts > 0 and bodies.held[i]):
             turn_about(state, i, further)
-            write_axes(state, i)
+        else:
+            turn_on_in_space(state, spin, i, further, dt)
+        write_axes(state, i)
 
 
 @spinning.stage(

@@ -11,6 +11,7 @@ from ..ccd.search_bounds import GIVE, find_margins, place_at
 from ..codes import OK
 from ..linking.parts import BOUND_SEARCHES, call_bound_searches
 from ..shapes.dispatch import half_extents, write_rotated
+from ..shapes.tolerances import reach_of
 from .records import HIGHEST, LARGEST, LOWEST
 from .uniform_grid import move_in_grid
 
@@ -80,8 +81,6 @@ def box_level(state, level, i, before, after):
     """The box of one level of a body that moves from ``before`` to ``after``; of nan if it has no shape."""
     at, half = state.bodies.level_offsets[level, i], state.bodies.half_extents[i]
     margin = MARGIN * smallest_of(half)
-    if state.spinning and state.bodies.rolling_radius[i] == 0.0:  # its corners reach farther within the step
-        margin += min(1.0, length(state.bodies.turn[i])) * (length(half) + length(at))
     first, last, low, high = add(before, at), add(after, at), at, at
     for k in range(len(at)):
         low = replace(low, k, min(item(first, k), item(last, k)) - item(half, k) - margin)
@@ -130,6 +129,19 @@ def follow_static_places(state):
         state.statics_version += 1
 
 
+@part
+def hold_turns(state, start, stop):
+    """Boxes hold what bodies sweep by turning: they are those of shapes as they are turned where the step ends."""
+    bodies = state.bodies
+    for i in range(start, stop):
+        if length(bodies.turn[i]) > 0.0 and bodies.rolling_radius[i] == 0.0:
+            way = min(length(bodies.turn[i]), 2.0) * reach_of(bodies, i)
+            lower, upper = bodies.lower[i], bodies.upper[i]
+            for k in range(len(lower)):
+                lower, upper = replace(lower, k, item(lower, k) - way), replace(upper, k, item(upper, k) + way)
+            bodies.lower[i], bodies.upper[i] = lower, upper
+
+
 # Where the motion of a box begins and ends. STAYING: where the body is, and the box may be one of the uniform grid.
 STANDING, MOVING, SEARCHING, STAYING = range(4)
 
@@ -157,6 +169,8 @@ def box_rows(state, start, stop, motion):
         for i in range(start, stop):
             low, high = box_level(state, level, i, starts[i], ends[i])
             add_level(state, i, low, high)
+    if state.spinning and motion in (MOVING, SEARCHING):
+        hold_turns(state, start, stop)
     if motion == STANDING:
         state.thinnest_static = min(state.thinnest_static, thinnest)
     elif motion != STAYING:
