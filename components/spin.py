@@ -36,11 +36,14 @@ class Spin(Component):
         rate c in 1/s: the angular velocity decays as exp(-c t)
     max_angular_speed
         rad/s, or None
+    rolling_friction
+        m, 0 or more: contacts resist rolling, and spinning about their normal, with a torque of up to this length times
+        the force between the two; the larger of both bodies counts
     constant_torque
         N m, acts always; in 3D (3,), along the world's axes
 
-    Kinematic bodies turn with their angular velocity; dynamic ones under torques, in 3D also as their inertia makes
-    them (Euler's equations). Contacts turn only those with a SphereCollider without offset, by friction.
+    Kinematic bodies turn with their angular velocity; dynamic ones under torques and by their contacts, in 3D also as
+    their inertia makes them (Euler's equations).
     """
 
     __slots__ = ()
@@ -59,6 +62,7 @@ class Spin(Component):
     max_angular_speed: float | None = special_column(
         default=None, optional=True, minimum=0.0, kw_only=True, also=("max_speed",)
     )
+    rolling_friction: float = special_column(default=0.0, minimum=0.0, kw_only=True)
     constant_torque: Angular = special_column(default=0.0, item="angular", kw_only=True, also=("torque",))
     # Not for the constructor, as in RigidBody.
     applied_torque: Angular = special_column(default=0.0, item="angular", init=False)

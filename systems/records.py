@@ -120,6 +120,7 @@ SPINS = Section(
     inverse_inertia=vectors(),  # 1 / (kg m^2): in 2D the first component; in 3D xx, yy, zz along the world's axes,
     inverse_products=vectors(),  # and xy, xz, yz; 0: contacts do not turn it
     rolling_radius=floats(default=0.0),  # m: of a round body; 0: its surface moves as its centre
+    rolling_friction=floats(),  # m
     turn=vectors(),  # rad, in the step
 )  # fmt: skip
 FAILS = "the start of the step, for one that fails"

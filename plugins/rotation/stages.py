@@ -301,8 +301,10 @@ def product_of(u, v):
     after="check_flight", records=(Spin,),
     reads=(
         "mass", "inverse_mass", "shapes", "levels", "offset", "rotation", "spin.inertia", "spin.angular_velocity",
+        "spin.rolling_friction",
     ),
-    writes=("spin", "inverse_inertia", "inverse_products", "rolling_radius", "turn"), needed="colliders",
+    writes=("spin", "inverse_inertia", "inverse_products", "rolling_radius", "rolling_friction", "turn"),
+    needed="colliders",
 )  # fmt: skip
 def share_spins(state, dt, spin):
     """how fast bodies spin, and how contacts turn them"""
@@ -314,6 +316,7 @@ def share_spins(state, dt, spin):
             w = spin_of(state, spin, i)
         bodies.spin[i], bodies.turn[i] = w, scale(w, dt)
         bodies.inverse_inertia[i], bodies.inverse_products[i], bodies.rolling_radius[i] = zero, zero, 0.0
+        bodies.rolling_friction[i] = spin.rolling_friction[i] if spin.present[i] else 0.0
         if moves and i < state.dynamic and bodies.inverse_mass[i] > 0.0:
             write_inverse_inertia(state, spin, i)
 

@@ -63,7 +63,7 @@ def first_touch(state, a, b, path, straight, since, until, limits):
     limits: (slop; stride, seconds between looks at concave shapes; approach speed below which these have no touch).
     """
     shape_a, shape_b = state.bodies.shape[a], state.bodies.shape[b]
-    if is_turning(state, until, a, b):
+    if state.spinning and is_turning(state, until, a, b):
         found, (t, normal, point, at) = touch_of_turning(state, a, b, path, since, until, limits)
         return (TOUCHES if found else APART), t, normal, point, at
     if not both_convex(state, shape_a, shape_b):

@@ -29,7 +29,7 @@ def turns_far(state, a, b):
     """Whether a pair has to be looked at on its way: one of the two turns by more than a part of the smaller one. Where
     they may bounce, only if it turns by itself: impacts have the others."""
     bodies, slot, restitution = state.bodies, state.bodies.collider_slot, state.colliders.restitution
-    if not state.spinning or len(bodies.axes) == 0:
+    if len(bodies.axes) == 0:
         return False
     way_a, way_b = angle_of(bodies, a) * reach_of(bodies, a), angle_of(bodies, b) * reach_of(bodies, b)
     far = FAST * smaller_extent(bodies, a, b)

@@ -53,9 +53,12 @@ def lay_arms(state, dt, r, gap):
         margin = turning_margin(state, dt, a, b)
         count = contact_points(state, (a, b), d, (-gap, normal, point), (margin, tilt), places, gaps)
     round_a, round_b = rounding_of(state, a), rounding_of(state, b)
+    rolling = max(bodies.rolling_friction[a], bodies.rolling_friction[b])
+    solver.has_rolling |= rolling > 0.0
     for e in range(rows):
         k = solver.slot[r + e]
         at, between = row(places, min(e, count - 1), nothing), gaps[min(e, count - 1)]
+        solver.rolling[k], solver.rolled[k] = rolling, nothing
         solver.place[k], solver.gap[k] = at, between if e < count else UNREACHED * extent
         solver.arm_a[k] = add(bodies.offset[a], add_scaled(at, normal, -0.5 * between))
         solver.arm_b[k] = add(bodies.offset[b], add_scaled(sub(at, d), normal, 0.5 * between))

@@ -69,7 +69,7 @@ def deepest(state, dt, c, d):
     way there; else by its manifold or its function."""
     pairs, bodies = state.pairs, state.bodies
     a, b = pairs.a[c], pairs.b[c]
-    if turns_far(state, a, b):
+    if state.spinning and turns_far(state, a, b):
         touches, _, _, normal, _ = first_touch_of_turn(state, a, b)
         return 2.0 * slop_of(state, a, b) if touches else -math.inf, normal, touches
     far, gap, normal = touch_of_long_way(state, dt, a, b, d)
@@ -125,7 +125,7 @@ def is_resting(state, dt, c):
     if not pairs.near_contact[c] and not hit and not carried:
         return False
     margin, d = turning_margin(state, dt, a, b), centre_offset(bodies, a, b)
-    turns = turns_far(state, a, b)
+    turns = state.spinning and turns_far(state, a, b)
     if turns and state.impacts.sweeps and pairs.impulse[c] > 0.0:  # that was its touch
         return False
     if pairs.early[c] and not hit and not turns and is_at_manifold(pairs, c, d, smaller_extent(bodies, a, b)):  # usual
@@ -241,6 +241,7 @@ def linearise(state, dt):
         solver.friction[k] = mu
         has_friction |= mu != 0.0
     solver.has_friction = has_friction
+    solver.has_rolling = False
     for r in range(solver.contacts if state.spinning else 0):
         if solver.point[r] == 0:
             lay_arms(state, dt, r, solver.gap[solver.slot[r]])

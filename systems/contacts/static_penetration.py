@@ -35,7 +35,7 @@ def how_deep(state, c, a, b):
     travel = sub(d, start)
     way, allowed = length(travel), ALLOWED * extent
     found, depth, normal = False, 0.0, travel
-    if turns_far(state, a, b):  # where it started says nothing of the shapes at the end
+    if state.spinning and turns_far(state, a, b):  # where it started says nothing of the shapes at the end
         _, depth, normal, _ = evaluate_pair(state, a, b, d)
         return depth - allowed, normal
     if way > FAST * extent:

@@ -74,7 +74,9 @@ def find_touch(state, c, a, b, path, since, restitution, dt):
     a time on. What is not swept, or touches at a corner, has none unless it overlaps where the step ends."""
     impacts, bodies, zero = state.impacts, state.bodies, zero_of(state)
     swept, overlaps, end_normal, nothing = False, False, zero, (dt, zero, zero, zero)
-    limits = slop_of(state, a, b), dt, bounce_threshold(state, a, b) if is_turning(state, dt, a, b) else -math.inf
+    limits = slop_of(state, a, b), dt, -math.inf
+    if state.spinning and is_turning(state, dt, a, b):
+        limits = slop_of(state, a, b), dt, bounce_threshold(state, a, b)
     if impacts.sweeps:
         since = max(since, bodies.last_impact[a], bodies.last_impact[b])
         passive, travel = not state.pairs.is_solid[c], travel_of(path, dt) + turning_travel(state, dt, a, b)
@@ -85,7 +87,7 @@ def find_touch(state, c, a, b, path, since, restitution, dt):
             stride = FAST * smaller_extent(bodies, a, b) / travel * dt if travel > 0.0 else dt
             limits = rest_edge(state, a, b, dt), stride, bounce_threshold(state, a, b)
     if not swept:
-        if turns_far(state, a, b):  # contacts at rest know what a mill meets on its way
+        if state.spinning and turns_far(state, a, b):  # contacts at rest know what a mill meets on its way
             return NO_TOUCH, nothing
         if restitution > 0.0:
             overlaps, end_normal = overlap_at_end(state, a, b, path, dt)
@@ -261,7 +263,7 @@ def queue_next_impact(state, c, since, dt):
     pairs, bodies, impacts = state.pairs, state.bodies, state.impacts
     a, b, passive = pairs.a[c], pairs.b[c], not pairs.is_solid[c]
     path = relative_path(state, a, b)
-    turns = is_turning(state, dt, a, b)
+    turns = state.spinning and is_turning(state, dt, a, b)
     if impacts.sweeps and not turns and bounds_stay_disjoint(state, a, b, path, since, dt):
         return
     slot, restitutions = bodies.collider_slot, state.colliders.restitution

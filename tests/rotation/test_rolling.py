@@ -42,6 +42,29 @@ def motion(world, entity):
     return v, np.array((0, 0, w) if np.ndim(w) == 0 else w)
 
 
+@pytest.mark.plain
+@pytest.mark.parametrize("d", [2, 3])
+def test_rolling_friction_stops_a_ball_and_holds_it_on_a_slope(d):
+    """On level ground it slows by (b / r) g / (1 + I / m r^2); it stays where tan a < b / r, 1 % to either side."""
+    r, b, rest = 0.5, 0.02, (0,) * (d - 2)
+    with plane(d) as world:
+        entity = ball(world, (0, r, *rest), (2.0, 0, *rest), spin=-2.0 / r, r=r)
+        world.component_for_entity(entity, Spin).rolling_friction = b
+        for _ in range(60):
+            world.step()
+        v, w = motion(world, entity)
+        assert v[0] == pytest.approx(2.0 - b / r * G / (1 + SHARE[d]), rel=1e-3)
+        assert w[2] == pytest.approx(-v[0] / r, rel=1e-3)
+    for times in (0.99, 1.01):
+        with plane(d, math.atan(times * b / r)) as world:
+            entity = ball(world, (0, r, *rest), r=r)
+            world.component_for_entity(entity, Spin).rolling_friction = b
+            for _ in range(120):
+                world.step()
+            v, _ = motion(world, entity)
+            assert v[0] < 1e-3 if times < 1 else v[0] > 4e-3  # m/s: of the first steps
+
+
 # -- on a slope -----------------------------------------------------------------------------------
 
 

@@ -36,6 +36,7 @@ SOLVER = Schema(
     any_hard=flag(),
     has_friction=flag(),
     tips=flag(),  # some pair has several points
+    has_rolling=flag(),
     # where bodies spin:
     place=vectors(),  # of the point, from the centre of the first shape
     arm_a=vectors(),  # from the centres of mass to the surfaces there,
@@ -43,6 +44,8 @@ SOLVER = Schema(
     core_a=vectors(),  # and to what of the shapes turns: a rounding stays along the normal
     core_b=vectors(),
     tangent_mass=floats(),  # kg, that an impulse along the surface moves
+    rolling=floats(),  # m, of rolling friction
+    rolled=vectors(),  # N m s in a substep, by that
     visits=integer(),  # rows solved in this step
     starts=ints(),  # where each colour begins
     # bodies, in the order of their ranges
@@ -112,7 +115,7 @@ SOLVER = Schema(
     restrained_row=integer(),
 )
 
-ARMS = ("place", "arm_a", "arm_b", "core_a", "core_b", "tangent_mass")
+ARMS = ("place", "arm_a", "arm_b", "core_a", "core_b", "tangent_mass", "rolling", "rolled")
 TURNS = ("spin", "spin_before", "turn", "inverse_inertia", "inverse_products", "reach")
 
 # Impulses of the contacts at rest, for the next step: [now, i] is the memory, [1 - now, i] is written.

@@ -154,6 +154,34 @@ def solve_friction(solver, span):
             solve_friction_of(solver, k, arms)
 
 
+@inlined
+def most_turned(solver, q):
+    """An inverse inertia no less than that of body q about any axis; the same in a plane and of what is round."""
+    d, p = solver.inverse_inertia[q], solver.inverse_products[q]
+    if len(d) == 2:
+        return item(d, 0)
+    xy, xz, yz = abs(item(p, 0)), abs(item(p, 1)), abs(item(p, len(p) - 1))
+    return max(item(d, 0) + xy + xz, item(d, 1) + xy + yz, item(d, len(d) - 1) + xz + yz)
+
+
+@part
+def solve_rolling(solver, span):
+    """Stop what rolls on each other, with a torque of at most ``rolling`` times the normal impulse, from one substep
+    alone."""
+    for k in range(span[0], span[1]):
+        limit, old = solver.rolling[k] * solver.impulse[k], solver.rolled[k]
+        if limit > 0.0 or dot(old, old) > 0.0:
+            a, b = solver.first[k], solver.second[k]
+            light = most_turned(solver, a) + most_turned(solver, b)
+            turn = add_scaled(old, sub(solver.spin[b], solver.spin[a]), -1.0 / light) if light > 0.0 else old
+            strength = math.sqrt(dot(turn, turn))
+            if strength > limit:
+                turn = scale(turn, limit / strength)
+            solver.rolled[k] = turn
+            solver.spin[a] = sub(solver.spin[a], change_of_spin(solver, a, sub(turn, old)))
+            solver.spin[b] = add(solver.spin[b], change_of_spin(solver, b, sub(turn, old)))
+
+
 @part
 def relax_listed(solver, count, arms):
     """One pass over the first rows of ``listed``, which may close as fast as what is open lets them."""

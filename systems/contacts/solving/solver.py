@@ -46,6 +46,7 @@ from .rows import (
     room_of,
     solve_friction,
     solve_normals,
+    solve_rolling,
     weigh_row,
 )  # fmt: skip
 
@@ -90,6 +91,8 @@ def apply_forces(solver, h, span):
 @part
 def apply_warm_start(solver, most, span):
     """The impulses of the last substep act again, no more than ``most`` of each: what is more was a blow."""
+    for k in range(span[0], span[1] if len(span[4]) > 0 and solver.has_rolling else span[0]):
+        solver.rolled[k] = scale(solver.normal[k], 0.0)
     for k in range(span[0], span[1]):
         old = solver.impulse[k]
         if old > 0.0:
@@ -198,6 +201,8 @@ def solve_pass(solver, bias, soft, pushes, span):
     solve_normals(solver, bias, soft, pushes, span)
     if solver.has_friction:
         solve_friction(solver, span)
+    if len(span[4]) > 0 and solver.has_rolling:
+        solve_rolling(solver, span)
     solver.visits += span[1] - span[0]
 
 
