@@ -15,6 +15,7 @@ from carom.plugins.convex_polygon import ConvexPolygonCollider
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 MODES = ("discrete", "continuous", "event_driven")
+PLAIN_MODES = (pytest.param("discrete", marks=pytest.mark.plain), "continuous", "event_driven")
 G = 9.81
 
 
@@ -52,8 +53,7 @@ def test_a_box_tips_where_its_centre_stands_over_its_edge(mode):
             assert (y, angle) == pytest.approx((0.25, -math.pi / 2), abs=2e-3)
 
 
-@pytest.mark.plain
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", PLAIN_MODES)
 def test_a_box_slides_where_friction_ends_and_does_not_turn(mode):
     """At tan a = mu, 1 % to either side; with g (sin a - mu cos a), but for the first steps, in which it settles
     and keeps some mm/s."""
@@ -159,7 +159,7 @@ def kinetic(world):
     return 0.5 * float((moving.mass * (moving.linear_velocity**2).sum(axis=1)).sum())
 
 
-@pytest.mark.parametrize("seconds", [10, pytest.param(60, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seconds", [10, pytest.param(60, marks=pytest.mark.long)])
 def test_a_pyramid_of_fifty_rows_stands_still(seconds):
     """1,275 boxes: from 5 s on none creeps by a millimetre, and none overlaps by .0125."""
     with ground(friction=0.6) as world:
@@ -201,8 +201,9 @@ def test_a_house_of_cards_stands(seed):
         assert kinetic(world) < 1e-5
 
 
-@pytest.mark.parametrize(("lightest", "seconds", "left"), [(1.0, 20, 1e-3), (0.1, 30, 0.1)])
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(
+    ("seed", "lightest", "seconds", "left"), [(0, 1.0, 20, 1e-3), (1, 1.0, 20, 1e-3), (0, 0.1, 30, 0.1)]
+)
 def test_mixed_shapes_between_walls_come_to_rest_and_nobody_leaves(seed, lightest, seconds, left):
     """200 boxes, balls, capsules and polygons, also of masses from 1 / 10 to 10 kg, which take longer."""
     random = np.random.default_rng(seed)
