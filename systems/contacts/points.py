@@ -70,8 +70,6 @@ def lay_arms(state, dt, r, gap):
         solver.core_b[k] = add_scaled(solver.arm_b[k], normal, round_b)
 
 
-
-
 @part
 def lay_first_touch(state, r):
     """The rows of a pair of which one body turns far, if it touches on the way: at one point, as they are turned then.

@@ -23,7 +23,7 @@ from ..constants import (
     SOLVED,
     SWEEPS,
 )  # fmt: skip
-from .rows import closing_speed, first_velocity, relax_listed, second_velocity
+from .rows import closing_speed, relax_listed, velocity_at
 
 
 @part
@@ -70,9 +70,9 @@ def weigh(solver, span, islands):
             push = scale(solver.normal[k], solver.impulse[k])
             if solver.has_friction:
                 push = add(push, solver.tangent[k])
-            work = -dot(push, first_velocity(solver, k, arms))
+            work = -dot(push, velocity_at(solver, a, solver.arm_a, k, arms))
             if island[a] >= 0:
-                work = dot(push, second_velocity(solver, k, arms))
+                work = dot(push, velocity_at(solver, b, solver.arm_b, k, arms))
             slope[island_of(solver, k)] += work
 
 

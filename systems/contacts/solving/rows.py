@@ -65,29 +65,19 @@ def weigh_row(solver, k, arms):
 
 
 @inlined
-def first_velocity(solver, k, arms):
-    """The velocity of the first body of row k at its point."""
-    q = solver.first[k]
+def velocity_at(solver, q, arm, k, arms):
+    """The velocity of body q at the point of row k. arm: the column of arms to that body."""
     v = solver.velocity[q]
     if len(arms) > 0:
-        v = add(v, cross_spin(solver.spin[q], solver.arm_a[k]))
-    return v
-
-
-@inlined
-def second_velocity(solver, k, arms):
-    """The same of the second body."""
-    q = solver.second[k]
-    v = solver.velocity[q]
-    if len(arms) > 0:
-        v = add(v, cross_spin(solver.spin[q], solver.arm_b[k]))
+        v = add(v, cross_spin(solver.spin[q], arm[k]))
     return v
 
 
 @inlined
 def relative_velocity(solver, k, arms):
     """The velocity of the second body of row k at its point, as the first one sees it there."""
-    return sub(second_velocity(solver, k, arms), first_velocity(solver, k, arms))
+    first = velocity_at(solver, solver.first[k], solver.arm_a, k, arms)
+    return sub(velocity_at(solver, solver.second[k], solver.arm_b, k, arms), first)
 
 
 @inlined
