@@ -11,6 +11,7 @@ from .constants import FREQUENCY, SAG, TIPPING_FREQUENCY, TIPPING_SAG
 from .points import points_of
 from .solving.islands import order_rows
 from .solving.prediction import drop_support
+from .solving.rows import turn_body
 
 
 @part
@@ -60,10 +61,13 @@ def gather(state, dt):
         return NEED_SOLVER
     list_rows(state)
     order_rows(state, dt)
+    inverse_mass = bodies.inverse_mass
     for r in range(solver.contacts):
         c, k = solver.pair[r], solver.slot[r]
-        solver.first[k], solver.second[k] = bodies.place[pairs.a[c]], bodies.place[pairs.b[c]]
-    inverse_mass, nothing = bodies.inverse_mass, zero_of(state)
+        a, b = pairs.a[c], pairs.b[c]
+        solver.first[k], solver.second[k] = bodies.place[a], bodies.place[b]
+        solver.fixed[k] = solver.tips and (inverse_mass[a] == 0.0 or inverse_mass[b] == 0.0)
+    nothing = zero_of(state)
     solver.movers = 0
     for q in range(solver.bodies):
         i = solver.body_row[q]
@@ -87,7 +91,8 @@ def gather(state, dt):
         solver.velocity[q], solver.shift[q], solver.acceleration[q] = v, x, a
     for q in range(solver.bodies if state.spinning else 0):
         i = solver.body_row[q]
-        solver.spin[q], solver.turn[q] = bodies.spin[i], scale(bodies.turn[i], -1.0)  # to where the step starts
+        solver.spin[q] = bodies.spin[i]
+        turn_body(solver, q, scale(bodies.turn[i], -1.0))  # to where the step starts
         solver.reach[q] = length(bodies.half_extents[i]) + length(bodies.offset[i])
         solver.inverse_inertia[q] = bodies.inverse_inertia[i]
         solver.inverse_products[q] = bodies.inverse_products[i]

@@ -12,6 +12,7 @@ import math
 FREQUENCY = 0.25  # times the rate of the substeps; above .5 an explicit spring is unstable
 DAMPING_RATIO = 10.0  # at the usual number of substeps; overdamped, so that pushing out gives little speed
 TIPPING_FREQUENCY = 0.125  # where pairs have several points: with .25 piles of boxes that turn never rest
+STIFFER = 1.4  # times that frequency there, if one of the two cannot be moved: a pyramid lies on few such contacts
 SAG = 1.0 / (2.0 * math.pi * FREQUENCY) ** 2  # of a contact that bears an impulse J per substep h: SAG J h / mass
 TIPPING_SAG = 1.0 / (2.0 * math.pi * TIPPING_FREQUENCY) ** 2
 
@@ -32,7 +33,7 @@ FURTHER_WORK = 20_000  # rows of the island in all of these,
 LEAST_FURTHER_PASSES = 8  # if they are not these,
 SWEEPS = 2  # between two looks at which rows these are
 EXCESS = 0.01  # extents per step: where the speed of a row is wrong by more, its island is struck, and solved until
-SOLVED = 1e-4  # less than this is wrong
+SOLVED = EXCESS * LEAST_FURTHER_PASSES / FURTHER_PASSES  # less than this is wrong; the fewer passes, the more is left
 
 # The number of substeps of an island.
 MOST_SAG = 0.005  # extents: no contact sags more under the island's heaviest body,

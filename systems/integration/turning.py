@@ -11,7 +11,7 @@ import math
 from ...framework.compilation import inlined
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 
-SMALL_TURN = 1e-6  # rad: its cube is nothing beside 1
+SERIES = 0.06  # rad^2: below it six terms are exact
 
 
 @inlined
@@ -73,13 +73,28 @@ def spin_energy(bodies, i, u, v):
 
 
 @inlined
+def shares_of_turn(turn):
+    """(sin(t) / t, (1 - cos(t)) / t^2) of a turn by the angle t."""
+    s = dot(turn, turn)
+    if s < SERIES:
+        sine = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0))))
+        versine = 1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0 * (1.0 - s / 132.0))))
+        return sine, 0.5 * versine
+    t = math.sqrt(s)
+    return math.sin(t) / t, (1.0 - math.cos(t)) / s
+
+
+@inlined
+def end_of_turn(turn, shares, arm):
+    """By how much the end of an arm moves as it turns, in space about the direction of the turn (Rodrigues)."""
+    once = cross_spin(turn, arm)
+    return add_scaled(scale(once, shares[0]), cross_spin(turn, once), shares[1])
+
+
+@inlined
 def turn_of_arm(turn, arm):
-    """By how much the end of an arm moves as it turns; in space about the direction of the turn."""
-    once, square = cross_spin(turn, arm), dot(turn, turn)
-    if square < SMALL_TURN * SMALL_TURN:
-        return add_scaled(once, cross_spin(turn, once), 0.5)
-    size = math.sqrt(square)
-    return add_scaled(scale(once, math.sin(size) / size), cross_spin(turn, once), (1.0 - math.cos(size)) / square)
+    """The same of one arm alone."""
+    return end_of_turn(turn, shares_of_turn(turn), arm)
 
 
 @inlined

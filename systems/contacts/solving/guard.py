@@ -16,10 +16,12 @@ from ..constants import (
     DEEP,
     EXCESS,
     FADING,
+    FURTHER_PASSES,
     GAIN_MOTION,
     GAIN_PUSH,
     GAIN_ROUNDING,
     GAIN_WEIGHT,
+    LEAST_FURTHER_PASSES,
     SOLVED,
     SWEEPS,
 )  # fmt: skip
@@ -113,19 +115,14 @@ def excess_speed(solver, k, arms):
 
 
 @part
-def find_struck(solver, dt, span):
-    """Mark the islands of which some row is far from what the passes are to make of it; returns whether there are
-    any."""
-    start, stop, any_struck = span[0], span[1], False
-    for k in range(start, stop):
-        any_struck |= excess_speed(solver, k, span[4]) * dt > EXCESS * solver.extent[k]
+def mark_struck(solver, dt, span):
+    """The islands of which some row is far from solved."""
     first, last = islands_of(solver, span)
-    for t in range(first, last if any_struck else first):
+    for t in range(first, last):
         solver.struck[t] = False
-    for k in range(start, stop if any_struck else start):
+    for k in range(span[0], span[1]):
         if excess_speed(solver, k, span[4]) * dt > EXCESS * solver.extent[k]:
             solver.struck[island_of(solver, k)] = True
-    return any_struck
 
 
 @part
@@ -137,10 +134,11 @@ def find_unsolved(solver, turn, any_struck, dt, span, islands):
         unsolved[t] = gains(solver, t)
         any_gain |= unsolved[t]
     for k in range(span[0], span[1] if any_gain or any_struck else span[0]):
-        wrong = any_struck and excess_speed(solver, k, span[4]) * dt > SOLVED * solver.extent[k]
-        if wrong or any_gain:
+        excess = excess_speed(solver, k, span[4]) * dt / solver.extent[k] if any_struck else 0.0
+        if excess > SOLVED or any_gain:
             t = island_of(solver, k)
-            if ((wrong and solver.struck[t]) or unsolved[t]) and turn < solver.passes[t]:
+            wrong = solver.struck[t] and excess * solver.passes[t] > SOLVED * FURTHER_PASSES
+            if (wrong or unsolved[t]) and turn < solver.passes[t]:
                 solver.listed[count] = k
                 count += 1
     return count
@@ -188,9 +186,10 @@ def finish_substep(solver, bias_rate, any_struck, h, dt, span):
     allow(solver, bias_rate, h, dt, span, islands)
     turn, count = 0, find_unsolved(solver, 0, any_struck, dt, span, islands)
     while count > 0:
-        for _ in range(SWEEPS):
+        sweeps = max(SWEEPS, min(LEAST_FURTHER_PASSES, (span[1] - span[0]) // (2 * count)))  # a look costs as much
+        for _ in range(sweeps):
             relax_listed(solver, count, span[4])
         weigh(solver, span, islands)
-        turn += SWEEPS
+        turn += sweeps
         count = find_unsolved(solver, turn, any_struck, dt, span, islands)
     restrain(solver, span, islands)

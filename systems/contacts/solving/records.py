@@ -31,7 +31,8 @@ SOLVER = Schema(
     pushing=floats(),  # and the same in the pass that pushes: below 0 where overlap is to open
     loaded=floats(),  # m of sag under the impulse of the last step
     had_impulse=flags(),  # it has pushed in this step
-    soft=flags(),
+    soft=floats(),  # share of its impulse that it gives back in the pass that pushes
+    fixed=flags(),  # it has several points, and one of its bodies cannot be moved
     hard=flags(),
     any_hard=flag(),
     has_friction=flag(),
@@ -63,6 +64,8 @@ SOLVER = Schema(
     spin=vectors(),  # where bodies spin, as in the records of the bodies
     spin_before=vectors(),  # of a substep
     turn=vectors(),
+    sine=floats(),  # shares of that, see shares_of_turn
+    versine=floats(),
     inverse_inertia=vectors(),
     inverse_products=vectors(),
     reach=floats(),  # m, of its shape from its centre of mass
@@ -116,7 +119,7 @@ SOLVER = Schema(
 )
 
 ARMS = ("place", "arm_a", "arm_b", "core_a", "core_b", "tangent_mass", "rolling", "rolled")
-TURNS = ("spin", "spin_before", "turn", "inverse_inertia", "inverse_products", "reach")
+TURNS = ("spin", "spin_before", "turn", "sine", "versine", "inverse_inertia", "inverse_products", "reach")
 
 # Impulses of the contacts at rest, for the next step: [now, i] is the memory, [1 - now, i] is written.
 WARM_START = Schema(

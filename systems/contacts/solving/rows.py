@@ -12,7 +12,7 @@ import math
 
 from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, divided, dot, item, replace, scale, sub
-from ...integration.turning import change_of_spin, compliance, cross_spin, turn_of_arm, twist
+from ...integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, shares_of_turn, twist
 
 NO_ARMS, ARMS = (), (True,)
 
@@ -28,13 +28,20 @@ def compliance_along(solver, k, along, arms):
 
 
 @inlined
+def turn_body(solver, q, turn):
+    """Body q is turned so far since the step began."""
+    solver.turn[q] = turn
+    solver.sine[q], solver.versine[q] = shares_of_turn(turn)
+
+
+@inlined
 def room_of(solver, k, arms):
     """The gap of row k where its bodies are now."""
     a, b = solver.first[k], solver.second[k]
     way = sub(solver.shift[b], solver.shift[a])
     if len(arms) > 0:
-        way = add(way, turn_of_arm(solver.turn[b], solver.core_b[k]))
-        way = sub(way, turn_of_arm(solver.turn[a], solver.core_a[k]))
+        way = add(way, end_of_turn(solver.turn[b], (solver.sine[b], solver.versine[b]), solver.core_b[k]))
+        way = sub(way, end_of_turn(solver.turn[a], (solver.sine[a], solver.versine[a]), solver.core_a[k]))
     return solver.gap[k] + dot(way, solver.normal[k])
 
 
@@ -103,20 +110,18 @@ def apply_impulse(solver, k, impulse, arms):
 
 
 @part
-def solve_normals(solver, bias, softness, pushes, span):
+def solve_normals(solver, bias, pushes, span):
     """One pass over the rows of a range, along their normals.
 
-    bias: speed at which each row may close, below 0 at which it is to open. softness: (share of that speed which a soft
-    row takes, share of its impulse that it gives back), where this pass ``pushes``.
+    bias: speed at which each row may close, below 0 at which it is to open; softly where this pass ``pushes``.
     """
     impulse, soft = solver.impulse, solver.soft
-    mass_scale, impulse_scale = softness
     start, stop, _, _, arms = span
     for k in range(start, stop):
         old = impulse[k]
         excess = solver.mass[k] * (closing_speed(solver, k, arms) - bias[k])
-        if pushes and soft[k]:
-            excess = mass_scale * excess - impulse_scale * old
+        if pushes:
+            excess -= soft[k] * (excess + old)
         new = max(0.0, old + excess)
         apply_impulse(solver, k, scale(solver.normal[k], new - old), arms)
         impulse[k] = new
@@ -127,10 +132,15 @@ def solve_friction_of(solver, k, arms):
     """Stop what slides at row k, with at most ``friction`` times the normal impulse (Coulomb)."""
     n, old, w = solver.normal[k], solver.tangent[k], relative_velocity(solver, k, arms)
     mass = solver.tangent_mass[k] if len(arms) > 0 else solver.mass[k]
-    pull = add_scaled(old, add_scaled(w, n, -dot(w, n)), -mass)
-    strength, limit = math.sqrt(dot(pull, pull)), solver.friction[k] * solver.impulse[k]
-    if strength > limit:
-        pull = scale(pull, limit / strength)
+    limit = solver.friction[k] * solver.impulse[k]
+    if len(n) == 2:  # a number along the one direction there is
+        along = replace(replace(n, 0, -item(n, 1)), 1, item(n, 0))
+        pull = scale(along, max(-limit, min(limit, dot(old, along) - mass * dot(w, along))))
+    else:
+        pull = add_scaled(old, add_scaled(w, n, -dot(w, n)), -mass)
+        square = dot(pull, pull)
+        if square > limit * limit:
+            pull = scale(pull, limit / math.sqrt(square))
     solver.tangent[k] = pull
     apply_impulse(solver, k, sub(pull, old), arms)
 

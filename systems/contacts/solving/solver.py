@@ -21,6 +21,7 @@ from ..constants import (
     DAMPING_RATIO,
     DEEP,
     DEEPEST,
+    EXCESS,
     HARD_PASSES,
     LAST_RELAX_PASSES,
     LOADED,
@@ -30,12 +31,13 @@ from ..constants import (
     REFINED_PASSES,
     RELAX_PASSES,
     SLOPE,
+    STIFFER,
     STILL,
     SUBSTEP_WORK,
     TOLD_GAIN,
     VERY_DEEP,
 )  # fmt: skip
-from .guard import find_struck, finish_substep
+from .guard import excess_speed, finish_substep, mark_struck
 from .hard import choose_hard, leave_open
 from .rows import (
     ARMS,
@@ -47,6 +49,7 @@ from .rows import (
     solve_friction,
     solve_normals,
     solve_rolling,
+    turn_body,
     weigh_row,
 )  # fmt: skip
 
@@ -54,28 +57,32 @@ ORDINARY, REFINED, HARD = range(3)  # ranges: with the usual substeps, with more
 
 
 @part
-def measure(solver, h, bias_rate, dt, stiff, ends, span):
+def measure(solver, h, springs, dt, stiff, ends, span):
     """What each row asks of the speed along its normal, from where the bodies are now.
 
     opening: at most closing what is open within a substep, or, in the one that ``ends`` the step, within a usual one;
-    pushing: in the pass that pushes, overlap is to open as well, softly where ``soft`` says so.
+    pushing: in the pass that pushes, overlap is to open as well, softly where ``soft`` says so. Returns whether the
+    speed of some row is far from what the relaxing passes are to make of it.
     """
-    ahead = dt / solver.usual if ends else h
+    ahead, any_struck = dt / solver.usual if ends else h, False
     for k in range(span[0], span[1]):
         room = room_of(solver, k, span[4])
         opening = pushing = max(0.0, room) / ahead
-        extent, soft = solver.extent[k], False
+        extent, soft = solver.extent[k], 0.0
         if room <= OPEN * extent and not solver.parting[k]:  # what was just closed is soft, on either side of rounding
             hard = solver.hard[k]
+            softness, bias_rate = springs[1] if solver.fixed[k] else springs[0]
             deep = DEEP * extent + solver.loaded[k]
             if room < -deep:
                 room = -deep + max(min(0.0, SLOPE * (room + VERY_DEEP * extent)), -DEEPEST * extent)
             elif hard:  # at once
                 room = max(room / (h * bias_rate), -deep)
             pushing = bias_rate * room
-            soft = not (stiff or hard)
+            soft = 0.0 if stiff or hard else softness
         solver.had_impulse[k] |= solver.impulse[k] > 0.0
         solver.opening[k], solver.pushing[k], solver.soft[k] = opening, pushing, soft
+        any_struck |= excess_speed(solver, k, span[4]) * dt > EXCESS * solver.extent[k]
+    return any_struck
 
 
 @part
@@ -113,9 +120,9 @@ def move(solver, h, span):
         q = solver.mover[m]
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], h)
         if len(span[4]) > 0:
-            solver.turn[q] = add_scaled(solver.turn[q], solver.spin[q], h)
+            turn_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], h))
     for q in range(span[2], span[3] if len(span[4]) > 0 else span[2]):
-        solver.turn[q] = add_scaled(solver.turn[q], solver.spin[q], h)
+        turn_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], h))
 
 
 @part
@@ -145,12 +152,12 @@ def agrees(solver, h, least, span):
 
 
 @part
-def converge(solver, soft, pushes, h, span):
+def converge(solver, pushes, h, span):
     """Passes over a hard island until they agree."""
     start, stop, least = span[0], span[1], least_change(solver, h, span)
     for _ in range(min(HARD_PASSES, SUBSTEP_WORK // (stop - start))):
         note_impulses(solver, span)
-        solve_pass(solver, solver.pushing if pushes else solver.opening, soft, pushes, span)
+        solve_pass(solver, solver.pushing if pushes else solver.opening, pushes, span)
         if agrees(solver, h, least, span):
             break
 
@@ -196,9 +203,9 @@ def close_in_order(solver, h, span):
 
 
 @part
-def solve_pass(solver, bias, soft, pushes, span):
+def solve_pass(solver, bias, pushes, span):
     """One pass over the rows of a range: along their normals, then along their surfaces."""
-    solve_normals(solver, bias, soft, pushes, span)
+    solve_normals(solver, bias, pushes, span)
     if solver.has_friction:
         solve_friction(solver, span)
     if len(span[4]) > 0 and solver.has_rolling:
@@ -207,27 +214,28 @@ def solve_pass(solver, bias, soft, pushes, span):
 
 
 @part
-def solve_substep(solver, spring, most, dt, h, kind, ends, span):
-    """One substep of a range. spring: (see solve_normals, twice; speed per overlap at which it is pushed out)."""
+def solve_substep(solver, springs, most, dt, h, kind, ends, span):
+    """One substep of a range. springs: see ``spring_of``."""
     start, stop = span[0], span[1]
-    soft, bias_rate, opening, stiff = (spring[0], spring[1]), spring[2], solver.opening, kind == HARD
+    opening, stiff = solver.opening, kind == HARD
     apply_forces(solver, h, span)
     apply_warm_start(solver, most, span)
     if stiff:
         close_in_order(solver, h, span)
-    solve_pass(solver, solver.pushing, soft, True, span)
+    solve_pass(solver, solver.pushing, True, span)
     if stiff:
-        converge(solver, soft, True, h, span)
+        converge(solver, True, h, span)
     move(solver, h, span)
-    measure(solver, h, bias_rate, dt, stiff, ends, span)
-    any_struck = find_struck(solver, dt, span)
+    any_struck = measure(solver, h, springs, dt, stiff, ends, span)
+    if any_struck:
+        mark_struck(solver, dt, span)
     if ends and solver.any_hard:
         leave_open(solver, h, span)
     for _ in range(REFINED_PASSES if kind != ORDINARY else (LAST_RELAX_PASSES if ends else RELAX_PASSES)):
-        solve_pass(solver, opening, soft, False, span)
+        solve_pass(solver, opening, False, span)
     if stiff:
-        converge(solver, soft, False, h, span)
-    finish_substep(solver, bias_rate, any_struck, h, dt, span)
+        converge(solver, False, h, span)
+    finish_substep(solver, springs[0][1], any_struck, h, dt, span)
     for k in range(start, stop):
         solver.total[k] += solver.impulse[k]
         solver.had_impulse[k] |= solver.impulse[k] > 0.0
@@ -261,7 +269,7 @@ def repeat_substep(solver, left, h, span):
     for q in range(span[2], span[3]):
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], left * h)
         if len(span[4]) > 0:
-            solver.turn[q] = add_scaled(solver.turn[q], solver.spin[q], left * h)
+            turn_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], left * h))
 
 
 @part
@@ -281,25 +289,33 @@ def most_impulse(solver, t, substeps):
 
 
 @part
-def solve_range(solver, substeps, kind, dt, span):
-    """The substeps of a range. Where there are more than usual, springs are damped by as much more: for the heavy
-    bodies that they bear, and so that overlap is pushed out at the usual rate."""
-    h, stiff, special = dt / substeps, kind == HARD, kind != ORDINARY
-    omega = 2.0 * math.pi * solver.frequency / h
+def spring_of(solver, stiffer, substeps, h):
+    """(share of its impulse that a soft row gives back, speed per overlap at which it is pushed out).
+
+    Where there are more substeps than usual springs are damped by as much more: for the heavy bodies that they bear,
+    and so that overlap is pushed out at the usual rate.
+    """
+    omega = 2.0 * math.pi * stiffer * solver.frequency / h
     damping = 2.0 * DAMPING_RATIO * substeps / solver.usual + h * omega
-    stiffness, bias_rate = h * omega * damping, omega / damping
-    spring = stiffness / (1.0 + stiffness), 1.0 / (1.0 + stiffness), bias_rate
+    return 1.0 / (1.0 + h * omega * damping), omega / damping
+
+
+@part
+def solve_range(solver, substeps, kind, dt, span):
+    """The substeps of a range."""
+    h, stiff, special = dt / substeps, kind == HARD, kind != ORDINARY
+    springs = spring_of(solver, 1.0, substeps, h), spring_of(solver, STIFFER, substeps, h)
     scale_impulses(solver, 1.0 / substeps, span)
     for k in range(span[0], span[1]):
         sag = LOADED * solver.sag * solver.impulse[k] * h / solver.mass[k]
         solver.loaded[k] = 0.0 if stiff else min(sag, MOST_LOADED * solver.extent[k])
-    measure(solver, h, bias_rate, dt, stiff, False, span)
+    measure(solver, h, springs, dt, stiff, False, span)
     most = most_impulse(solver, solver.island[span[2]], substeps) if special else math.inf
     for step in range(substeps):
         left = substeps - 1 - step
         if special:
             note_impulses(solver, span)
-        solve_substep(solver, spring, most, dt, h, kind, left == 0, span)
+        solve_substep(solver, springs, most, dt, h, kind, left == 0, span)
         if special and left > 0 and is_still(solver, dt, span):
             repeat_substep(solver, left, h, span)
             break
@@ -363,7 +379,7 @@ def advance(state, dt, arms):
                 q = solver.mover[m]
                 solver.shift[q] = zero_of(state)
                 if len(arms) > 0:
-                    solver.turn[q] = scale(solver.spin[q], -dt)
+                    turn_body(solver, q, scale(solver.spin[q], -dt))
             if solver.bears[t] < 1.0:
                 lighten(solver, t, span)
         if span[1] > start:

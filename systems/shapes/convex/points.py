@@ -62,6 +62,8 @@ def contact_points(state, rows, d, met, within, places, gaps):
 def may_have_face(state, shape, like):
     """Not balls, whose core is a point, nor what has neither a support nor the form of a plane: convex without end."""
     if shape[0] != 0:
+        if len(like) == 2:  # the ends of an edge tell
+            return True
         way = like
         for k in range(len(like)):
             way = replace(way, k, PREFERRED[k])
