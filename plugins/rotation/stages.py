@@ -356,11 +356,12 @@ def turn_on_in_space(state, spin, i, angle, dt):
     m = along[0] * principal[0], along[1] * principal[1], along[2] * principal[2]
     momentum = rotate(q, m, False)
     both, size = product_of(w, momentum), product_of(momentum, momentum)
-    free, about, apart = product_of(d, w) / square, 0.0, square * size - both * both
+    free, apart = product_of(d, w) / square, square * size - both * both
     if apart > PARALLEL * square * size:
         free = (product_of(d, w) * size - product_of(d, momentum) * both) / apart
-        about = (product_of(d, momentum) * square - product_of(d, w) * both) / apart
-    q, m = turn_freely(q, m, inverse, min(max(free, -dt), dt))
+    free = min(max(free, -dt), dt)
+    about = (product_of(d, momentum) - free * both) / size  # what is left
+    q, m = turn_freely(q, m, inverse, free)
     set_rotation(state, i, product(q, (own[0], -own[1], -own[2], -own[3])))
     axis = replace(replace(replace(angle, 0, momentum[0]), 1, momentum[1]), len(angle) - 1, momentum[2])
     turn_about(state, i, scale(axis, about))
