@@ -10,16 +10,37 @@ from __future__ import annotations
 
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, dot, length, scale, sub
+from ...framework.jit.stack_arrays import stack_array
+from ...framework.vectors import add, dot, length, row, scale, sub
 from ..integration.trajectory import along, rate_along, travel_of
 from ..integration.turning import arms_to, closing_by_spin, is_turned
+from ..shapes.convex.points import MOST_POINTS, contact_points
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch
 from ..shapes.poses import turn_shape
 from ..shapes.tolerances import smaller_extent, turning_travel
 
 LOOKS, EXACT_LOOKS = 250, 60
 NEAR = 1e-6  # of the extent: a smaller gap is a touch
+TILT = 0.1  # rad, between faces that may touch in several points
 GRAZE = 0.125  # slops: as far as points move between looks at a pair that touches and parts, or after EXACT_LOOKS
+
+
+@part
+def closing_point(state, a, b, d, met, within, velocity):
+    """(how fast the gap grows there, point): the middle of those points in which the two touch that approach; that of
+    the pair if none does, and in a plane if all do: it is in their middle, to the bit. met, within: see
+    :func:`~.points.contact_points`; velocity: of b's body as a's sees it."""
+    bodies, (_, normal, point) = state.bodies, met
+    places, gaps = stack_array(MOST_POINTS, d), stack_array(MOST_POINTS, 0.0)
+    speed, middle, closing = dot(velocity, normal), scale(d, 0.0), 0
+    count = contact_points(state, (a, b), d, met, within, places, gaps)
+    for k in range(count):
+        place = row(places, k, d)
+        if speed + closing_by_spin(bodies, a, b, arms_to(bodies, a, b, normal, place, d), normal) < 0.0:
+            middle, closing = add(middle, place), closing + 1
+    if closing > 0 and (closing < count or len(d) == 3):
+        point = scale(middle, 1.0 / closing)
+    return speed + closing_by_spin(bodies, a, b, arms_to(bodies, a, b, normal, point, d), normal), point
 
 
 @part
@@ -45,7 +66,7 @@ def touch_of_turning(state, a, b, path, since, until, limits):
         near = graze if look == EXACT_LOOKS else near
         fastest, touches = turning + length(w) + bend * (until - t), -depth <= near
         if touches:
-            rate = dot(w, normal) + closing_by_spin(bodies, a, b, arms_to(bodies, a, b, normal, point, d), normal)
+            rate, point = closing_point(state, a, b, d, (depth, normal, point), (near, TILT), w)
             closes = rate < 0.0 and (rate < -threshold or not found)
             if closes and (corners or not is_corner_touch(state, shape_a, a, shape_b, b, d, slop)):
                 touch, found = (t, normal, point, d), True
