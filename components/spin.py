@@ -7,10 +7,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..framework.compilation import part
 from ..framework.data.columns import Column, special_column
 from ..framework.data.component import Component
 from ..framework.errors import CaromError
 from ..framework.typing import Vector
+from ..framework.vectors import item
 from .colliders import AABBCollider, Collider
 from .rigid_body import RigidBody, add_push, force_applied
 
@@ -104,20 +106,24 @@ class Spin(Component):
         if len(colliders) != 1 or not hasattr(colliders[0], "second_moments"):
             raise CaromError(f"entity {self._entity}: {UNKNOWN}")
         shape = self._handle(colliders[0])
-        _, *found = colliders[0].second_moments(shape, d)  # type: ignore[attr-defined]
-        centre, offset, mass = np.array(found[:d]), np.asarray(shape.offset), store.column("mass")[row]
-        xx, yy, zz, xy, xz, yz = (found[d], found[d + 2], 0, found[d + 1], 0, 0) if d == 2 else found[d:]
-        means = np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))[:d, :d]
-        means = means + np.outer(offset, centre) + np.outer(centre, offset) + np.outer(offset, offset)
-        return mass * np.trace(means) if d == 2 else mass * (np.trace(means) * np.eye(3) - means)
+        found = colliders[0].second_moments(shape, d)  # type: ignore[attr-defined]
+        xx, yy, zz, xy, xz, yz = inertia_about(found, shape.offset, store.column("mass")[row])
+        return float(zz) if d == 2 else np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
 
     def _turned_by(self, twist: Any) -> Angular:
         """The change of the angular velocity by an angular impulse, N m s, along the world's axes."""
         moments = self.moments
         if not np.ndim(moments):
             return float(twist / moments) if moments > 0.0 else 0.0
-        axes = _matrix(self._in_world().column("rotation")[self._in_world().find(self._entity)])
+        axes = self._axes()
         return axes @ np.linalg.pinv(moments, hermitian=True) @ axes.T @ twist  # 0 about an axis without inertia
+
+    def _axes(self) -> np.ndarray:
+        """The matrix of the body's quaternion w, x, y, z."""
+        store = self._in_world()
+        w, x, y, z = store.column("rotation")[store.find(self._entity)].tolist()
+        across = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+        return np.eye(3) + 2.0 * w * across + 2.0 * across @ across
 
     def _turn(self, torque: Any) -> None:
         if self._store is None or self._handle(RigidBody).kind == "dynamic":
@@ -155,8 +161,24 @@ def _cross(arm: np.ndarray, push: np.ndarray) -> Angular:
     return np.cross(arm, push) if len(arm) == 3 else float(arm[0] * push[1] - arm[1] * push[0])
 
 
-def _matrix(rotation: np.ndarray) -> np.ndarray:
-    """The matrix of a unit quaternion w, x, y, z."""
-    w, (x, y, z) = rotation[0], rotation[1:]
-    across = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
-    return np.eye(3) + 2.0 * w * across + 2.0 * across @ across
+@part
+def number(values, k):
+    """One of several; k need not be known when this compiles."""
+    return values[k]
+
+
+@part
+def inertia_about(found, offset, mass):
+    """(xx, yy, zz, xy, xz, yz) of the inertia about a body's position, along its own axes, in a plane zz alone: from
+    the second moments that its shape tells, about a centre at ``offset``."""
+    d, x, y, at_x, at_y = len(offset), item(offset, 0), item(offset, 1), number(found, 1), number(found, 2)
+    xx = number(found, 1 + d) + x * (2.0 * at_x + x)
+    yy = number(found, 5) + y * (2.0 * at_y + y)
+    if d == 2:
+        return 0.0, 0.0, mass * (xx + yy), 0.0, 0.0, 0.0
+    z, at_z = item(offset, d - 1), number(found, d)
+    zz = number(found, d + 3) + z * (2.0 * at_z + z)
+    xy = number(found, d + 4) + x * at_y + y * at_x + x * y
+    xz = number(found, d + 5) + x * at_z + z * at_x + x * z
+    yz = number(found, d + 6) + y * at_z + z * at_y + y * z
+    return mass * (yy + zz), mass * (xx + zz), mass * (xx + yy), -mass * xy, -mass * xz, -mass * yz

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from ...components import SphereCollider
-from ...components.spin import FASTEST_TURN, UNKNOWN, Spin
+from ...components.spin import FASTEST_TURN, UNKNOWN, Spin, inertia_about
 from ...framework import Plugin
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
@@ -32,12 +32,6 @@ spinning = Plugin("stages of rotation")
 
 
 @part
-def number(values, k):
-    """One of several; k need not be known when this compiles."""
-    return values[k]
-
-
-@part
 def inertia_of(state, spin, i):
     """(xx, yy, zz, xy, xz, yz) of the inertia of body i about its position, along its own axes; in a plane zz alone."""
     d, bodies = len(zero_of(state)), state.bodies
@@ -55,18 +49,7 @@ def inertia_of(state, spin, i):
         state.blamed = i + 1
         raise ValueError(UNKNOWN)
     found, offset = second_moments(state, shape, i), state.colliders.offset[state.shapes.slots[shape], i]
-    mass, xx, yy, zz, xy, xz, yz = bodies.mass[i], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    x, y, at_x, at_y = item(offset, 0), item(offset, 1), number(found, 1), number(found, 2)
-    xx = number(found, 1 + d) + x * (2.0 * at_x + x)
-    yy = number(found, 5) + y * (2.0 * at_y + y)
-    if d == 2:
-        return 0.0, 0.0, mass * (xx + yy), 0.0, 0.0, 0.0
-    z, at_z = item(offset, d - 1), number(found, d)
-    zz = number(found, d + 3) + z * (2.0 * at_z + z)
-    xy = number(found, d + 4) + x * at_y + y * at_x + x * y
-    xz = number(found, d + 5) + x * at_z + z * at_x + x * z
-    yz = number(found, d + 6) + y * at_z + z * at_y + y * z
-    return mass * (yy + zz), mass * (xx + zz), mass * (xx + yy), -mass * xy, -mass * xz, -mass * yz
+    return inertia_about(found, offset, bodies.mass[i])
 
 
 @part
