@@ -156,6 +156,18 @@ class Spin(Component):
         return found
 
 
+def spin_energy(store: Any, entities: np.ndarray) -> float:
+    """Sum of w . I w / 2 of bodies with a Spin, joules."""
+    spin, total = object.__new__(Spin), 0.0
+    for entity in entities.tolist():
+        spin._bind(store, entity)
+        w = spin.angular_velocity
+        if np.any(w):
+            w = spin._axes().T @ w if np.ndim(w) else w
+            total += 0.5 * float(np.dot(w, np.dot(spin.moments, w)))
+    return total
+
+
 def _cross(arm: np.ndarray, push: np.ndarray) -> Angular:
     """arm x push; in a plane its only component."""
     return np.cross(arm, push) if len(arm) == 3 else float(arm[0] * push[1] - arm[1] * push[0])

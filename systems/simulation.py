@@ -408,7 +408,7 @@ class Simulation:
     # -- answers ----------------------------------------------------------------------------------
 
     def kinetic_energy(self) -> float:
-        return kinetic_energy(self.bodies.dynamic)
+        return kinetic_energy(self.table, self.bodies.dynamic)
 
     def potential_energy(self) -> float:
         return potential_energy(self.table, self.bodies, self.gravity, self._world.force_systems)

@@ -7,15 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from ...components.spin import Spin, spin_energy
 from ...framework.data.bodies import Bodies
 from ...framework.data.table import Table
 from ..forces.accumulation import required_bodies
 
 
-def kinetic_energy(dynamic: Any) -> float:
-    """Sum of m v^2 / 2, joules."""
+def kinetic_energy(table: Table, dynamic: Bodies) -> float:
+    """Sum of m v^2 / 2, and of w . I w / 2 of those that have a Spin, joules."""
     speeds = np.einsum("ij,ij->i", dynamic.linear_velocity, dynamic.linear_velocity)
-    return float(0.5 * (dynamic.mass * speeds).sum())
+    spinning = table.column("entity")[dynamic.rows][dynamic.has(Spin)]
+    return float(0.5 * (dynamic.mass * speeds).sum()) + spin_energy(table, spinning)
 
 
 def momentum(dynamic: Any, dimensions: int) -> np.ndarray:

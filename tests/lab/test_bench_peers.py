@@ -39,8 +39,9 @@ def test_every_subject_translates():
         own, peer = CaromWorld(world), PymunkSpace(world)
         for ours, theirs in zip((*own.state(), *own.turns()), (*peer.state(), *peer.turns()), strict=True):
             np.testing.assert_array_equal(ours, theirs)
-        mass = np.array([body.mass for body in peer.bodies])
-        assert 0.5 * mass @ (peer.state()[1] ** 2).sum(axis=1) == pytest.approx(world.kinetic_energy())
+        twice = (body.mass * abs(body.velocity) ** 2 for body in peer.bodies)
+        spinning = (body.moment * body.angular_velocity**2 for body in peer.bodies if body.angular_velocity)
+        assert 0.5 * (sum(twice) + sum(spinning)) == pytest.approx(world.kinetic_energy())
         assert len(peer.space.shapes) == sum(int(part.shaped.sum()) for part in moving_and_fixed(world))
         moments = {
             entity: world.component_for_entity(entity, Spin).moments if spins else math.inf

@@ -259,6 +259,7 @@ def test_a_smooth_elastic_gas_of_boxes_in_space_keeps_energy_as_free_turns_do():
             u = np.stack((x, y, z), 1)
             own = w + 2 * np.cross(u, np.cross(u, w) - c[:, None] * w)
             energies.append(0.5 * (bodies.linear_velocity**2).sum() + 0.5 * (moments * own**2).sum())
+            assert world.kinetic_energy() == pytest.approx(energies[-1], rel=1e-12)
             world.step()
         assert world.stats().counters["impacts"] > 300
         assert np.abs(bodies.position).max() < 3.0

@@ -61,7 +61,8 @@ def distance_to(corners, x):
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("seed", range(3))
 def test_inertia_of_uniform_shapes_is_the_sum_over_a_lattice(seed, d):
-    """sum m r^2 over points of a lattice, to its spacing; in the step what a torque does, in Python what it says."""
+    """sum m r^2 over points of a lattice, to its spacing; in the step what a torque does, in Python what it says, and
+    the energy of turning is that of these points."""
     random = np.random.default_rng(seed)
     count = SIDE if d == 2 else 90
     line = (np.arange(count) + 0.5) / count * 4 - 2
@@ -83,6 +84,8 @@ def test_inertia_of_uniform_shapes_is_the_sum_over_a_lattice(seed, d):
             moments = np.linalg.inv(spin.moments)[2, 2] if d == 3 else 1 / spin.moments
             w = spin.angular_velocity if d == 2 else spin.angular_velocity[2]
             assert w == pytest.approx(torque * moments / 60, rel=1e-6)
+            spin.angular_velocity = w = random.normal() if d == 2 else random.normal(size=3)
+            assert world.kinetic_energy() == pytest.approx(0.5 * np.dot(w, np.dot(expected, w)), rel=0.05)
 
 
 # -- torques, forces and impulses -----------------------------------------------------------------
