@@ -141,11 +141,13 @@ class Column:
         shape = self.item_shape(dimensions)
         if self.choices:
             return self._full(self._choices_of(values), count, shape)
-        absent = None
-        if self.optional and (values is None or np.asarray(values).dtype == object):
-            absent = np.equal(np.asarray(values, object), None)
-            values = np.where(absent, self.minimum or 1.0, values).tolist()  # any number that passes the checks
-        array = self._as_numbers(values, None)
+        absent, given, some = None, values, np.full(shape, self.minimum or 1.0).tolist()  # what passes the checks
+        if self.optional and values is None:
+            absent, values = True, some
+        elif self.optional and (isinstance(values, (list, tuple)) or getattr(values, "dtype", "") == "O"):
+            absent = np.array([value is None for value in values])
+            values = [some if value is None else value for value in values] if absent.any() else values
+        array = self._as_numbers(values, None, given)
         if array.ndim == 0 and self.item == "rotation" and dimensions == 3 and array == 0:
             array = self.empty_value(3)
         full = self._full(array, count, shape)
@@ -153,8 +155,8 @@ class Column:
             self.check_numbers(array, array.tolist(), None)
         else:
             self.check_numbers(full, None, None)
-        if absent is not None:
-            full = np.where(np.broadcast_to(absent, full.shape), math.nan, full)
+        if np.any(absent):
+            full = np.where(np.reshape(absent, (-1, *(1,) * len(shape))), math.nan, full)
         if self.item == "rotation" and shape:
             full = full / _lengths(full)
         return full
@@ -219,7 +221,7 @@ class Column:
             where = "" if shown is not None else f" (row {int(np.argmin(np.any(array, axis=-1)))})"
             raise self._error([0.0] * 4 if shown is None else shown, f"must not be the zero quaternion{where}", entity)
 
-    def _as_numbers(self, value: Any, entity: int | None) -> np.ndarray:
+    def _as_numbers(self, value: Any, entity: int | None, shown: Any = None) -> np.ndarray:
         try:
             array = np.asarray(value)
             if array.size and array.dtype.kind not in {"b": "b", "i": "iu", "f": "iuf"}[np.dtype(self.dtype).kind]:
@@ -232,7 +234,7 @@ class Column:
         except (ValueError, TypeError, OverflowError):
             wanted = {"i": "an integer", "b": "True or False"}.get(np.dtype(self.dtype).kind, "a number")
             rule = f"must be {wanted}" if self.item == "scalar" else "must be numbers"
-            raise self._error(value, rule, entity) from None
+            raise self._error(value if shown is None else shown, rule, entity) from None
 
     def _error(self, value: Any, rule: str, entity: int | None) -> ValueError:
         prefix = "" if entity is None else f"entity {entity}: "

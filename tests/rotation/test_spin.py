@@ -353,6 +353,19 @@ def test_wrong_values_of_spin_are_refused_where_they_are_given():
             world.step()
 
 
+@pytest.mark.parametrize("d", [2, 3])
+def test_bodies_made_at_once_have_an_inertia_of_their_own_or_that_of_their_shape(d):
+    given, whole = (0.7, [[0.5]]) if d == 2 else ((0.7, 0.8, 0.9), 0.4 * np.eye(3))
+    with space(d) as world:
+        parts = Transform.many(np.eye(3)[:, :d] * 9), RigidBody.many(), SphereCollider.many(1)
+        world.create_entities(3, Spin.many(inertia=[None, given, None]), *parts)
+        world.step()
+        moments = [np.atleast_2d(spin.moments) for _, spin in world.get_component(Spin)]
+        assert np.allclose(moments, [whole, np.diag(np.atleast_1d(given)), whole])
+        with pytest.raises(ValueError, match=r"Spin.inertia must be numbers, got \[None, 'heavy', None\]"):
+            world.create_entities(3, Spin.many(inertia=[None, "heavy", None]), *parts)
+
+
 def test_a_small_torque_turns_what_could_sleep():
     with space(sleeping=True) as world:
         entity = world.create_entity(
