@@ -12,12 +12,14 @@ import sys
 from collections.abc import Iterator
 
 import numpy as np
-from helpers_zoo import MODES, mixed, platformer
+from helpers_zoo import MODES, mixed, platformer, tumbling
 
 from carom.framework import World
+from carom.plugins.rotation import Spin
 
 VALUES = (math.nan, math.inf, -math.inf, -1.0)
-MADE = {"force", "inverse_mass", "previous_position"}  # in every step again
+# Made in every step, or cleared where a frame ends.
+MADE = {"force", "inverse_mass", "previous_position", "applied_force", "spin.applied_torque"}
 BEFORE, AFTER = 8, 6  # steps
 
 
@@ -45,11 +47,12 @@ def poison(world: World, name: str, entity: int, value: float) -> bool:
 
 
 def rest_of(world: World, entity: int) -> list[bytes]:
-    """Where the other bodies are and how fast, in order of their ids."""
+    """Where the other bodies are, how they are turned and how fast, in order of their ids."""
     bodies = world.bodies
     order = np.argsort(bodies.entity)
     order = order[bodies.entity[order] != entity]
-    return [bodies.position[order].tobytes(), bodies.linear_velocity[order].tobytes()]
+    names = ["position", "linear_velocity", "rotation", *["spin.angular_velocity"] * int(bodies.has(Spin).any())]
+    return [column_of(world, name)[order].tobytes() for name in names]
 
 
 def told(world: World) -> list[str]:
@@ -106,6 +109,7 @@ def scenes() -> Iterator[tuple[str, object]]:
     for mode in MODES:
         for d in (2, 3):
             yield f"mixed {d}D {mode}", lambda d=d, mode=mode: mixed(d, mode)
+            yield f"tumbling {d}D {mode}", lambda d=d, mode=mode: tumbling(d, mode)
         yield f"platformer {mode}", lambda mode=mode: platformer(mode)
 
 

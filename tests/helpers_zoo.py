@@ -16,6 +16,7 @@ from carom.components import AABBCollider, Collider, RigidBody, SphereCollider, 
 from carom.framework import ForceSystem, Plugin, Settings, World, column
 from carom.framework.vectors import item, replace, scale
 from carom.plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
 from carom.plugins.springs import Springs
 
 MODES = ("discrete", "continuous", "event_driven")
@@ -108,6 +109,23 @@ def platformer(mode: str) -> World:
         world.create_entity(Transform((-0.8 + 0.7 * k, 1.6 + 0.3 * k)), body, collider)
     corners = convex_polygon.ConvexPolygonCollider([(-0.2, -0.2), (0.2, -0.2), (0.0, 0.2)])
     world.create_entity(Transform((0.5, 0.8)), RigidBody(linear_velocity=(3.0, 1.0)), corners)
+    return world
+
+
+def tumbling(d: int, mode: str) -> World:
+    """Boxes, balls and a capsule with a Spin fall onto each other beside a mill; one has no Spin."""
+    world = World(Physics(d, gravity=at(d, 0.0, -9.81)), Rotation(), capsule.plugin, settings=Settings(collision=mode))
+    world.create_entity(Transform(at(d)), RigidBody(kind="static"), BoxCollider((9.0, 0.5, 9.0)[:d], friction=0.5))
+    about, turned = (lambda w: w) if d == 2 else (lambda w: (0.3, -w, w)), 0.7 if d == 2 else (1.0, 0.3, 0.1, 0.4)
+    mill = BoxCollider((1.0, 0.2, 0.2)[:d], friction=0.5)
+    world.create_entity(Transform(at(d, -1.5, 1.5)), RigidBody(kind="kinematic"), Spin(about(2.0)), mill)
+    for k in range(5):
+        shapes = BoxCollider((0.3, 0.4, 0.2)[:d], friction=0.5), SphereCollider(0.3, restitution=0.4, friction=0.5)
+        spin = Spin(about(3.0 - k), constant_torque=about(0.2), angular_damping=0.1 * k, max_angular_speed=4.0)
+        body = RigidBody(1.0 + k, at(d, 2.0 - k, -3.0))
+        shape = capsule.CapsuleCollider(0.2, 0.3, friction=0.5) if k == 4 else shapes[k % 2]
+        world.create_entity(Transform(at(d, 0.4 * k - 0.8, 1.1 + 0.62 * k), turned), body, spin, shape)
+    world.create_entity(Transform(at(d, 0.5, 2.2)), RigidBody(), SphereCollider(0.2))
     return world
 
 
@@ -280,6 +298,7 @@ def scenarios() -> Iterator[tuple[str, Callable[[], list[str]]]]:
         yield f"buried {d}D", lambda d=d: play(buried(d), 3)
         yield f"heavy on light {d}D", lambda d=d: play(heavy_on_light(d), 2)
         yield f"asked {d}D", lambda d=d: asked(d)
+        yield f"tumbling {d}D", lambda d=d: play(tumbling(d, MODES[d - 2]))
     for d, mode in zip((2, 3, 2), MODES, strict=True):
         yield f"sleepers {d}D {mode}", lambda d=d, mode=mode: sleepers(d, mode)
 

@@ -23,9 +23,7 @@ from .free_rotation import diagonalised, product, rotate, turn_freely
 TRIPLE = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))  # of the step: the outer two of Yoshida's three
 PARALLEL = 1e-9  # square of the sine between spin and angular momentum: less is none
 SLOW = 1e-4  # rad in a step: what turns slower may fall asleep, if it is dynamic
-NOT_FINITE = (
-    f"Spin.angular_velocity must be finite, at most {FASTEST_TURN:g} rad/s: it, a torque or the damping is none"
-)
+TOO_FAST = f"a torque is so large for the inertia that Spin.angular_velocity exceeds {FASTEST_TURN:g} rad/s"
 NOT_POSITIVE = "Spin.inertia must be positive and finite"
 
 spinning = Plugin("stages of rotation")
@@ -212,7 +210,7 @@ def write_axes(state, i):
 @spinning.stage(
     after="check_flight", records=(Spin,),
     reads=(
-        "mass", "inverse_mass", "still", "levels", "shapes", "spin.inertia", "spin.angular_damping",
+        "mass", "quarantined", "still", "levels", "shapes", "spin.inertia", "spin.angular_damping",
         "spin.max_angular_speed", "spin.constant_torque", "spin.applied_torque",
     ),
     writes=("rotation", "axes", "spin.angular_velocity", "spin.step_torque"),
@@ -221,17 +219,17 @@ def turn_bodies(state, dt, spin):
     """bodies turn"""
     bodies, parts = state.bodies, 1 if len(zero_of(state)) == 2 else 3
     for i in range(state.first, state.moving):
-        if not spin.present[i] or bodies.still[i] > 0:
+        if not spin.present[i] or bodies.still[i] > 0 or bodies.quarantined[i]:
             continue
         if i >= state.dynamic:
             turn_about(state, i, scale(spin_of(state, spin, i), dt))
-        elif bodies.inverse_mass[i] > 0.0 and parts == 1:  # 0: it is taken out
+        elif parts == 1:
             turn_in_plane(state, spin, i, dt)
-        elif bodies.inverse_mass[i] > 0.0:
+        else:
             turn_in_space(state, spin, i, dt)
         if not length(spin_of(state, spin, i)) <= FASTEST_TURN:
             state.blamed = i + 1
-            raise ValueError(NOT_FINITE)
+            raise ValueError(TOO_FAST)
         write_axes(state, i)
         for k in range(parts):
             spin.step_torque[i, k] = 0.0
@@ -283,7 +281,7 @@ def product_of(u, v):
 @spinning.stage(
     after="check_flight", records=(Spin,),
     reads=(
-        "mass", "inverse_mass", "shapes", "levels", "offset", "rotation", "spin.inertia", "spin.angular_velocity",
+        "mass", "quarantined", "shapes", "levels", "offset", "rotation", "spin.inertia", "spin.angular_velocity",
         "spin.rolling_friction",
     ),
     writes=("spin", "inverse_inertia", "inverse_products", "rolling_radius", "rolling_friction", "turn"),
@@ -294,26 +292,26 @@ def share_spins(state, dt, spin):
     bodies, zero = state.bodies, zero_of(state)
     state.spinning = True
     for i in range(state.count):
-        w, moves = zero, state.first <= i < state.moving and spin.present[i]
+        w, moves = zero, state.first <= i < state.moving and spin.present[i] and not bodies.quarantined[i]
         if moves:
             w = spin_of(state, spin, i)
         bodies.spin[i], bodies.turn[i] = w, scale(w, dt)
         bodies.inverse_inertia[i], bodies.inverse_products[i], bodies.rolling_radius[i] = zero, zero, 0.0
         bodies.rolling_friction[i] = spin.rolling_friction[i] if spin.present[i] else 0.0
-        if moves and i < state.dynamic and bodies.inverse_mass[i] > 0.0:
+        if moves and i < state.dynamic:
             write_inverse_inertia(state, spin, i)
 
 
 @spinning.stage(
     after="check_flight", records=(Spin, SphereCollider),
-    reads=("inverse_mass", "shapes", "levels", "offset", "inverse_inertia", "sphere_collider.radius"),
+    reads=("quarantined", "shapes", "levels", "offset", "inverse_inertia", "sphere_collider.radius"),
     writes=("rolling_radius",), needed="colliders",
 )  # fmt: skip
 def find_round(state, dt, spin, sphere):
     """which bodies roll: contacts push on their centre, and turn them by friction alone"""
     bodies, d = state.bodies, len(zero_of(state))
     for i in range(state.first, state.moving):
-        if not (spin.present[i] and sphere.present[i]):
+        if bodies.quarantined[i] or not (spin.present[i] and sphere.present[i]):  # of the first there is no shape
             continue
         shape, inverse, others = bodies.levels[0, i], bodies.inverse_inertia[i], bodies.inverse_products[i]
         several = state.several_levels and bodies.levels[state.level_count - 1, i] != shape  # another one decides
@@ -356,7 +354,7 @@ def turn_on_in_space(state, spin, i, angle, dt):
 @spinning.stage(
     after="resolve_static_penetration",
     records=(Spin,),
-    reads=("spin", "turn", "inverse_mass"),
+    reads=("spin", "turn", "quarantined"),
     writes=("spin.angular_velocity", "rotation", "axes"),
     needed="colliders",
 )
@@ -364,7 +362,7 @@ def take_spins(state, dt, spin):
     """what contacts have made of the spins; the step has turned the bodies with these"""
     bodies, parts = state.bodies, 1 if len(zero_of(state)) == 2 else 3
     for i in range(state.first, state.dynamic):
-        if not (spin.present[i] and bodies.inverse_mass[i] > 0.0):
+        if not spin.present[i] or bodies.quarantined[i]:
             continue
         changed, further = False, bodies.turn[i]
         for k in range(parts):

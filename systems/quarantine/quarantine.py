@@ -16,6 +16,7 @@ import numpy as np
 
 from ...components import RigidBody, Transform
 from ...components.rigid_body import FASTEST
+from ...components.spin import Spin
 from ...framework.data.columns import Column
 from ...framework.data.table import Table
 from ...framework.jit.records.record import Record, make_record
@@ -113,6 +114,9 @@ class Quarantine:
         for column in RigidBody.columns.values():
             if column.name != "linear_velocity":
                 yield from self._check(column, RigidBody, DYNAMIC_ROWS)
+        if Spin in self._table.component_types:
+            for column in Spin.columns.values():
+                yield from self._check(column, Spin, ALL_ROWS)
         yield from self._check(Transform.columns["position"], Transform, STATIC_ROWS)
         if self._scene.linked is not None:
             yield from self._check(Transform.columns["rotation"], Transform, ALL_ROWS)
