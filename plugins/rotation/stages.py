@@ -354,7 +354,7 @@ def turn_on_in_space(state, spin, i, angle, dt):
 @spinning.stage(
     after="resolve_static_penetration",
     records=(Spin,),
-    reads=("spin", "turn", "quarantined"),
+    reads=("spin", "turn", "quarantined", "spin.max_angular_speed"),
     writes=("spin.angular_velocity", "rotation", "axes"),
     needed="colliders",
 )
@@ -377,6 +377,9 @@ def take_spins(state, dt, spin):
         else:
             turn_on_in_space(state, spin, i, further, dt)
         write_axes(state, i)
+        size, most = length(spin_of(state, spin, i)), spin.max_angular_speed[i]
+        for k in range(parts if size > most else 0):
+            spin.angular_velocity[i, k] *= most / size
 
 
 @spinning.stage(

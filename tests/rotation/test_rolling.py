@@ -43,6 +43,23 @@ def motion(world, entity):
     return v, np.array((0, 0, w) if np.ndim(w) == 0 else w)
 
 
+@pytest.mark.parametrize("mode", PLAIN_MODES)
+@pytest.mark.parametrize("d", [2, 3])
+def test_contacts_leave_nothing_faster_than_its_limit(d, mode):
+    """Balls and boxes that skid at 12 m/s and would roll with 20 rad/s: after impacts and at rest, in each step."""
+    with plane(d, collision=mode) as world:
+        for k in range(4):
+            shape = BoxCollider((0.5, 0.4, 0.3)[:d], restitution=0.3) if k % 2 else SphereCollider(0.5, restitution=0.5)
+            spin = Spin(1 if d == 2 else (0, 0, 1), max_angular_speed=2)
+            world.create_entity(Transform((0, 2 + 1.5 * k, 0)[:d]), RigidBody(1, (12, -3, 1)[:d]), spin, shape)
+        fastest = []
+        for _ in range(120):
+            world.step()
+            w = world.bodies.dynamic.spin.angular_velocity.reshape(4, -1)
+            fastest.append(np.linalg.norm(w, axis=1).max())
+    assert max(fastest) == pytest.approx(2, rel=1e-14)
+
+
 @pytest.mark.plain
 @pytest.mark.parametrize("d", [2, 3])
 def test_rolling_friction_stops_a_ball_and_holds_it_on_a_slope(d):
