@@ -11,6 +11,7 @@ MARGIN_STEPS = 2.0
 SAME_PLACE = 1e-9  # of the extent: within that all of it does; and a gap that is smaller is one of rounding errors
 PLANE_SIZES = 0.2  # of the extent: within that its plane may tell the depth,
 FLAT_SLOPS = 0.02  # slops: if it is off the surfaces by less, which decides nothing
+ENDLESS = 1e300  # m: how far a half-space reaches, so that one that does not turn moves by 0, not nan
 
 
 @inlined
@@ -44,7 +45,7 @@ def contact_margin(state, dt, a, b):
 @inlined
 def reach_of(bodies, i):
     """How far body i reaches from its centre of mass, at most."""
-    return length(bodies.half_extents[i]) + length(bodies.offset[i])
+    return min(length(bodies.half_extents[i]) + length(bodies.offset[i]), ENDLESS)
 
 
 @inlined

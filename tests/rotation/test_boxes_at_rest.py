@@ -9,7 +9,7 @@ import pytest
 
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
-from carom.plugins import Physics, capsule, convex_polygon
+from carom.plugins import Physics, capsule, convex_polygon, half_space
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
@@ -274,3 +274,18 @@ def test_a_cube_that_falls_askew_comes_to_lie_on_a_side():
             assert transform.position[1] == pytest.approx(0.5, abs=1e-4)
             assert np.sort(np.abs(up)) == pytest.approx((0, 0, 1), abs=1e-3)
             assert world.kinetic_energy() < 1e-9
+
+
+@pytest.mark.parametrize("mode", PLAIN_MODES)
+@pytest.mark.parametrize("d", [2, 3])
+def test_endless_ground_bears_a_box_that_falls_askew_as_long_ground_does(d, mode):
+    with World(
+        Physics(d, gravity=(0, -G, 0)[:d]), Rotation(), half_space.plugin, settings=Settings(collision=mode)
+    ) as world:
+        world.create_entity(Transform((0,) * d), half_space.HalfSpaceCollider((0, 1, 0)[:d], friction=0.5))
+        turn, shape = (0.9, 0.3, 0.1, 0.3) if d == 3 else 0.6, BoxCollider((0.5,) * d, friction=0.5)
+        entity = world.create_entity(Transform((0, 1.5, 0)[:d], turn), RigidBody(), Spin(), shape)
+        for _ in range(300):
+            world.step()
+        assert world.component_for_entity(entity, Transform).y == pytest.approx(0.5, abs=1e-4)
+        assert np.abs(world.component_for_entity(entity, Spin).angular_velocity).max() < 1e-9
