@@ -24,6 +24,7 @@ _NAMES = {
     ),
     "plugins": ("Physics",),
     "plugins.capsule": ("CapsuleCollider",),
+    "plugins.convex_hull": ("ConvexHullCollider",),
     "plugins.convex_polygon": ("ConvexPolygonCollider",),
     "plugins.half_space": ("HalfSpaceCollider",),
     "plugins.one_way_segment": ("OneWaySegmentCollider",),

@@ -2,6 +2,7 @@ from .components import *
 from .framework import *
 from .plugins import *
 from .plugins.capsule import CapsuleCollider as CapsuleCollider
+from .plugins.convex_hull import ConvexHullCollider as ConvexHullCollider
 from .plugins.convex_polygon import ConvexPolygonCollider as ConvexPolygonCollider
 from .plugins.half_space import HalfSpaceCollider as HalfSpaceCollider
 from .plugins.one_way_segment import OneWaySegmentCollider as OneWaySegmentCollider

@@ -8,10 +8,11 @@ import re
 import esper
 import numpy as np
 import pytest
+import scipy.spatial
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import CaromError, Phase, Settings, StepError, System, World
-from carom.plugins import Physics, capsule, convex_polygon
+from carom.plugins import Physics, capsule, convex_hull, convex_polygon
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 pytestmark = pytest.mark.plain
@@ -20,7 +21,7 @@ SIDE = 400  # of the lattice that sums inertia
 
 def space(d=2, gravity=0, **settings):
     return World(
-        Physics(d, gravity=gravity), Rotation(), capsule.plugin, *([convex_polygon.plugin] if d == 2 else []),
+        Physics(d, gravity=gravity), Rotation(), capsule.plugin, (convex_polygon if d == 2 else convex_hull).plugin,
         settings=Settings(**settings),
     )  # fmt: skip
 
@@ -35,6 +36,9 @@ def shapes(random, d):
     yield BoxCollider(half), lambda x: (np.abs(x) <= half).all(axis=-1)
     yield capsule.CapsuleCollider(r, h), lambda x: np.linalg.norm(x - along(x), axis=-1) <= r
     if d == 3:
+        corners = random.uniform(-0.9, 0.9, (12, 3))
+        faces = scipy.spatial.ConvexHull(corners).equations
+        yield convex_hull.ConvexHullCollider(corners), lambda x: (x @ faces[:, :3].T + faces[:, 3] <= 0).all(axis=-1)
         return
     angles = np.sort(random.uniform(0, 2 * math.pi, 5))
     corners = np.stack((np.cos(angles), np.sin(angles)), axis=-1) * random.uniform(0.4, 0.7) + random.uniform(
@@ -203,7 +207,8 @@ def test_snapshots_files_and_failed_steps_bring_back_every_bit(d, tmp_path):
         while world.clock.step_count < 40:
             world.step()
         assert world.state_hash() == later
-    plugins = (Physics(d, gravity=0), Rotation(), capsule.plugin, *([convex_polygon.plugin] if d == 2 else []))
+    corners = convex_polygon if d == 2 else convex_hull
+    plugins = Physics(d, gravity=0), Rotation(), capsule.plugin, corners.plugin
     with World.load(tmp_path / "world.carom", *plugins) as other:
         other.add_system(Fails())
         for _ in range(20):

@@ -12,20 +12,24 @@ from worlds import registry
 from carom.components import AABBCollider, SphereCollider
 from carom.lab.plugins.kernels import PairCode
 from carom.lab.plugins.samples import Poses, Rows, poses
-from carom.plugins import capsule, convex_polygon, half_space, one_way_segment
+from carom.plugins import capsule, convex_hull, convex_polygon, half_space, one_way_segment
 from carom.plugins.capsule import CapsuleCollider
+from carom.plugins.convex_hull import FIRST, ConvexHullCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider
 from carom.plugins.half_space import HalfSpaceCollider
 from carom.plugins.one_way_segment import OneWaySegmentCollider
 
 SHAPES = (
-    AABBCollider, CapsuleCollider, ConvexPolygonCollider, HalfSpaceCollider, OneWaySegmentCollider, SphereCollider
+    AABBCollider, CapsuleCollider, ConvexHullCollider, ConvexPolygonCollider, HalfSpaceCollider, OneWaySegmentCollider,
+    SphereCollider,
 )  # fmt: skip
 DIRECTIONS = 24  # per pose: half of them anywhere, half near the normal
 ROUNDING = 1e-12  # of distance and sizes
 
 
-REGISTRY = registry(capsule.plugin, convex_polygon.plugin, half_space.plugin, one_way_segment.plugin)
+REGISTRY = registry(
+    capsule.plugin, convex_hull.plugin, convex_polygon.plugin, half_space.plugin, one_way_segment.plugin
+)  # fmt: skip
 PAIRS = [
     (first, second, d)
     for first, second in itertools.combinations_with_replacement(SHAPES, 2)
@@ -53,13 +57,13 @@ def reach(rows: Rows, n: np.ndarray) -> np.ndarray:
     if component is OneWaySegmentCollider:
         ends = [np.einsum("pkd,pd->pk", n, turned(rows, arrays[name])) for name in ("start", "end")]
         return np.maximum(*ends)
-    assert component is ConvexPolygonCollider
+    name, first = ("hull", FIRST) if component is ConvexHullCollider else ("vertices", 0)
     result = np.empty(n.shape[:2])
-    for number in np.unique(arrays["vertices"]):
-        those = arrays["vertices"] == number
-        corners = np.einsum("pij,cj->pci", rows.axes[those], component.columns["vertices"].shown(number))
+    for number in np.unique(arrays[name]):
+        those = arrays[name] == number
+        corners = np.einsum("pij,cj->pci", rows.axes[those], component.columns[name].shown(number)[first:])
         result[those] = np.einsum("pkd,pcd->pkc", n[those], corners).max(axis=2)
-    return result + arrays["corner_radius"][:, None]
+    return result + (arrays["corner_radius"][:, None] if component is ConvexPolygonCollider else 0.0)
 
 
 def gap(cases: Poses, n: np.ndarray) -> np.ndarray:

@@ -1,0 +1,169 @@
+"""Convex hulls in 3D, turned by the Transform: the smallest convex bodies around some points."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from ..components.colliders import Collider
+from ..framework import Plugin, array_column
+from ..framework.typing import ArrayField
+from ..framework.vectors import add_scaled, dot, item, replace, scale
+
+MOST_POINTS = 64
+FLAT = 1e-6  # of the size: points so near to a plane lie in it
+NARROW = 1e-5  # of the size: three points within such a strip span no plane
+FIRST = 5  # row of the first corner; before: the mass centre, three vectors whose products sum to the covariance, and
+# the sides of a box of the same volume: lengths all, so that they stretch as the corners do
+
+plugin = Plugin("convex_hull", version="1.0")
+
+
+def _faces_of(points: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """(which points it has, outward unit normal) of each face: a plane through three of them with none beyond."""
+    triples = np.array(list(itertools.combinations(range(len(points)), 3)), int).reshape(-1, 3)
+    places = points[triples]
+    edges = places - np.roll(places, 1, axis=1)
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    areas = np.linalg.norm(normals, axis=1)
+    order = np.argsort(-areas, kind="stable")  # of all triples of a face the widest gives its normal
+    order = order[areas[order] > NARROW * np.linalg.norm(edges, axis=2).max(axis=1)[order]]
+    normals, triples = normals[order] / areas[order, None], triples[order]
+    heights = normals @ points.T - (normals * points[triples[:, 0]]).sum(axis=1)[:, None]
+    side = np.where((heights <= FLAT).all(axis=1), 1.0, -1.0)
+    left = np.flatnonzero((side[:, None] * heights <= FLAT).all(axis=1))
+    faces = []
+    while len(left):
+        on = np.abs(heights[left[0]]) <= FLAT
+        faces.append((on, side[left[0]] * normals[left[0]]))
+        left = left[~on[triples[left]].all(axis=1)]
+    return faces
+
+
+@functools.lru_cache(maxsize=256)
+def _hull_of(data: bytes) -> np.ndarray | str:
+    """The rows of the hull of points, given as their bytes; or what is wrong with the points."""
+    points = np.frombuffer(data).reshape(-1, 3)
+    if len(points) > MOST_POINTS:
+        return f"must have at most {MOST_POINTS} points"
+    size = np.abs(points).max() or 1.0  # divided by it nothing overflows, at any size
+    size *= np.abs((points - points[0]) / size).max() or 1.0
+    shape, index = np.unique((points - points[0]) / size, axis=0, return_index=True)
+    faces = _faces_of(shape)
+    if not faces or any(on.all() for on, _ in faces):
+        return "must not all lie in a plane"
+    corner = sum(on.astype(int) for on, _ in faces) >= 3  # of fewer faces: inside of one, or of an edge
+    middle = shape[corner].mean(axis=0)
+    triangles = []
+    for on, normal in faces:
+        ring = shape[on & corner] - middle
+        ways = ring - ring.mean(axis=0)
+        ring = ring[np.argsort(np.arctan2(np.cross(ways[0], ways) @ normal, ways @ ways[0]))]
+        triangles += [ring[[0, k, k + 1]] for k in range(1, len(ring) - 1)]
+    a, b, c = np.array(triangles).transpose(1, 0, 2)
+    six = (a * np.cross(b, c)).sum(axis=1)  # times the volumes of the tetrahedra from the middle
+    volume, whole = six.sum() / 6.0, a + b + c
+    centre = six @ whole / (24.0 * volume)
+    means = np.einsum("t,vti,vtj->ij", six, *2 * [np.array((a, b, c, whole))]) / (120.0 * volume)
+    roots = np.linalg.cholesky(means - np.outer(centre, centre))
+    sides = np.diag(roots) * np.cbrt(volume / np.diag(roots).prod())
+    return np.array(
+        (points[0] + (centre + middle) * size, *roots.T * size, sides * size, *points[np.sort(index[corner])])
+    )
+
+
+def _is_hull(rows: np.ndarray) -> bool:
+    """Whether these are the rows of a hull, not points."""
+    if len(rows) < FIRST + 4 or rows[2, 0] != 0.0 or rows[3, :2].any():
+        return False
+    made = _hull_of(rows[FIRST:].tobytes())
+    return (
+        not isinstance(made, str) and made.shape == rows.shape and np.allclose(made, rows, 1e-6, 1e-9 * rows[4].max())
+    )
+
+
+def _wrong_with(rows: np.ndarray) -> str | None:
+    """Why these are neither a hull nor points that have one."""
+    made = None if _is_hull(rows) else _hull_of(rows.tobytes())
+    return made if isinstance(made, str) else None
+
+
+def _rows_of(points: Any) -> Any:
+    """The rows of the hull of points; what has none is left for the column to report."""
+    try:
+        rows = np.array(points, float)
+    except (TypeError, ValueError):
+        return points
+    if rows.ndim != 2 or rows.shape[1] != 3 or len(rows) < 4 or not np.isfinite(rows).all() or _is_hull(rows):
+        return points
+    made = _hull_of(rows.tobytes())
+    return points if isinstance(made, str) else made
+
+
+@plugin.shape(cost=4)
+class ConvexHullCollider(Collider):
+    """The convex hull of some points in a 3D world; it turns with the Transform.
+
+    hull
+        (n, 3) m, 4 to 64 points around the shape's centre, not all in one plane; those inside are left out. Reads as
+        the rows that are stored, which may be given again: five with the mass, then the :attr:`corners`
+    """
+
+    __slots__ = ()
+
+    dimensions: ClassVar[tuple[int, ...]] = (3,)
+    rotates: ClassVar[bool] = True
+
+    hull: ArrayField = array_column(3, rows=(4, 2**31), check=_wrong_with, convert=_rows_of)
+
+    @property
+    def corners(self) -> np.ndarray:
+        """(n, 3) m, the points that the hull needs, in the order in which they were given."""
+        return self.hull[FIRST:]
+
+    @property
+    def centre_of_mass(self) -> np.ndarray:
+        """(3,) m, of the hull filled evenly, relative to the shape's centre."""
+        return self.hull[0]
+
+    @classmethod
+    def sample(cls, **common: Any) -> Self:
+        return cls(
+            ((0.5, 0.0, -0.3), (-0.5, 0.1, -0.4), (0.0, 0.6, -0.3), (0.1, -0.5, -0.2), (0.1, 0.0, 0.5)), **common
+        )
+
+    @staticmethod
+    def bounds(shape, dimensions):
+        reach = 0.0, 0.0, 0.0
+        for j in range(FIRST, len(shape.hull)):
+            for k in range(3):
+                way = 0.0
+                for axis in range(3):
+                    way += shape.hull[j, axis] * item(shape.axes[axis], k)
+                reach = replace(reach, k, max(item(reach, k), abs(way)))
+        return reach
+
+    @staticmethod
+    def support(shape, direction):
+        x, y, z = shape.axes
+        along_x, along_y, along_z = dot(x, direction), dot(y, direction), dot(z, direction)
+        farthest, at = -math.inf, FIRST
+        for j in range(FIRST, len(shape.hull)):
+            reach = shape.hull[j, 0] * along_x + shape.hull[j, 1] * along_y + shape.hull[j, 2] * along_z
+            if reach > farthest:
+                farthest, at = reach, j
+        return add_scaled(add_scaled(scale(x, shape.hull[at, 0]), y, shape.hull[at, 1]), z, shape.hull[at, 2])
+
+    @staticmethod
+    def second_moments(shape, dimensions):
+        """The centre's square and the covariance, sums over the rows before the corners."""
+        volume = shape.hull[4, 0] * shape.hull[4, 1] * shape.hull[4, 2]
+        xx = yy = zz = xy = xz = yz = 0.0
+        for j in range(4):
+            x, y, z = shape.hull[j, 0], shape.hull[j, 1], shape.hull[j, 2]
+            xx, yy, zz, xy, xz, yz = xx + x * x, yy + y * y, zz + z * z, xy + x * y, xz + x * z, yz + y * z
+        return volume, shape.hull[0, 0], shape.hull[0, 1], shape.hull[0, 2], xx, yy, zz, xy, xz, yz
