@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
-from carom.plugins import Physics
+from carom.plugins import Physics, capsule, convex_hull
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 from carom.systems.impacts.turning import impulses_of
 
@@ -100,6 +101,43 @@ def test_a_flat_landing_does_not_turn(mode):
             run(world, 4)
             v, w = motion(world, entity)
         assert (v[1], w) == (4.0 * e, 0.0)
+
+
+HALF, TURNS = np.array((0.5, 0.3, 0.4)), np.arange(6) * math.pi / 3
+OCTAHEDRON = 0.3 * np.stack((math.sqrt(2) * np.cos(TURNS), (-1.0) ** np.arange(6), math.sqrt(2) * np.sin(TURNS)), 1)
+LYING = {
+    "box": BoxCollider(HALF),
+    "hull": convex_hull.ConvexHullCollider(HALF * list(itertools.product((-1, 1), repeat=3))),
+    "capsule": capsule.CapsuleCollider(0.3, 0.5),
+    "octahedron": convex_hull.ConvexHullCollider(OCTAHEDRON),
+}
+
+
+@pytest.mark.parametrize("mode", [pytest.param("discrete", marks=pytest.mark.plain), "continuous", "event_driven"])
+@pytest.mark.parametrize("shape", LYING)
+def test_what_lands_flat_in_space_does_not_turn(shape, mode):
+    """On the ground, at three bounces, and on its like, which is free: with e v, and w = 0 but for rounding. An
+    octahedron lies on three corners, a capsule on its side."""
+    turn = (math.sqrt(0.5), 0, 0, math.sqrt(0.5)) if shape == "capsule" else (math.cos(0.3), 0, math.sin(0.3), 0)
+    plugins = Rotation(), capsule.plugin, convex_hull.plugin
+    cases = ((0.5, 9.81, False), (1.0, 0.0, False), (0.5, 0.0, True))
+    for e, gravity, like in cases[:2] if shape == "octahedron" else cases:  # two of these share a hexagon
+        with World(Physics(3, gravity=(0, -gravity, 0)), *plugins, settings=Settings(collision=mode)) as world:
+            if not like:
+                level = BoxCollider((20, 1, 20), restitution=e)
+                world.create_entity(Transform((0, -1, 0)), RigidBody(kind="static"), level)
+            for k in range(2 if like else 1):
+                body, collider = RigidBody(1.0, (0, (-4.0, 1.0)[k], 0)), LYING[shape].copy()
+                collider.restitution = e
+                place = Transform((1.25, 0.32 - 0.61 * k, 0.37), turn)
+                entity = world.create_entity(place, body, Spin(), collider)
+            for _ in range(40 if gravity else 4):
+                world.step()
+                v, w = motion(world, entity)
+                assert np.abs(w).max() < 1e-12
+            assert not gravity or world.stats().counters["impacts"] == 3
+            if not gravity:
+                assert v[1] == pytest.approx(-2.75 if like else 4.0, rel=1e-12)
 
 
 @pytest.mark.plain
