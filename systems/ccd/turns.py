@@ -9,7 +9,7 @@ from __future__ import annotations
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, length, scale, sub
-from ..shapes.dispatch import evaluate, mix
+from ..shapes.dispatch import evaluate, restitution_of
 from ..shapes.poses import turn_shape
 from ..shapes.tolerances import reach_of, slop_of, smaller_extent
 from .search_bounds import FAST
@@ -28,7 +28,7 @@ def angle_of(bodies, i):
 def turns_far(state, a, b):
     """Whether a pair has to be looked at on its way: one of the two turns by more than a part of the smaller one. Where
     they may bounce, only if it turns by itself: impacts have the others."""
-    bodies, slot, restitution = state.bodies, state.bodies.collider_slot, state.colliders.restitution
+    bodies = state.bodies
     if len(bodies.axes) == 0:
         return False
     way_a, way_b = angle_of(bodies, a) * reach_of(bodies, a), angle_of(bodies, b) * reach_of(bodies, b)
@@ -37,7 +37,7 @@ def turns_far(state, a, b):
         return False
     if (way_a > far and bodies.inverse_mass[a] == 0.0) or (way_b > far and bodies.inverse_mass[b] == 0.0):
         return True
-    return mix(state, state.restitution_rule, restitution[slot[a], a], restitution[slot[b], b]) == 0.0
+    return restitution_of(state, a, b) == 0.0
 
 
 @part

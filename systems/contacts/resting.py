@@ -25,7 +25,7 @@ from ..narrow_phase.manifolds import (
     is_at_manifold,
     make_manifold,
 )  # fmt: skip
-from ..shapes.dispatch import both_convex, mix, mix_friction
+from ..shapes.dispatch import both_convex, friction_of, restitution_of
 from ..shapes.tolerances import (
     SAME_PLACE,
     contact_margin,
@@ -86,9 +86,8 @@ def still_bounces(state, dt, c, depth, normal):
 
     Notes in pairs.parting how it parts.
     """
-    pairs, bodies, restitution = state.pairs, state.bodies, state.colliders.restitution
-    a, b, velocity, slot = pairs.a[c], pairs.b[c], bodies.linear_velocity, bodies.collider_slot
-    e = mix(state, state.restitution_rule, restitution[slot[a], a], restitution[slot[b], b])
+    pairs, bodies, a, b = state.pairs, state.bodies, state.pairs.a[c], state.pairs.b[c]
+    velocity, e = bodies.linear_velocity, restitution_of(state, a, b)
     if not e > 0.0:
         return False
     if e == 1.0 and state.impacts.sweeps and is_rattling(state, a, b):
@@ -208,8 +207,7 @@ def repeat_row(solver, one, k):
 
 def linearise(state, dt):
     """Of each contact at rest the normal and the gap where the step starts, and what the solver needs of its bodies."""
-    pairs, bodies, solver = state.pairs, state.bodies, state.solver
-    friction, slot_of_body, has_friction = state.colliders.friction, bodies.collider_slot, False
+    pairs, bodies, solver, has_friction = state.pairs, state.bodies, state.solver, False
     for r in range(solver.contacts):  # in the order of the pairs, for the caches
         c, k = solver.pair[r], solver.slot[r]
         if solver.point[r] > 0:
@@ -237,7 +235,7 @@ def linearise(state, dt):
         # After an impact at time t the body seems to come from dv t behind: no overlap to be pushed out.
         solver.parting[k] = parting == PARTS or (pairs.impulse[c] > 0.0 and gap > 0.0)
         solver.extent[k] = extent
-        mu = mix_friction(state, state.friction_rule, friction[slot_of_body[a], a], friction[slot_of_body[b], b])
+        mu = friction_of(state, a, b)
         solver.friction[k] = mu
         has_friction |= mu != 0.0
     solver.has_friction = has_friction

@@ -27,7 +27,7 @@ from ..integration.turning import arms_to, closing_by_spin, is_turned
 from ..linking.parts import FIRST_TOUCH, call_first_touch
 from ..narrow_phase.manifolds import is_at_manifold
 from ..narrow_phase.stages import rank_rows
-from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, mix, mix_friction
+from ..shapes.dispatch import both_convex, evaluate, friction_of, is_corner_touch, restitution_of
 from ..shapes.tolerances import contact_margin, is_turning, slop_of, smaller_extent, turning_travel
 from .heap import heap_push
 from .impulses import BOUNCE, CROSS, FREE, SLIDE, STOP, STOPPED, TOUCHDOWN, is_deflected, is_rattling
@@ -231,9 +231,7 @@ def queue_event(state, c, kind, path, touch, speed, restitution):
     """Put an event into the queue."""
     impacts, pairs, bodies, (t, normal, point, _) = state.impacts, state.pairs, state.bodies, touch
     a, b = pairs.a[c], pairs.b[c]
-    slot, change, pull = bodies.collider_slot, -(1.0 + restitution) * speed, zero_of(state)
-    friction = state.colliders.friction
-    mu = mix_friction(state, state.friction_rule, friction[slot[a], a], friction[slot[b], b])
+    change, pull, mu = -(1.0 + restitution) * speed, zero_of(state), friction_of(state, a, b)
     if state.spinning and kind != CROSS:
         change, pull = respond(state, (a, b), touch, (rate_along(path, t), speed), restitution, mu)
     elif mu > 0.0:  # Coulomb: stops what slides, with at most mu times the normal impulse
@@ -266,8 +264,7 @@ def queue_next_impact(state, c, since, dt):
     turns = state.spinning and is_turning(state, dt, a, b)
     if impacts.sweeps and not turns and bounds_stay_disjoint(state, a, b, path, since, dt):
         return
-    slot, restitutions = bodies.collider_slot, state.colliders.restitution
-    e = mix(state, state.restitution_rule, restitutions[slot[a], a], restitutions[slot[b], b])
+    e = restitution_of(state, a, b)
     rested = pairs.early[c] and not passive and e < 1.0 and not turns
     if rested and is_at_manifold(pairs, c, along(path, dt), smaller_extent(bodies, a, b)):  # it stays there
         return

@@ -18,7 +18,7 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, scale, sub
 from ..integration.trajectory import rate_along, relative_path
 from ..integration.turning import compliance, is_turned, velocity_by_spin
-from ..shapes.dispatch import mix_friction
+from ..shapes.dispatch import friction_of
 from .exact_sum import exact_sum
 from .impulses import FREE, deflect, log_impact, stands_still
 from .turning import arms_of, turn_by_impact
@@ -203,13 +203,12 @@ def solve_friction(state, count):
     Bodies are taken to be split among their impacts, so that these together never do more than stop what slides.
     """
     impacts, pairs, rubs = state.impacts, state.pairs, False
-    friction, slot, inverse_mass = state.colliders.friction, state.bodies.collider_slot, state.bodies.inverse_mass
+    inverse_mass = state.bodies.inverse_mass
     for g in range(count):
         m = impacts.group[g]
         c = impacts.event_pair[impacts.member[m]]
         a, b, normal = pairs.a[c], pairs.b[c], impacts.event_normal[impacts.member[m]]
-        mu = mix_friction(state, state.friction_rule, friction[slot[a], a], friction[slot[b], b])
-        impacts.friction_impulse[m] = zero_of(state)
+        mu, impacts.friction_impulse[m] = friction_of(state, a, b), zero_of(state)
         if mu > 0.0 and impacts.ahead[m] > 0.0:
             w = rate_along(relative_path(state, a, b), impacts.now)
             w = add(w, sub(impacts.gained[b], impacts.gained[a]))

@@ -36,13 +36,22 @@ def mix(state, rule, a, b):
 
 
 @inlined
-def mix_friction(state, rule, a, b):
-    """The contact's friction. NaN: use the other body's coefficient; 0 if neither has one."""
-    if a != a:
-        a = b
-    if b != b:
-        b = a
-    return mix(state, rule, a, b) if a == a else 0.0
+def restitution_of(state, a, b):
+    """The restitution of a contact of bodies a and b."""
+    of, slot = state.colliders.restitution, state.bodies.collider_slot
+    return mix(state, state.restitution_rule, of[slot[a], a], of[slot[b], b])
+
+
+@inlined
+def friction_of(state, a, b):
+    """Its friction. NaN: use the other body's coefficient; 0 if neither has one."""
+    of, slot = state.colliders.friction, state.bodies.collider_slot
+    one, other = of[slot[a], a], of[slot[b], b]
+    if one != one:
+        one = other
+    if other != other:
+        other = one
+    return mix(state, state.friction_rule, one, other) if one == one else 0.0
 
 
 @lru_cache(maxsize=CACHE_SIZE)
