@@ -319,7 +319,6 @@ IMPACTS = Schema(
     rounds=integer(),  # of pairs for what is left of the step
     halted=integer(),  # bodies that were stopped because these were too many,
     halted_row=integer(),  # and the first of them
-    crossings=integer(),
 )  # fmt: skip
 
 # Contacts at the end of the step and of the one before: [now, i] and [1 - now, i].

@@ -12,7 +12,7 @@ from __future__ import annotations
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ..codes import NEED_EVENTS, NEED_MERGED, OK
-from ..impacts.heap import heap_push
+from ..impacts.heap import heap_push, holds
 from ..impacts.worklist import lacks_room, list_pair
 from ..narrow_phase.manifolds import forget_manifold
 from ..narrow_phase.stages import is_solid_pair, layers_meet, rank_rows
@@ -72,13 +72,12 @@ def renumber(state):
 @part
 def keep_events(state):
     """The queue again, without the events of pairs that are gone, and those that do not hold any more."""
-    old, impacts, count = state.pairs, state.impacts, state.bodies.impact_count
+    old, impacts = state.pairs, state.impacts
     waiting, impacts.waiting = impacts.waiting, 0
     for k in range(waiting):
         event = impacts.heap[k]
         c = impacts.event_pair[event]
-        holds = impacts.event_count_a[event] == count[old.a[c]] and impacts.event_count_b[event] == count[old.b[c]]
-        if holds and old.place[c] >= 0:
+        if holds(state, event) and old.place[c] >= 0:
             impacts.event_pair[event] = old.place[c]
             place = impacts.waiting
             impacts.heap[k], impacts.heap[place] = impacts.heap[place], event

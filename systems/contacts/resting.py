@@ -10,8 +10,7 @@ from ...framework.vectors import add_scaled, dot, item, length, replace, sub
 from ..ccd.search_bounds import FAST, is_swept
 from ..ccd.turns import first_touch_of_turn, turns_far
 from ..codes import OK
-from ..impacts.find import is_beyond_cap
-from ..impacts.impulses import STOPPED, is_rattling
+from ..impacts.impulses import STOPPED, is_beyond_cap, is_rattling
 from ..integration.turning import arms_to, closing_by_spin
 from ..narrow_phase.manifolds import (
     centre_offset,

@@ -30,15 +30,13 @@ from ..narrow_phase.stages import rank_rows
 from ..shapes.dispatch import both_convex, evaluate, friction_of, is_corner_touch, restitution_of
 from ..shapes.tolerances import contact_margin, is_turning, slop_of, smaller_extent, turning_travel
 from .heap import heap_push
-from .impulses import BOUNCE, CROSS, FREE, SLIDE, STOP, STOPPED, TOUCHDOWN, is_deflected, is_rattling
+from .impulses import CROSSING, HAND_OVER, IMPACT, NONE, STOPPED, is_beyond_cap, is_deflected, is_rattling
 from .turning import respond
 
 QUICK = 1e-3  # of the step: inelastic impacts closer than this in time are treated as inelastic collapse
 MOST_PLASTIC = 1000  # impacts of a body in a step after which those beyond the cap are none any more
-MOST_LOOKS = 16_000_000  # at pairs in a step, of elastic impacts too: some seconds, then what meets is stopped
 
 NO_TOUCH, OVERLAPS_AT_END, SWEPT = range(3)
-NONE, LANDING, IMPACT = range(3)  # a landing is too slow to bounce
 
 
 @part
@@ -154,7 +152,7 @@ def passes_unseen(state, a, b, path, touch, dt):
 
 @part
 def closing_speed(state, a, b, path, touch, kind, dt):
-    """Of a solid pair: (NONE, LANDING or IMPACT, speed along the normal)."""
+    """Of a solid pair: (NONE, HAND_OVER if it lands, too slow to bounce, or IMPACT; speed along the normal)."""
     bodies, impacts, (t, normal, point, apart) = state.bodies, state.impacts, touch
     speed = dot(rate_along(path, t), normal)
     if state.spinning:
@@ -163,7 +161,7 @@ def closing_speed(state, a, b, path, touch, kind, dt):
     if impacts.sweeps:  # else a plastic impact would be one again, by a rounding error
         rounding = ROUNDING * (length(bodies.path_velocity[a]) + length(bodies.path_velocity[b]))
     if not speed < -(threshold + rounding):  # a contact at rest
-        return LANDING if passes_unseen(state, a, b, path, touch, dt) else NONE, speed
+        return HAND_OVER if passes_unseen(state, a, b, path, touch, dt) else NONE, speed
     warm_started = kind == SWEPT and (bodies.warm_started[a] or bodies.warm_started[b])
     if warm_started and is_held_by_edge(state, a, b, path, touch, speed, dt):
         return NONE, speed
@@ -186,44 +184,23 @@ def correct_speed(state, a, b, touch, speed, dt):
 
 @part
 def kind_beyond_cap(state, a, b, path, t, speed, restitution, dt):
-    """What becomes of a pair of which a body has had all the impacts it may have: STOP or SLIDE; BOUNCE, once more, but
-    without restitution, if impacts that lose energy follow each other at once; -1: none, it is left."""
+    """What becomes of a pair of which a body has had all the impacts it may have: HAND_OVER; IMPACT, once more, but
+    without restitution, if impacts that lose energy follow each other at once; NONE, if it goes too little further."""
     bodies = state.bodies
     count, inverse_mass = bodies.impact_count, bodies.inverse_mass
     still = (count[a] >= STOPPED or inverse_mass[a] == 0.0) and (count[b] >= STOPPED or inverse_mass[b] == 0.0)
     sinks = -speed * (dt - t) > slop_of(state, a, b)
     if still or not sinks:
-        return -1
+        return NONE
     far = travel_of(path, dt - t) > FAST * smaller_extent(bodies, a, b)
     if not (far or is_deflected(state, a) or is_deflected(state, b)):
-        return -1
+        return NONE
     if restitution == 1.0 and is_rattling(state, a, b):
-        return SLIDE
+        return HAND_OVER
     since_last = t - max(bodies.last_impact[a], bodies.last_impact[b])
     collapse = restitution <= 0.0 or (restitution < 1.0 and since_last <= QUICK * dt)
     collapse |= state.mode == EVENT_DRIVEN and since_last <= 0.0
-    return BOUNCE if collapse and max(count[a], count[b]) < MOST_PLASTIC else STOP
-
-
-@part
-def counts_for_cap(state, a, b, t, restitution):
-    """BOUNCE or FREE: in an event-driven world an elastic impact is not counted, unless something drives the bodies or
-    no time has passed, so that it need not end."""
-    bodies = state.bodies
-    inverse_mass, path, last = bodies.inverse_mass, bodies.path_velocity, bodies.last_impact
-    if not (state.impacts.sweeps and state.mode == EVENT_DRIVEN and restitution == 1.0):
-        return BOUNCE
-    driven = (inverse_mass[a] == 0.0 and length(path[a]) > 0.0) or (inverse_mass[b] == 0.0 and length(path[b]) > 0.0)
-    return BOUNCE if driven or t <= last[a] or t <= last[b] else FREE
-
-
-@part
-def is_beyond_cap(state, a, b):
-    """Whether one of the two has had all the impacts it may have in a step."""
-    counted, cap = state.bodies.counted_impacts, state.max_impacts
-    if state.impacts.sweeps and is_rattling(state, a, b):
-        return True
-    return counted[a] >= cap or counted[b] >= cap or state.impacts.looked >= MOST_LOOKS
+    return IMPACT if collapse and max(count[a], count[b]) < MOST_PLASTIC else HAND_OVER
 
 
 @part
@@ -232,7 +209,7 @@ def queue_event(state, c, kind, path, touch, speed, restitution):
     impacts, pairs, bodies, (t, normal, point, _) = state.impacts, state.pairs, state.bodies, touch
     a, b = pairs.a[c], pairs.b[c]
     change, pull, mu = -(1.0 + restitution) * speed, zero_of(state), friction_of(state, a, b)
-    if state.spinning and kind != CROSS:
+    if state.spinning and kind != CROSSING:
         change, pull = respond(state, (a, b), touch, (rate_along(path, t), speed), restitution, mu)
     elif mu > 0.0:  # Coulomb: stops what slides, with at most mu times the normal impulse
         w = rate_along(path, t)
@@ -268,8 +245,8 @@ def queue_next_impact(state, c, since, dt):
     rested = pairs.early[c] and not passive and e < 1.0 and not turns
     if rested and is_at_manifold(pairs, c, along(path, dt), smaller_extent(bodies, a, b)):  # it stays there
         return
-    kind, touch = find_touch(state, c, a, b, path, since, e, dt)
-    if kind == NO_TOUCH:
+    found, touch = find_touch(state, c, a, b, path, since, e, dt)
+    if found == NO_TOUCH:
         return
     t, normal, point, apart = touch
     w = rate_along(path, t)
@@ -278,27 +255,19 @@ def queue_next_impact(state, c, since, dt):
             return
         normal = divided(negative(w), length(w))  # no direction between the centres: they part the way they came
     touch = (t, normal, point, apart)
-    speed, approach = dot(w, normal), IMPACT
+    speed, kind = dot(w, normal), CROSSING
     if not passive:
-        approach, speed = closing_speed(state, a, b, path, touch, kind, dt)
-        if approach == NONE:
-            return
-        e = 0.0 if approach == LANDING else e
-    if state.path_degree == 1 and e != 1.0 and approach == IMPACT:
+        kind, speed = closing_speed(state, a, b, path, touch, found, dt)
+        e = 0.0 if kind == HAND_OVER else e
+    if state.path_degree == 1 and e != 1.0 and kind == IMPACT:
         speed = correct_speed(state, a, b, touch, speed, dt)
-        if impacts.sweeps and not passive:
+        if impacts.sweeps:
             rounding = ROUNDING * (length(bodies.path_velocity[a]) + length(bodies.path_velocity[b]))
             if not speed < -rounding:  # not in the flight
                 return
-    event_kind = CROSS if passive else counts_for_cap(state, a, b, t, e)
-    if approach == LANDING:
-        event_kind = TOUCHDOWN
-    if not passive and is_beyond_cap(state, a, b):
-        event_kind = -1
-        if impacts.sweeps:
-            event_kind = kind_beyond_cap(state, a, b, path, t, speed, e, dt)
-        impacts.capped += event_kind in (-1, BOUNCE)
-        if event_kind < 0:
-            return
-        e = 0.0 if event_kind == BOUNCE else e
-    queue_event(state, c, event_kind, path, touch, speed, e)
+    if kind not in (CROSSING, NONE) and is_beyond_cap(state, a, b):
+        kind = kind_beyond_cap(state, a, b, path, t, speed, e, dt) if impacts.sweeps else NONE
+        impacts.capped += kind != HAND_OVER
+        e = 0.0 if kind == IMPACT else e
+    if kind != NONE:
+        queue_event(state, c, kind, path, touch, speed, e)

@@ -20,7 +20,7 @@ from ..integration.trajectory import rate_along, relative_path
 from ..integration.turning import compliance, is_turned, velocity_by_spin
 from ..shapes.dispatch import friction_of
 from .exact_sum import exact_sum
-from .impulses import FREE, deflect, log_impact, stands_still
+from .impulses import deflect, is_counted, log_impact, stands_still
 from .turning import arms_of, turn_by_impact
 
 PASSES, LEAST_PASSES = 1000, 8  # over the impacts of a group
@@ -253,7 +253,7 @@ def push_group(state, count, dt):
                 deflect(state, i, impacts.gained[i], impacts.now, dt)
             if inverse_mass[i] > 0.0 and impacts.ahead[m] > 0.0:
                 bodies.impact_count[i] += 1
-                bodies.counted_impacts[i] += 0 if impacts.event_kind[event] == FREE else 1
+                bodies.counted_impacts[i] += is_counted(state, event)
         if impacts.ahead[m] > 0.0:
             impacts.event_time[event] = impacts.now
             log_impact(state, event, impacts.ahead[m])

@@ -16,6 +16,14 @@ def earlier(impacts, i, j):
 
 
 @part
+def holds(state, event):
+    """Whether neither body has had an impact since the event was made."""
+    impacts, pairs, count = state.impacts, state.pairs, state.bodies.impact_count
+    c = impacts.event_pair[event]
+    return impacts.event_count_a[event] == count[pairs.a[c]] and impacts.event_count_b[event] == count[pairs.b[c]]
+
+
+@part
 def heap_push(impacts):
     """Add the event in place heap[waiting], which was free."""
     heap, child = impacts.heap, impacts.waiting

@@ -1,4 +1,4 @@
-"""What an impact does to its bodies: an impulse; beyond the cap of impacts, standing still.
+"""What an impact does to its bodies: an impulse; where it is left to the solver, sliding or standing still.
 
 A body's path within the step is x(t) = origin + p1 t + p2 t^2 + p3 t^3. An impact at time t changes the velocity by
 dv; the path becomes the one of a body that has travelled with dv all along and stood at origin - dv t at the start, so
@@ -15,13 +15,14 @@ from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST
 from ..integration.trajectory import along, path_of, rate_along
 from ..narrow_phase.manifolds import forget_manifold
-from .turning import arms_of, turn_by_impact
+from ..shapes.dispatch import restitution_of
+from .turning import arms_of, mill_speed, turn_by_impact
 
 STOPPED = 1 << 30  # added to a body's impacts: it moves no more in this step, and the solver leaves it alone
 
-# Kinds of events: an impact, one that no cap counts, one that is too slow to bounce, one beyond the cap, a crossing of
-# what does not push, and one of what is caught between two walls.
-BOUNCE, FREE, TOUCHDOWN, STOP, CROSS, SLIDE = range(6)
+# Events: an impact; a crossing of what does not push; a touch from which on the solver has the two. Else: none.
+IMPACT, CROSSING, HAND_OVER, NONE = range(4)
+MOST_LOOKS = 16_000_000  # at pairs in a step, of elastic impacts too: some seconds, then what meets is stopped
 FEW, CAUGHT = 16, 1000  # impacts of a body in a step, one after the other with what stands still
 
 
@@ -70,13 +71,28 @@ def stands_still(bodies, i):
 
 
 @part
+def is_counted(state, event):
+    """Whether the cap counts an impact: in an event-driven world an elastic one only if something drives the bodies or
+    no time has passed, so that it need not end."""
+    impacts, last = state.impacts, state.bodies.last_impact
+    if not (impacts.sweeps and state.mode == EVENT_DRIVEN and impacts.event_kind[event] == IMPACT):
+        return True
+    c, t, inverse_mass = impacts.event_pair[event], impacts.event_time[event], state.bodies.inverse_mass
+    a, b = state.pairs.a[c], state.pairs.b[c]
+    if restitution_of(state, a, b) != 1.0 or t <= last[a] or t <= last[b]:
+        return True
+    one = a if inverse_mass[a] == 0.0 else b
+    return inverse_mass[one] == 0.0 and not stands_still(state.bodies, one)
+
+
+@part
 def bounce(state, event, dt):
     """One impact: both bodies get their impulse now, and the rest of the step with the new velocities."""
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
     c = impacts.event_pair[event]
     a, b, now = pairs.a[c], pairs.b[c], impacts.event_time[event]
     inverse_mass = bodies.inverse_mass
-    mass = 1.0 / (inverse_mass[a] + inverse_mass[b])
+    mass, counted = 1.0 / (inverse_mass[a] + inverse_mass[b]), is_counted(state, event)
     # of the bodies' relative velocity, with what friction adds to it
     change = add(scale(impacts.event_normal[event], impacts.event_change[event]), impacts.event_pull[event])
     if state.spinning:
@@ -86,7 +102,7 @@ def bounce(state, event, dt):
         i = a if side == 0 else b
         if inverse_mass[i] > 0.0:  # what cannot be moved is as it was: its other impacts stand, and no cap is on it
             bodies.impact_count[i] += 1
-            bodies.counted_impacts[i] += 0 if impacts.event_kind[event] == FREE else 1
+            bodies.counted_impacts[i] += counted
             if impacts.sweeps:
                 bodies.caught[i] = bodies.caught[i] + 1 if stands_still(bodies, a + b - i) else 0
             deflect(state, i, scale(change, (-mass if side == 0 else mass) * inverse_mass[i]), now, dt)
@@ -109,6 +125,15 @@ def is_rattling(state, a, b):
     bodies, caught = state.bodies, state.bodies.caught
     most = CAUGHT if state.mode == EVENT_DRIVEN else max(FEW, min(CAUGHT, state.max_impacts))
     return (caught[a] >= most and stands_still(bodies, b)) or (caught[b] >= most and stands_still(bodies, a))
+
+
+@part
+def is_beyond_cap(state, a, b):
+    """Whether one of the two has had all the impacts it may have in a step."""
+    counted, cap = state.bodies.counted_impacts, state.max_impacts
+    if state.impacts.sweeps and is_rattling(state, a, b):
+        return True
+    return counted[a] >= cap or counted[b] >= cap or state.impacts.looked >= MOST_LOOKS
 
 
 @part
@@ -141,3 +166,36 @@ def slide(state, i, normal, rate, dt):
     if state.path_degree > 1:
         bodies.path_second[i], bodies.path_third[i] = x2, x3
     bodies.impact_count[i] += 1
+
+
+@part
+def lands(state, event):
+    """Whether an event is a landing: too slow to bounce, where impacts are left."""
+    impacts, pairs = state.impacts, state.pairs
+    c = impacts.event_pair[event]
+    return impacts.event_kind[event] == HAND_OVER and not is_beyond_cap(state, pairs.a[c], pairs.b[c])
+
+
+@part
+def hand_over(state, event, dt):
+    """Leave a touch to the solver. What lands loses its approach and slides along what cannot be moved, as does what is
+    caught there; what else is beyond the cap stays where it is."""
+    impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
+    c = impacts.event_pair[event]
+    a, b = pairs.a[c], pairs.b[c]
+    landing = lands(state, event)
+    if landing:
+        bounce(state, event, dt)
+    else:
+        impacts.capped += 1
+    if landing or (restitution_of(state, a, b) == 1.0 and is_rattling(state, a, b)):
+        if bodies.inverse_mass[a] * bodies.inverse_mass[b] == 0.0:
+            rate = mill_speed(state, event) if state.spinning else 0.0
+            slide(state, a if bodies.inverse_mass[a] > 0.0 else b, impacts.event_normal[event], rate, dt)
+        return
+    pairs.crossed[c] = True
+    forget_manifold(pairs, c)
+    for side in range(2):
+        i = a if side == 0 else b
+        if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] < STOPPED:
+            stop(state, i, impacts.now)

@@ -9,14 +9,11 @@ from ...framework.jit.records.record_type import request
 from ..ccd.search_bounds import FAST
 from ..codes import NEED_EVENTS, NEED_IMPACTS, OK, REFRESH_PAIRS
 from ..linking.parts import FIRST_TOUCH, TAKE_TOGETHER, call_take_together
-from ..narrow_phase.manifolds import forget_manifold
 from ..narrow_phase.stages import find_hasty
-from .bounds_exit import update_bounds_exit_time
 from .find import queue_next_impact
-from .heap import heap_pop
-from .impulses import CROSS, SLIDE, STOPPED, TOUCHDOWN, bounce, slide, stop
-from .together import EQUAL, holds, put_back
-from .turning import mill_speed
+from .heap import heap_pop, holds
+from .impulses import CROSSING, IMPACT, STOPPED, bounce, hand_over, lands, stop
+from .together import EQUAL, put_back
 from .worklist import lacks_room, list_contacts, list_landings, list_neighbours, list_pair, list_pairs_of
 
 BLOCK = 256  # bodies that are looked at before one that bounces is enough
@@ -50,7 +47,7 @@ def may_sink(state, dt):
 def begin_impacts(state, dt):
     """No impact has happened yet; the first search is among what may have met."""
     impacts, bodies, pairs = state.impacts, state.bodies, state.pairs
-    impacts.logged = impacts.capped = impacts.crossings = impacts.group_visits = 0
+    impacts.logged = impacts.capped = impacts.group_visits = 0
     impacts.rounds = impacts.halted = impacts.looked = 0
     impacts.active = False
     if state.response_idle:
@@ -106,39 +103,13 @@ def next_event(state):
 
 
 @part
-def take_swept_event(state, event, dt):
-    """Carry out what happens to swept bodies alone: a crossing, standing still, sliding."""
-    impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
-    c, kind = impacts.event_pair[event], impacts.event_kind[event]
-    if kind == CROSS:
-        pairs.crossed[c] = True
-        impacts.crossings += 1
-        return
-    if kind in (SLIDE, TOUCHDOWN):
-        impacts.capped += 1 if kind == SLIDE else 0
-        a, b = pairs.a[c], pairs.b[c]
-        if bodies.inverse_mass[a] * bodies.inverse_mass[b] == 0.0:
-            rate = mill_speed(state, event) if state.spinning else 0.0
-            slide(state, a if bodies.inverse_mass[a] > 0.0 else b, impacts.event_normal[event], rate, dt)
-    else:
-        impacts.capped += 1
-        pairs.crossed[c] = True
-        forget_manifold(pairs, c)
-        for side in range(2):
-            i = pairs.a[c] if side == 0 else pairs.b[c]
-            if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] < STOPPED:
-                stop(state, i, impacts.now)
-    list_neighbours(state, c)
-
-
-@part
 def touches_down_first(state, event):
     """Whether a body of this impact may have to land on something thin before: then that is searched, and the impact
     once more."""
     impacts = state.impacts
-    c, kind, now = impacts.event_pair[event], impacts.event_kind[event], impacts.event_time[event]
+    c, now = impacts.event_pair[event], impacts.event_time[event]
     looked, impacts.touchdown_time = impacts.touchdown_pair == c, 0.0
-    if looked or not impacts.may_sink or kind in (TOUCHDOWN, CROSS):
+    if looked or not impacts.may_sink or impacts.event_kind[event] == CROSSING or lands(state, event):
         return False
     list_landings(state, c, now)
     if impacts.listed == 0:
@@ -151,30 +122,26 @@ def touches_down_first(state, event):
 @part
 def take_event(state, event, dt):
     """Carry an event out, with all impacts at the same time; a code if these need something first."""
-    impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
+    impacts = state.impacts
     if touches_down_first(state, event):
         return OK
     c, kind = impacts.event_pair[event], impacts.event_kind[event]
     impacts.now = impacts.event_time[event]
-    if kind > TOUCHDOWN:
-        take_swept_event(state, event, dt)
+    if kind == CROSSING:
+        state.pairs.crossed[c] = True
         return OK
-    if kind != TOUCHDOWN and impacts.waiting > 0 and impacts.event_time[impacts.heap[0]] - impacts.now <= EQUAL * dt:
+    if kind == IMPACT and impacts.waiting > 0 and impacts.event_time[impacts.heap[0]] - impacts.now <= EQUAL * dt:
         if state.links[TAKE_TOGETHER] == 0:
             put_back(impacts, event)
             return NEED_IMPACTS
         taken = call_take_together(state.links[TAKE_TOGETHER], state, event, dt)
         if taken >= 0:
             return taken
-    bounce(state, event, dt)
-    if kind == TOUCHDOWN:
-        take_swept_event(state, event, dt)
+    if kind == IMPACT:
+        bounce(state, event, dt)
     else:
-        list_neighbours(state, c)
-    for side in range(2 if impacts.sweeps else 0):
-        i = pairs.a[c] if side == 0 else pairs.b[c]
-        if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] < STOPPED:
-            update_bounds_exit_time(state, i, dt)
+        hand_over(state, event, dt)
+    list_neighbours(state, c, dt)
     return OK
 
 
@@ -199,7 +166,7 @@ def request_bodies(state, c):
 
 
 @part
-def halt(state):
+def halt(state, dt):
     """Too many rounds: what impacts have sent elsewhere stays where it is until the step ends; others may meet it."""
     impacts, bodies = state.impacts, state.bodies
     impacts.now = impacts.until
@@ -209,7 +176,7 @@ def halt(state):
                 impacts.halted_row = i
             impacts.halted += 1
             stop(state, i, impacts.now)
-            list_pairs_of(state, i, -1)
+            list_pairs_of(state, i, -1, dt)
     impacts.until = math.inf
 
 
@@ -248,7 +215,7 @@ def resolve_impacts(state, dt):
             impacts.rounds += 1
             if impacts.rounds <= MOST_ROUNDS:
                 return REFRESH_PAIRS
-            halt(state)
+            halt(state, dt)
         else:
             break
     if impacts.logged > 0:

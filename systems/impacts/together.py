@@ -14,21 +14,12 @@ from ...framework.vectors import dot
 from ..ccd.time_of_impact import clear_of_rounding
 from ..codes import NEED_EVENTS, OK
 from ..integration.trajectory import rate_along, relative_path
-from .bounds_exit import update_bounds_exit_time
 from .group import WORK, is_affordable, push_group, shoots, solve_group, turns
-from .heap import heap_pop, heap_push
-from .impulses import BOUNCE, CROSS, FREE, bounce
+from .heap import heap_pop, heap_push, holds
+from .impulses import HAND_OVER, IMPACT, bounce
 from .worklist import list_landings, list_pairs_of
 
 EQUAL = 1e-6  # of the step: times that differ by more are never the same, however slow the approach
-
-
-@part
-def holds(state, event):
-    """Whether neither body has had an impact since the event was made."""
-    impacts, pairs, count = state.impacts, state.pairs, state.bodies.impact_count
-    c = impacts.event_pair[event]
-    return impacts.event_count_a[event] == count[pairs.a[c]] and impacts.event_count_b[event] == count[pairs.b[c]]
 
 
 @part
@@ -49,25 +40,22 @@ def is_at(state, event, now, dt):
 def next_at(state, now, dt):
     """The earliest impact in the queue that holds, if its time is ``now``, else -1; it stays there. Crossings before it
     are noted, as they change no path."""
-    impacts, pairs = state.impacts, state.pairs
+    impacts = state.impacts
     while impacts.waiting > 0:
         event = impacts.heap[0]
         c, kind, time = impacts.event_pair[event], impacts.event_kind[event], impacts.event_time[event]
         if time - now > EQUAL * dt or (impacts.sweeps and time > impacts.until):
             return -1
-        if holds(state, event) and kind != CROSS:
-            if kind not in (BOUNCE, FREE) or not is_at(state, event, now, dt):
+        if holds(state, event):
+            if kind == HAND_OVER or not is_at(state, event, now, dt):
                 return -1
-            if not impacts.may_sink:
-                return event
-            list_landings(state, c, time)
-            sinks, impacts.listed = impacts.listed > 0, 0
-            return -1 if sinks else event
-        if kind == CROSS and holds(state, event) and is_at(state, event, now, dt):
-            pairs.crossed[c] = True
-            impacts.crossings += 1
-        elif kind == CROSS and holds(state, event):
-            return -1
+            if kind == IMPACT:
+                if not impacts.may_sink:
+                    return event
+                list_landings(state, c, time)
+                sinks, impacts.listed = impacts.listed > 0, 0
+                return -1 if sinks else event
+            state.pairs.crossed[c] = True
         heap_pop(impacts)
     return -1
 
@@ -207,7 +195,5 @@ def take_group(state, m, dt):
                 continue
             if impacts.first_member[i] >= 0:
                 impacts.first_member[i] = -1  # once each
-                list_pairs_of(state, i, listed)
-                if impacts.sweeps:
-                    update_bounds_exit_time(state, i, dt)
+                list_pairs_of(state, i, listed, dt)
             listed = c

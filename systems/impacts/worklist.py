@@ -6,9 +6,10 @@ It begins with what may have met; each event adds the pairs of the bodies that i
 from __future__ import annotations
 
 from ...framework.compilation import inlined, part
-from ..ccd.search_bounds import FAST
+from ..ccd.search_bounds import FAST, leaves_bounds_at
 from ..shapes.tolerances import smaller_extent
 from .find import bounce_threshold
+from .impulses import STOPPED
 
 
 @part
@@ -57,9 +58,12 @@ def link_pairs(state):
 
 
 @part
-def list_pairs_of(state, i, but):
-    """The pairs of body i, but for one, from now on."""
-    impacts = state.impacts
+def list_pairs_of(state, i, but, dt):
+    """Body i goes on from an impact: list its pairs but one from now on, and note when it may leave its bounds."""
+    impacts, bodies = state.impacts, state.bodies
+    if impacts.sweeps and bodies.impact_count[i] < STOPPED:
+        bodies.last_impact[i] = impacts.now
+        impacts.until = min(impacts.until, leaves_bounds_at(state, i, impacts.now, dt))
     if not impacts.linked:
         link_pairs(state)
     entry = impacts.heads[i]
@@ -70,13 +74,13 @@ def list_pairs_of(state, i, but):
 
 
 @part
-def list_neighbours(state, c):
+def list_neighbours(state, c, dt):
     """The pairs of the two bodies of pair c that can be moved."""
     listed = -1
     for side in range(2):
         i = state.pairs.a[c] if side == 0 else state.pairs.b[c]
         if state.bodies.inverse_mass[i] > 0.0:
-            list_pairs_of(state, i, listed)
+            list_pairs_of(state, i, listed, dt)
             listed = c
 
 
