@@ -22,9 +22,10 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import absolute, add, add_scaled, dot, item, length, scale, sub
 from ..integration.trajectory import ROUNDING, along, bend_of, first_root, rate_along
+from ..integration.turning import is_turned
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, sweep
 from ..shapes.tolerances import is_turning, smaller_extent
-from .turning_touch import touch_of_turning
+from .turning_touch import NEAR, closing_point, touch_of_turning
 
 MOST_STRIDES = 4096  # looks at concave shapes in a step
 LOOKS = 100  # a graze takes about 30; whatever is still closing in after that counts as touching
@@ -76,7 +77,11 @@ def first_touch(state, a, b, path, straight, since, until, limits):
     if known and not met:  # most pairs
         zero = zero_of(state)
         return APART, t, zero, zero, zero
-    return advance(state, a, b, path, (straight, known), (since, t), until, limits[0])
+    found, t, normal, point, at = advance(state, a, b, path, (straight, known), (since, t), until, limits[0])
+    if state.spinning and found == TOUCHES and (is_turned(state.bodies, a) or is_turned(state.bodies, b)):
+        near = NEAR * smaller_extent(state.bodies, a, b)
+        _, point = closing_point(state, a, b, at, (0.0, normal, point), near, rate_along(path, t))
+    return found, t, normal, point, at
 
 
 @part

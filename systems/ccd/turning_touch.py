@@ -26,14 +26,14 @@ GRAZE = 0.125  # slops: as far as points move between looks at a pair that touch
 
 
 @part
-def closing_point(state, a, b, d, met, within, velocity):
+def closing_point(state, a, b, d, met, near, velocity):
     """(how fast the gap grows there, point): the middle of those points in which the two touch that approach; that of
-    the pair if none does, and in a plane if all do: it is in their middle, to the bit. met, within: see
-    :func:`~.points.contact_points`; velocity: of b's body as a's sees it."""
+    the pair if none does, and in a plane if all do: it is in their middle, to the bit. met: (depth,
+    normal, point) as the pair's function answers; velocity: of b's body as a's sees it."""
     bodies, (_, normal, point) = state.bodies, met
     places, gaps = stack_array(MOST_POINTS, d), stack_array(MOST_POINTS, 0.0)
     speed, middle, closing = dot(velocity, normal), scale(d, 0.0), 0
-    count = contact_points(state, (a, b), d, met, within, places, gaps)
+    count = contact_points(state, (a, b), d, met, (near, TILT), places, gaps)
     for k in range(count):
         place = row(places, k, d)
         if speed + closing_by_spin(bodies, a, b, arms_to(bodies, a, b, normal, place, d), normal) < 0.0:
@@ -66,7 +66,7 @@ def touch_of_turning(state, a, b, path, since, until, limits):
         near = graze if look == EXACT_LOOKS else near
         fastest, touches = turning + length(w) + bend * (until - t), -depth <= near
         if touches:
-            rate, point = closing_point(state, a, b, d, (depth, normal, point), (near, TILT), w)
+            rate, point = closing_point(state, a, b, d, (depth, normal, point), near, w)
             closes = rate < 0.0 and (rate < -threshold or not found)
             if closes and (corners or not is_corner_touch(state, shape_a, a, shape_b, b, d, slop)):
                 touch, found = (t, normal, point, d), True

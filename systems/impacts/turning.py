@@ -5,8 +5,7 @@ point change in proportion to it (E. J. Routh, 1905). Restitution is that of ene
 times that of the compression (W. J. Stronge, 1990), so that energy never grows. Newton's rule, the same where an
 impulse along the normal makes nothing slide, gains with friction elsewhere.
 
-In space friction acts along one direction, that of the slip halfway through the impact without friction. There the
-point of faces that lie on each other is the middle of what they share; in a plane that of the pair is it already.
+In space friction acts along one direction, that of the slip halfway through the impact without friction.
 """
 
 from __future__ import annotations
@@ -14,26 +13,13 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
-from ...framework.jit.stack_arrays import stack_array
-from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, row, scale, sub
+from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, scale, sub
 from ..integration.trajectory import along, path_of
-from ..integration.turning import (
-    arms_to,
-    change_of_spin,
-    closing_by_spin,
-    compliance,
-    cross_spin,
-    is_turned,
-    lever,
-    twist,
-    velocity_by_spin,
-)
-from ..shapes.convex.points import MOST_POINTS, contact_points
+from ..integration.turning import arms_to, change_of_spin, compliance, cross_spin, lever, twist, velocity_by_spin
 from ..shapes.poses import turn_shape
 
 PIECES = 6  # slides, sticks or turns round, and each once more for the restitution
 STUCK = 1e-14  # of the speeds: a slower slip is none
-FLAT = 1e-6  # rad: faces that are tilted less, and tilt by less in a step, lie on each other
 
 
 @part
@@ -82,25 +68,6 @@ def impulses_of(masses, speeds, e, mu):
 
 
 @part
-def middle_of_faces(state, a, b, normal, place, d):
-    """The middle of what faces share that lie on each other, else the place; relative to the centre of a's shape."""
-    bodies = state.bodies
-    if len(d) == 2:
-        return place
-    round_ones = bodies.rolling_radius[a] > 0.0 or bodies.rolling_radius[b] > 0.0
-    tilts = sub(bodies.turn[b], bodies.turn[a])
-    tilts = add_scaled(tilts, normal, -dot(tilts, normal))
-    if round_ones or length(tilts) > FLAT or not (is_turned(bodies, a) or is_turned(bodies, b)):
-        return place
-    places, gaps = stack_array(MOST_POINTS, place), stack_array(MOST_POINTS, 0.0)
-    count = contact_points(state, (a, b), d, (0.0, normal, place), (math.inf, FLAT), places, gaps)
-    middle = row(places, 0, place)
-    for k in range(1, count):
-        middle = add(middle, row(places, k, place))
-    return divided(middle, float(count))
-
-
-@part
 def respond(state, sides, touch, motion, e, mu):
     """(change of the speed of b as a sees it, along the normal; change of its velocity along the surface) by an impact.
 
@@ -108,9 +75,7 @@ def respond(state, sides, touch, motion, e, mu):
     """
     bodies, (a, b), (_, normal, point, apart) = state.bodies, sides, touch
     velocity, speed = motion
-    arms = arms_to(bodies, a, b, normal, middle_of_faces(state, a, b, normal, point, apart), apart)
-    by_spin = closing_by_spin(bodies, a, b, arms_to(bodies, a, b, normal, point, apart), normal)
-    speed = min(0.0, speed + (closing_by_spin(bodies, a, b, arms, normal) - by_spin))
+    arms = arms_to(bodies, a, b, normal, point, apart)
     light = bodies.inverse_mass[a] + bodies.inverse_mass[b]
     lever_a, lever_b = lever(bodies, a, arms[0], normal), lever(bodies, b, arms[1], normal)
     turn_a, turn_b = change_of_spin(bodies, a, lever_a), change_of_spin(bodies, b, lever_b)
@@ -141,8 +106,7 @@ def arms_of(state, event):
     point, bodies = impacts.event_point[event], state.bodies
     to_a, to_b = sub(point, along(path_of(state, a), now)), sub(point, along(path_of(state, b), now))
     place, d = sub(to_a, bodies.offset[a]), add(sub(to_a, to_b), sub(bodies.offset[b], bodies.offset[a]))
-    normal = impacts.event_normal[event]
-    return arms_to(bodies, a, b, normal, middle_of_faces(state, a, b, normal, place, d), d)
+    return arms_to(bodies, a, b, impacts.event_normal[event], place, d)
 
 
 @part
