@@ -21,7 +21,6 @@ from ..constants import (
     GAIN_PUSH,
     GAIN_ROUNDING,
     GAIN_WEIGHT,
-    LEAST_FURTHER_PASSES,
     SOLVED,
     SWEEPS,
 )  # fmt: skip
@@ -186,10 +185,9 @@ def finish_substep(solver, bias_rate, any_struck, h, dt, span):
     allow(solver, bias_rate, h, dt, span, islands)
     turn, count = 0, find_unsolved(solver, 0, any_struck, dt, span, islands)
     while count > 0:
-        sweeps = max(SWEEPS, min(LEAST_FURTHER_PASSES, (span[1] - span[0]) // (2 * count)))  # a look costs as much
-        for _ in range(sweeps):
+        for _ in range(SWEEPS):
             relax_listed(solver, count, span[4])
         weigh(solver, span, islands)
-        turn += sweeps
+        turn += SWEEPS
         count = find_unsolved(solver, turn, any_struck, dt, span, islands)
     restrain(solver, span, islands)
