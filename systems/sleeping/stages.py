@@ -151,6 +151,22 @@ def highest_speed(state):
     return math.sqrt(fastest)
 
 
+@part
+def reach_of_next_step(state, dt):
+    """How far, at most, what is awake will wake others, if nothing but forces makes it faster."""
+    bodies, change = state.bodies, 0.0
+    for i in range(state.first, state.dynamic):
+        if bodies.still[i] == AWAKE:
+            change = max(change, bodies.force_speed_change[i])
+    return THROW * (highest_speed(state) + change) * dt
+
+
+@inlined
+def wakes(state, dt, c, reach):
+    """Whether a pair is so near that what is awake wakes the other."""
+    return state.pairs.depth[c] >= -contact_margin(state, dt, state.pairs.a[c], state.pairs.b[c]) - reach
+
+
 def find_touched(state, dt):
     """Wake what an awake body touches, or may touch after impacts in this step."""
     pairs, still, disturbed = state.pairs, state.bodies.still, 0
@@ -163,8 +179,7 @@ def find_touched(state, dt):
         i, other = (a, b) if still[a] == STILL and a < state.dynamic else (b, a)
         if not (pairs.is_solid[c] and i < state.dynamic and still[i] == STILL and still[other] <= AWAKE):
             continue
-        margin = contact_margin(state, dt, a, b) + (reach if other < state.moving else 0.0)
-        if pairs.near_contact[c] or pairs.depth[c] >= -margin:
+        if pairs.near_contact[c] or wakes(state, dt, c, reach if other < state.moving else 0.0):
             still[i] = DISTURBED
             disturbed += 1
     state.disturbed = disturbed
@@ -230,7 +245,8 @@ def count_rest(state, dt, needed):
 
 @part
 def join_islands(state, dt, needed):
-    """Islands of dynamic bodies that are awake, each known by its first row; restless[row] tells which stay awake.
+    """Islands of dynamic bodies that are awake, each known by its first row; restless[row] tells which stay awake. What
+    would wake each other if one slept is in one island: else they take turns.
 
     Those do of which a body has not been at rest for long enough, or has nothing that holds it, or slides on and on, or
     stands on something that moves, or that a system disables the contact with.
@@ -245,10 +261,11 @@ def join_islands(state, dt, needed):
             for i in (a, b):
                 if i < state.dynamic and bodies.rest_steps[i] >= needed:
                     keeps_awake[i] = goes_on(state, i, dt)
+    reach = reach_of_next_step(state, dt)
     for c in range(pairs.count):
         a, b = min(pairs.a[c], pairs.b[c]), max(pairs.a[c], pairs.b[c])
         awake = b < state.dynamic and still[a] == AWAKE and still[b] == AWAKE
-        if awake and pairs.is_solid[c] and pairs.near_contact[c]:
+        if awake and pairs.is_solid[c] and (pairs.near_contact[c] or wakes(state, dt, c, reach)):
             one, other = root_of(root, a), root_of(root, b)
             root[max(one, other)] = min(one, other)
     for k in range(pairs.disabled_count):

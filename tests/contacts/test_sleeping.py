@@ -59,6 +59,19 @@ def test_falls_asleep_and_stays_to_the_bit(mode, method, d, substeps):
     assert not any(is_asleep(world, *boxes))
 
 
+@pytest.mark.parametrize("gap", [0.006, 0.009, 0.012, 0.015, 0.03])
+@pytest.mark.parametrize("mode", MODES)
+def test_neighbours_that_do_not_touch_do_not_wake_each_other_in_turns(mode, gap):
+    """The second one comes to rest later."""
+    world = sleepy_world(collision=mode)
+    neighbours = box(world, (0.0, 0.5)), box(world, (1.0 + gap, 0.6))
+    for _ in range(90):
+        world.step()
+    for _ in range(60):
+        world.step()
+        assert all(is_asleep(world, *neighbours))
+
+
 def test_not_before_half_a_second_at_rest():
     world = sleepy_world()
     boxes = tower(world, 0.0, 1)
