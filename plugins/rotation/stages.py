@@ -396,3 +396,14 @@ def keep_spinning_awake(state, dt, spin):
                 pushed |= torque_on(spin, i, k) != 0.0
             if pushed or length(spin_of(state, spin, i)) * dt > (SLOW if i < state.dynamic else 0.0):
                 state.bodies.rest_steps[i] = 0
+
+
+@spinning.stage(
+    after="update_sleep", records=(Spin,), reads=("still",), writes=("spin.angular_velocity",), needed="sleeping",
+)  # fmt: skip
+def stop_sleepers(state, dt, spin):
+    """what falls asleep turns no more"""
+    for i in range(state.first, state.dynamic):
+        if spin.present[i] and state.bodies.still[i] > 0:
+            for k in range(1 if len(zero_of(state)) == 2 else 3):
+                spin.angular_velocity[i, k] = 0.0
