@@ -16,7 +16,7 @@ from carom.plugins.convex_hull import ConvexHullCollider
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 G = 9.81
-MODES = (pytest.param("discrete", marks=pytest.mark.plain), "continuous", "event_driven")
+MODES = ("discrete", "continuous", "event_driven")
 CUBE = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 TETRAHEDRON = np.array([(1.0, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]) / math.sqrt(8)  # edges of 1
 OCTAHEDRON = np.concatenate((np.eye(3), -np.eye(3))) / math.sqrt(2)  # edges of 1
