@@ -25,7 +25,8 @@ from ..integration.trajectory import (
     travel_of,
 )
 from ..linking.parts import FIRST_TOUCH, call_first_touch
-from ..shapes.tolerances import contact_margin, is_turning, smaller_extent, turning_travel
+from ..shapes.dispatch import restitution_of
+from ..shapes.tolerances import contact_margin, is_turning, reach_of, smaller_extent, turning_travel
 from .time_of_impact import APART, bounds_stay_disjoint
 
 DISCRETE, CONTINUOUS, EVENT_DRIVEN = range(3)
@@ -45,6 +46,22 @@ def is_swept(state, a, b, travel):
     if mode == EVENT_DRIVEN:
         return True
     return (mode == CONTINUOUS or bodies.ccd[a] or bodies.ccd[b]) and travel > FAST * smaller_extent(bodies, a, b)
+
+
+@part
+def turns_far(state, a, b):
+    """Whether a pair has to be looked at on its way: one of the two turns by more than a part of the smaller one. Where
+    they may bounce, only if it turns by itself: impacts have the others."""
+    bodies = state.bodies
+    if len(bodies.axes) == 0:
+        return False
+    way_a, way_b = length(bodies.turn[a]) * reach_of(bodies, a), length(bodies.turn[b]) * reach_of(bodies, b)
+    far = FAST * smaller_extent(bodies, a, b)
+    if way_a + way_b <= far:
+        return False
+    if (way_a > far and bodies.inverse_mass[a] == 0.0) or (way_b > far and bodies.inverse_mass[b] == 0.0):
+        return True
+    return restitution_of(state, a, b) == 0.0
 
 
 @inlined

@@ -65,7 +65,10 @@ def first_touch(state, a, b, path, straight, since, until, limits):
     """
     shape_a, shape_b = state.bodies.shape[a], state.bodies.shape[b]
     if state.spinning and is_turning(state, until, a, b):
-        found, (t, normal, point, at) = touch_of_turning(state, a, b, path, since, until, limits)
+        spins, near = (state.bodies.spin[a], state.bodies.spin[b]), NEAR * smaller_extent(state.bodies, a, b)
+        found, (t, normal, point, at), _ = touch_of_turning(
+            state, a, b, path, spins, (since, until), (limits[0], near, limits[2])
+        )
         return (TOUCHES if found else APART), t, normal, point, at
     if not both_convex(state, shape_a, shape_b):
         return march(state, a, b, path, since, until, limits)

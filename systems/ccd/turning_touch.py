@@ -1,12 +1,14 @@
-"""When two bodies of which one turns, and is not round, first touch where they also approach: by conservative
-advancement, with both shapes turned as they are at each time.
+"""When two bodies of which one turns, and is not round, first touch: by conservative advancement, with both shapes
+turned as they are at each time. What a flipper passes is behind it where the step ends.
 
 The gap closes no faster than the bodies approach along its normal, plus the speed by spin of the farthest point of
-each. A touch counts only if its point approaches: after an impact the two still touch, and another corner may come in.
+each. An impact needs a point that approaches: after one the two still touch, and another corner may come in.
 (B. Mirtich, "Impulse-based dynamic simulation of rigid body systems", 1996.)
 """
 
 from __future__ import annotations
+
+import math
 
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
@@ -17,10 +19,11 @@ from ..integration.turning import arms_to, closing_by_spin, is_turned
 from ..shapes.convex.points import MOST_POINTS, contact_points
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch
 from ..shapes.poses import turn_shape
-from ..shapes.tolerances import smaller_extent, turning_travel
+from ..shapes.tolerances import reach_of, slop_of
 
 LOOKS, EXACT_LOOKS = 250, 60
-NEAR = 1e-6  # of the extent: a smaller gap is a touch
+NEAR = 1e-6  # of the extent: a smaller gap is a touch; of bodies at rest,
+BESIDE = 0.5  # of the slop
 TILT = 0.1  # rad, between faces that may touch in several points
 GRAZE = 0.125  # slops: as far as points move between looks at a pair that touches and parts, or after EXACT_LOOKS
 
@@ -44,18 +47,19 @@ def closing_point(state, a, b, d, met, near, velocity):
 
 
 @part
-def touch_of_turning(state, a, b, path, since, until, limits):
-    """(whether they touch; time, normal, point, from a's centre to b's) as of :func:`time_of_impact.first_touch`, until
-    the end of the step. limits: (slop, -, speed of approach of the point below which a touch is one only if no faster
-    one follows)."""
-    bodies, slop, threshold = state.bodies, limits[0], limits[2]
-    spin_a, spin_b, shape_a, shape_b = bodies.spin[a], bodies.spin[b], bodies.shape[a], bodies.shape[b]
-    near, turning = NEAR * smaller_extent(bodies, a, b), turning_travel(state, 1.0, a, b)
+def touch_of_turning(state, a, b, path, spins, times, limits):
+    """(whether they touch; (time, normal, point, from a's centre to b's); gap then) between two times, while they turn
+    with those spins; shapes stand as at the second of these. limits: (slop; gap of a touch; speed of approach of the
+    point below which a touch is one only if no faster one follows; -inf: any is one, at corners too)."""
+    bodies, (spin_a, spin_b), (since, until), (slop, near, threshold) = state.bodies, spins, times, limits
+    shape_a, shape_b = bodies.shape[a], bodies.shape[b]
+    turning = length(spin_a) * reach_of(bodies, a) + length(spin_b) * reach_of(bodies, b)
     graze = max(GRAZE * slop, (turning * (until - since) + travel_of(path, until)) / (LOOKS - EXACT_LOOKS))
     bend = 2.0 * length(path[2]) + 6.0 * length(path[3]) * until
-    corners = is_turned(bodies, a) and is_turned(bodies, b)  # what turns meets those of others, too
+    corners = threshold < 0.0 or (is_turned(bodies, a) and is_turned(bodies, b))  # of others, too
     convex, ends = both_convex(state, shape_a, shape_b), sub(bodies.offset[b], bodies.offset[a])
-    touch, found, t, posed = (until, zero_of(state), zero_of(state), zero_of(state)), False, since, until
+    touch, found, gap = (until, zero_of(state), zero_of(state), zero_of(state)), False, 0.0
+    t, posed = since, until
     for look in range(LOOKS):
         turn_shape(state, a, scale(spin_a, t - posed))
         turn_shape(state, b, scale(spin_b, t - posed))
@@ -63,13 +67,15 @@ def touch_of_turning(state, a, b, path, since, until, limits):
         d = add(along(path, t), sub(sub(bodies.offset[b], bodies.offset[a]), ends))
         _, depth, normal, point = evaluate(state, shape_a, a, shape_b, b, d)
         w = rate_along(path, t)
-        near = graze if look == EXACT_LOOKS else near
+        near = max(near, graze) if look == EXACT_LOOKS else near
         fastest, touches = turning + length(w) + bend * (until - t), -depth <= near
         if touches:
-            rate, point = closing_point(state, a, b, d, (depth, normal, point), near, w)
-            closes = rate < 0.0 and (rate < -threshold or not found)
+            rate = 0.0
+            if threshold > -math.inf:
+                rate, point = closing_point(state, a, b, d, (depth, normal, point), near, w)
+            closes = rate < -threshold or (rate < 0.0 and not found)
             if closes and (corners or not is_corner_touch(state, shape_a, a, shape_b, b, d, slop)):
-                touch, found = (t, normal, point, d), True
+                touch, found, gap = (t, normal, point, d), True, -depth
                 if rate < -threshold:
                     break
         elif convex:
@@ -80,4 +86,17 @@ def touch_of_turning(state, a, b, path, since, until, limits):
         t = further if further < until else until
     turn_shape(state, a, scale(spin_a, until - posed))
     turn_shape(state, b, scale(spin_b, until - posed))
-    return found, touch
+    return found, touch, gap
+
+
+@part
+def first_touch_of_turn(state, a, b):
+    """(whether they touch on the way, share of the step before that, gap then, normal, point from a's centre), as the
+    step leads and turns them; they need not approach."""
+    bodies, slop, still = state.bodies, slop_of(state, a, b), zero_of(state)
+    start = sub(bodies.previous_position[b], bodies.previous_position[a])
+    travel = sub(sub(bodies.position[b], bodies.position[a]), start)
+    path = add(start, sub(bodies.offset[b], bodies.offset[a])), travel, still, still
+    spins, limits = (bodies.turn[a], bodies.turn[b]), (slop, BESIDE * slop, -math.inf)
+    found, (share, normal, point, _), gap = touch_of_turning(state, a, b, path, spins, (0.0, 1.0), limits)
+    return found, share, gap, normal, point

@@ -6,7 +6,7 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, length, row, scale, store, sub
-from ..ccd.turns import first_touch_of_turn
+from ..ccd.turning_touch import first_touch_of_turn
 from ..integration.turning import is_turned, turn_of_arm
 from ..narrow_phase.manifolds import centre_offset_at_start, evaluate_pair, forget_manifold, has_manifold
 from ..shapes.convex.points import MOST_POINTS, contact_points

@@ -7,8 +7,8 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add_scaled, dot, item, length, replace, sub
-from ..ccd.search_bounds import FAST, is_swept
-from ..ccd.turns import first_touch_of_turn, turns_far
+from ..ccd.search_bounds import FAST, is_swept, turns_far
+from ..ccd.turning_touch import first_touch_of_turn
 from ..codes import OK
 from ..impacts.impulses import STOPPED, is_beyond_cap, is_rattling
 from ..integration.turning import arms_to, closing_by_spin

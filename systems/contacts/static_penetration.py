@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from ...framework.compilation import part
 from ...framework.vectors import add_scaled, dot, item, length, sub
-from ..ccd.search_bounds import FAST
-from ..ccd.turns import turns_far
+from ..ccd.search_bounds import FAST, turns_far
 from ..codes import OK
 from ..impacts.impulses import STOPPED
 from ..integration.trajectory import along, path_of

@@ -10,9 +10,8 @@ import math
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
-from ..ccd.search_bounds import EVENT_DRIVEN, FAST, is_swept
+from ..ccd.search_bounds import EVENT_DRIVEN, FAST, is_swept, turns_far
 from ..ccd.time_of_impact import APART, AT_CORNER, TOUCHES, bounds_stay_disjoint, clear_of_rounding
-from ..ccd.turns import turns_far
 from ..integration.trajectory import (
     ROUNDING,
     along,

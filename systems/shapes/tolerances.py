@@ -44,20 +44,19 @@ def contact_margin(state, dt, a, b):
 
 @inlined
 def reach_of(bodies, i):
-    """How far body i reaches from its centre of mass, at most."""
+    """How far from its centre of mass turning moves points of body i, at most: none of a round one."""
+    if bodies.rolling_radius[i] > 0.0:
+        return 0.0
     return min(length(bodies.half_extents[i]) + length(bodies.offset[i]), ENDLESS)
 
 
 @inlined
 def turning_travel(state, span, a, b):
-    """How far points of the two come nearer by turning, at most; what is round comes no nearer."""
-    bodies, travel = state.bodies, 0.0
-    if state.spinning:
-        if bodies.rolling_radius[a] == 0.0:
-            travel += span * length(bodies.spin[a]) * reach_of(bodies, a)
-        if bodies.rolling_radius[b] == 0.0:
-            travel += span * length(bodies.spin[b]) * reach_of(bodies, b)
-    return travel
+    """How far points of the two come nearer by turning, at most."""
+    bodies, spin = state.bodies, state.bodies.spin
+    if not state.spinning:
+        return 0.0
+    return span * length(spin[a]) * reach_of(bodies, a) + span * length(spin[b]) * reach_of(bodies, b)
 
 
 @inlined
