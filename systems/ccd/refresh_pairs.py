@@ -79,9 +79,7 @@ def keep_events(state):
         c = impacts.event_pair[event]
         if holds(state, event) and old.place[c] >= 0:
             impacts.event_pair[event] = old.place[c]
-            place = impacts.waiting
-            impacts.heap[k], impacts.heap[place] = impacts.heap[place], event
-            heap_push(impacts)
+            heap_push(impacts, k)
 
 
 def merge_pairs(state, dt):

@@ -18,7 +18,6 @@ from ..integration.trajectory import (
     along,
     bend_of,
     centre_at,
-    is_straight,
     path_of,
     rate_along,
     relative_path,
@@ -62,6 +61,19 @@ def turns_far(state, a, b):
     if (way_a > far and bodies.inverse_mass[a] == 0.0) or (way_b > far and bodies.inverse_mass[b] == 0.0):
         return True
     return restitution_of(state, a, b) == 0.0
+
+
+@part
+def rest_edge(state, a, b, dt):
+    """How far what slides or rests may have sunk in."""
+    return min(contact_margin(state, dt, a, b), FAST * smaller_extent(state.bodies, a, b))
+
+
+@inlined
+def limits_of_sweep(state, a, b, travel, threshold, dt):
+    """Limits of the search for the touch of a swept pair that travels so far in the step (see first_touch)."""
+    stride = FAST * smaller_extent(state.bodies, a, b) / travel * dt if travel > 0.0 else dt
+    return rest_edge(state, a, b, dt), stride, threshold
 
 
 @inlined
@@ -217,12 +229,8 @@ def sweep_pairs(state, dt):
             travel, turns = travel_of(path, dt) + turning_travel(state, dt, a, b), is_turning(state, dt, a, b)
             if not is_swept(state, a, b, travel) or (not turns and bounds_stay_disjoint(state, a, b, path, 0.0, dt)):
                 continue
-            small = FAST * smaller_extent(bodies, a, b)
-            limits = min(contact_margin(state, dt, a, b), small), small / travel * dt, 0.0
-            straight = is_straight(state, a, b, path, dt)
-            touch, t, normal, point, at = call_first_touch(
-                state.links[FIRST_TOUCH], state, a, b, path, straight, 0.0, dt, limits
-            )
+            address, limits = state.links[FIRST_TOUCH], limits_of_sweep(state, a, b, travel, 0.0, dt)
+            touch, t, normal, point, at = call_first_touch(address, state, a, b, path, 0.0, dt, limits)
             if touch == APART:
                 continue
             end = add(bodies.position[a], bodies.offset[a])

@@ -21,7 +21,7 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import absolute, add, add_scaled, dot, item, length, scale, sub
-from ..integration.trajectory import ROUNDING, along, bend_of, first_root, rate_along
+from ..integration.trajectory import ROUNDING, along, bend_of, first_root, is_straight, rate_along
 from ..integration.turning import is_turned
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, sweep
 from ..shapes.tolerances import is_turning, smaller_extent
@@ -56,7 +56,7 @@ def bounds_stay_disjoint(state, a, b, path, since, until):
     return dot(start, start) * way - ahead * ahead > SAFETY_FACTOR * dot(reach, reach) * way
 
 
-def first_touch(state, a, b, path, straight, since, until, limits):
+def first_touch(state, a, b, path, since, until, limits):
     """(APART, TOUCHES or AT_CORNER; time, normal, point, from a's centre to b's) of the first touch on b's path as seen
     from a, between two times; touching at ``since`` and parting is none unless the path leads back.
 
@@ -73,6 +73,7 @@ def first_touch(state, a, b, path, straight, since, until, limits):
     if not both_convex(state, shape_a, shape_b):
         return march(state, a, b, path, since, until, limits)
     t, known, met, share = since, False, False, 0.0
+    straight = is_straight(state, a, b, path, until)
     if straight:
         start = along(path, since)
         known, met, share = sweep(state, shape_a, a, shape_b, b, start, sub(along(path, until), start))

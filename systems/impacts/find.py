@@ -10,14 +10,13 @@ import math
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
-from ..ccd.search_bounds import EVENT_DRIVEN, FAST, is_swept, turns_far
+from ..ccd.search_bounds import EVENT_DRIVEN, FAST, is_swept, limits_of_sweep, rest_edge, turns_far
 from ..ccd.time_of_impact import APART, AT_CORNER, TOUCHES, bounds_stay_disjoint, clear_of_rounding
 from ..integration.trajectory import (
     ROUNDING,
     along,
     centre_at,
     first_root,
-    is_straight,
     rate_along,
     relative_path,
     travel_of,
@@ -27,7 +26,7 @@ from ..linking.parts import FIRST_TOUCH, call_first_touch
 from ..narrow_phase.manifolds import is_at_manifold
 from ..narrow_phase.stages import rank_rows
 from ..shapes.dispatch import both_convex, evaluate, friction_of, is_corner_touch, restitution_of
-from ..shapes.tolerances import contact_margin, is_turning, slop_of, smaller_extent, turning_travel
+from ..shapes.tolerances import is_turning, slop_of, smaller_extent, turning_travel
 from .heap import heap_push
 from .impulses import CROSSING, HAND_OVER, IMPACT, NONE, STOPPED, is_beyond_cap, is_deflected, is_rattling
 from .turning import respond
@@ -48,12 +47,6 @@ def overlap_at_end(state, a, b, path, dt):
 
 
 @part
-def rest_edge(state, a, b, dt):
-    """How far what slides or rests may have sunk in."""
-    return min(contact_margin(state, dt, a, b), FAST * smaller_extent(state.bodies, a, b))
-
-
-@part
 def leaves_touch_at(state, c, path, since, t):
     """When pair c, that touches at t on the side opposite to its last impact, is clear of the place of that: ``since``,
     unless it is there still. Things without thickness touch on either side, by rounding, after they have bounced."""
@@ -71,9 +64,8 @@ def find_touch(state, c, a, b, path, since, restitution, dt):
     a time on. What is not swept, or touches at a corner, has none unless it overlaps where the step ends."""
     impacts, bodies, zero = state.impacts, state.bodies, zero_of(state)
     swept, overlaps, end_normal, nothing = False, False, zero, (dt, zero, zero, zero)
-    limits = slop_of(state, a, b), dt, -math.inf
-    if state.spinning and is_turning(state, dt, a, b):
-        limits = slop_of(state, a, b), dt, bounce_threshold(state, a, b)
+    turning = state.spinning and is_turning(state, dt, a, b)
+    limits = slop_of(state, a, b), dt, bounce_threshold(state, a, b) if turning else -math.inf
     if impacts.sweeps:
         since = max(since, bodies.last_impact[a], bodies.last_impact[b])
         passive, travel = not state.pairs.is_solid[c], travel_of(path, dt) + turning_travel(state, dt, a, b)
@@ -81,8 +73,7 @@ def find_touch(state, c, a, b, path, since, restitution, dt):
         if passive and (not swept or state.pairs.crossed[c]):
             return NO_TOUCH, nothing
         if swept:
-            stride = FAST * smaller_extent(bodies, a, b) / travel * dt if travel > 0.0 else dt
-            limits = rest_edge(state, a, b, dt), stride, bounce_threshold(state, a, b)
+            limits = limits_of_sweep(state, a, b, travel, bounce_threshold(state, a, b), dt)
     if not swept:
         if state.spinning and turns_far(state, a, b):  # contacts at rest know what a mill meets on its way
             return NO_TOUCH, nothing
@@ -90,17 +81,15 @@ def find_touch(state, c, a, b, path, since, restitution, dt):
             overlaps, end_normal = overlap_at_end(state, a, b, path, dt)
         if not overlaps:
             return NO_TOUCH, nothing
-    straight, clear = is_straight(state, a, b, path, dt), since
     while True:
-        found, t, normal, point, apart = call_first_touch(
-            state.links[FIRST_TOUCH], state, a, b, path, straight, clear, dt, limits
-        )
-        since = clear
+        address, clear = state.links[FIRST_TOUCH], since
+        found, t, normal, point, apart = call_first_touch(address, state, a, b, path, since, dt, limits)
         if swept and found == TOUCHES and state.pairs.impulse[c] > 0.0 and dot(normal, state.pairs.normal[c]) < 0.0:
             clear = leaves_touch_at(state, c, path, since, t)
         if not clear > since:
             break
-        if clear >= dt:
+        since = clear
+        if since >= dt:
             return NO_TOUCH, nothing
     if found == APART:
         return NO_TOUCH, nothing
@@ -225,7 +214,7 @@ def queue_event(state, c, kind, path, touch, speed, restitution):
     impacts.event_key[event] = bodies.rank[a] * state.count + bodies.rank[b]
     impacts.event_change[event], impacts.event_normal[event] = change, normal
     impacts.event_point[event], impacts.event_pull[event] = add(centre_at(state, a, t), point), pull
-    heap_push(impacts)
+    heap_push(impacts, impacts.waiting)
 
 
 @part

@@ -24,9 +24,10 @@ def holds(state, event):
 
 
 @part
-def heap_push(impacts):
-    """Add the event in place heap[waiting], which was free."""
+def heap_push(impacts, place):
+    """Add the event in that place of ``heap``, which is free: at ``waiting`` or behind it."""
     heap, child = impacts.heap, impacts.waiting
+    heap[place], heap[child] = heap[child], heap[place]
     while child > 0:
         parent = (child - 1) // 2
         if not earlier(impacts, heap[child], heap[parent]):

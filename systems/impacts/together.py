@@ -63,11 +63,10 @@ def next_at(state, now, dt):
 @part
 def put_back(impacts, event):
     """Add an event to the queue again that has been taken off it."""
-    heap, place = impacts.heap, impacts.waiting
-    while heap[place] != event:
+    place = impacts.waiting
+    while impacts.heap[place] != event:
         place += 1
-    heap[place], heap[impacts.waiting] = heap[impacts.waiting], event
-    heap_push(impacts)
+    heap_push(impacts, place)
 
 
 def resolve_simultaneous(state, event, dt):

@@ -108,8 +108,9 @@ def test_c5_thin_wall(mode, d):
 @each_mode
 @pytest.mark.parametrize("radius", [0.0, 0.1])
 def test_b15_a_thousand_passes(mode, d, radius):
-    """Between walls 1 m apart at 1000 m/s: after 60 steps 1000 impacts, and the start position, to rounding."""
-    world = mode_world(mode, d, max_impacts_per_step=100)
+    """Between walls 1 m apart at 1000 m/s: after 60 steps 1000 impacts, and the start position, to rounding. No cap is
+    on elastic impacts of event-driven worlds."""
+    world = mode_world(mode, d, max_impacts_per_step=1 if mode == "event_driven" else 100)
     for side in (-1, 1):
         box(world, side * (0.5 + radius + 0.5), half=along(d, 0.5, 5.0, 5.0), kind="static")
     mover = bullet(world, 0.0, 1000.0, radius=radius, restitution=1.0)
@@ -141,16 +142,6 @@ def test_b15_beyond_the_cap(mode, e, d):
         capped, speed = capped + world.stats().counters["capped_impacts"], now
     assert capped > 0
     assert any("impacts beyond 8 of a body in one step" in fault for fault in world.faults)
-
-
-def test_b15_elastic_impacts_are_not_capped_when_event_driven():
-    world = mode_world("event_driven", max_impacts_per_step=1)
-    for side in (-1, 1):
-        box(world, side * 1.0, half=(0.5, 5.0), kind="static")
-    mover = ball(world, 0.0, 1000.0, radius=0.0, restitution=1.0)
-    assert len(strikes(world, 60)) == 1000
-    assert position(world, mover)[0] == pytest.approx(0.0, abs=1e-11)
-    assert world.stats().counters["capped_impacts"] == 0
 
 
 def meet(rng, d, shapes):
