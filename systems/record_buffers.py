@@ -20,7 +20,7 @@ SPARE = 1 << 16  # rows at most that are reserved beyond what is asked for
 # What these stages need of the bodies before they do anything.
 COLUMNS_OF = {
     "sum_forces": ("force",), "end_flight": records.UNDO_FORCE, "predict_rest": records.PREDICTED,
-    "gather": records.HELD,
+    "gather": records.HELD, "begin_joints": (*records.SPINS, *records.COLLISIONS),
 }  # fmt: skip
 
 
@@ -112,9 +112,9 @@ class Room:
         solver, state = self._state.solver, self._state
         if state.needed > len(solver.first):
             solver.reserve(with_spare(state.needed), *records.SOLVER_CONTACTS)
-        bodies = min(2 * state.needed, state.count)
+        bodies = min(2 * state.needed, state.count) + 1  # the world is one that joints hold on to
         if bodies > len(solver.body_row):
-            solver.reserve(min(with_spare(bodies), self._scene.table.capacity), *records.SOLVER_BODIES)
+            solver.reserve(min(with_spare(bodies), self._scene.table.capacity + 1), *records.SOLVER_BODIES)
         if state.spinning:
             solver.reserve(len(solver.first), *records.SOLVER_ARMS)
             solver.reserve(len(solver.body_row), *records.SOLVER_SPINS)

@@ -47,7 +47,7 @@ from .shapes.geometry_levels import LevelCheck, check_sensors
 from .shapes.pair_coverage import check_pairs
 from .sleeping.sleepers import Sleepers, add_columns
 from .stage_list import CLOSING, KEPT, OPENING, STAGES, SYSTEM_OF_STAGE
-from .tracking import CONTACTS, WARM_START, put_rows_back, saved_rows
+from .tracking import CONTACTS, WARM_START, put_joints_back, put_rows_back, saved_rows
 
 
 class Simulation:
@@ -171,6 +171,8 @@ class Simulation:
     def _follow(self, others_write: bool) -> None:
         """Everything that depends on which bodies and systems there are."""
         table, scene, words = self.table, self.scene, self._words
+        for follow in self.extensions.followers:
+            follow(self._world)
         words[self._step_number] = self.table.clock.step_count
         self.contacts_before = self.contacts.columns_now() if words[self._found_current] else None
         if self._structure() != scene.structure or table.static_version != scene.static_version:
@@ -285,6 +287,7 @@ class Simulation:
         if state.kept & KEEPS_WRITTEN:
             self.extensions.written.put_back()
         self.copies.kept = False
+        put_joints_back(state)
         if state.kept:
             state.warm_start.now, state.contacts.now = state.warm_start.before, state.contacts.before
         self.contacts.forget_step(state.step_number)
@@ -313,6 +316,8 @@ class Simulation:
             self.sleepers.end_step()
         if self._words[self._found_current]:  # no RESPONSE has replaced them: they are read at any time
             self.contacts.columns_now()
+        for finish in self.extensions.finishers:
+            finish(self._world)
 
     def report_faults(self, prefix: str) -> None:
         """Name the bodies whose state is not finite in the world's faults; they are taken out of the next step."""

@@ -67,11 +67,12 @@ ON_DEMAND = (
 )  # fmt: skip
 # What may be true of a scene, for ``Stage.needed``; besides, stages of integrators are needed by their own names.
 WITH_COLLIDERS = frozenset((
-    "colliders", "contacts", "no body spins", "one level", "several levels", "many bodies", "swept bodies",
+    "colliders", "colliders or joints", "contacts", "no body spins, no joints", "one level", "several levels",
+    "many bodies", "swept bodies",
 ))  # fmt: skip
 CONDITIONS = (
-    "", "dynamic bodies", *sorted(WITH_COLLIDERS), "bodies spin", "standard", "sleeping", "stages of plugins",
-    "on demand",
+    "", "dynamic bodies", *sorted(WITH_COLLIDERS), "bodies spin", "bodies spin, no joints", "joints", "standard",
+    "sleeping", "stages of plugins", "on demand",
 )  # fmt: skip
 # What a failed step puts back, in this order: the bit of state.kept that says that the copy is made; the column, its
 # copy, and their rows.

@@ -33,5 +33,12 @@ def put_rows_back(record: Record, saved: dict[str, Any]) -> None:
             getattr(record, name)[now] = value
 
 
+def put_joints_back(state: Record) -> None:
+    """The forces that joints had before the step, if it has begun with them."""
+    joints = state.solver.joints
+    if joints.kept_in == state.step_number + 1:
+        joints.load[:], joints.pull[:] = joints.old_load, joints.old_pull
+
+
 def _stacked(record: Record) -> list[str]:
     return [name for name, field in record.schema.fields.items() if isinstance(field, Column) and field.stacked]

@@ -28,18 +28,22 @@ class ChangeLog:
         entities without objects that came; the ids of those that went
     lost
         handles that belong to no entity any more and that may be in use
+    rounds
+        how often the table has been brought up to date: another number whenever entities may have changed
     cleared
         esper.clear_database(): everything before it has gone
     """
 
-    __slots__ = ("arrivals", "base", "cleared", "deleted", "dirty", "lost", "touched")
+    __slots__ = ("arrivals", "base", "cleared", "deleted", "dirty", "lost", "rounds", "touched")
 
     def __init__(self, base: type[Any]) -> None:
         self.base = base  # only types derived from it are watched
+        self.rounds = 0
         self.clear()
 
     def clear(self) -> None:
         self.cleared = self.dirty = False
+        self.rounds += 1
         self.touched: set[int] = set()
         self.arrivals: list[Arrival] = []
         self.deleted: set[int] = set()

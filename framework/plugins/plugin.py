@@ -58,6 +58,7 @@ class Plugin:
             raise ValueError(f"a plugin needs a name, got {name!r}")
         self.name = name
         self.version = version
+        self.components: tuple[type[Component], ...] = ()  # those that saved worlds have, beside those of its stages
         self.shapes: dict[type[Component], Shape] = {}
         self.pairs: dict[tuple[type[Any], type[Any]], Pair] = {}
         self.integrators: dict[str, Any] = {}

@@ -65,7 +65,7 @@ class StateVerbs:
         plugins
             all that the saved world had, of the same versions or newer
         components
-            your own component classes that it had, but for those that stages of the plugins are about
+            your own component classes that it had, but for those of the plugins
         name
             as for a new world
 
@@ -78,7 +78,8 @@ class StateVerbs:
         try:
             physics = world._services
             of_stages = [component for stage in world.registry.stages.values() for component in stage.components]
-            known = (*physics.table.component_types, *world.registry.shapes, *of_stages, *components)
+            of_plugins = [component for plugin in plugins for component in plugin.components]
+            known = (*physics.table.component_types, *world.registry.shapes, *of_stages, *of_plugins, *components)
             snapshot = file.snapshot(dict.fromkeys(known))
             file.whole(lambda: snapshots.restore_world(snapshot, world, physics))
             snapshots.restore_plugins(snapshot, world)

@@ -285,7 +285,7 @@ def product_of(u, v):
         "spin.rolling_friction",
     ),
     writes=("spin", "inverse_inertia", "inverse_products", "rolling_radius", "rolling_friction", "turn"),
-    needed="colliders",
+    needed="colliders or joints",
 )  # fmt: skip
 def share_spins(state, dt, spin):
     """how fast bodies spin, and how contacts turn them"""
@@ -356,7 +356,7 @@ def turn_on_in_space(state, spin, i, angle, dt):
     records=(Spin,),
     reads=("spin", "turn", "quarantined", "spin.max_angular_speed"),
     writes=("spin.angular_velocity", "rotation", "axes"),
-    needed="colliders",
+    needed="colliders or joints",
 )
 def take_spins(state, dt, spin):
     """what contacts have made of the spins; the step has turned the bodies with these"""
@@ -372,7 +372,7 @@ def take_spins(state, dt, spin):
             spin.angular_velocity[i, k] = new
         if not changed:
             continue
-        if parts == 1 or (state.solver.contacts > 0 and bodies.held[i]):
+        if parts == 1 or (state.solver.contacts + state.solver.joints.active > 0 and bodies.held[i]):
             turn_about(state, i, further)
         else:
             turn_on_in_space(state, spin, i, further, dt)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from ...framework.schedule.phases import Phase
 from ...framework.schedule.plan import PlannedKernel
 from ...framework.schedule.stages import Program, Stage
+from ..contacts.solving.joined import leave_out_joined
 from ..sleeping.stages import leave_out_still
 from ..staged import StagedSystem
 from .boxes import box_motions, box_statics, fixed_count
@@ -70,6 +71,9 @@ class BroadPhase(StagedSystem):
         Stage(
             leave_out_still, "pairs of two bodies that are still", ("candidates", "still"), ("candidates",), "sleeping",
             "bodies sleep",
+        ),
+        Stage(
+            leave_out_joined, "pairs that a joint keeps from touching", ("candidates",), ("candidates",), "joints",
         ),
     )  # fmt: skip
 

@@ -10,6 +10,7 @@ from ..integration.trajectory import along, path_of
 from .constants import FREQUENCY, SAG, TIPPING_FREQUENCY, TIPPING_SAG
 from .points import points_of
 from .solving.islands import order_rows
+from .solving.joined import lay_joints
 from .solving.prediction import drop_support
 from .solving.rows import turn_body
 
@@ -51,13 +52,14 @@ def gather(state, dt):
     solver, pairs, bodies = state.solver, state.pairs, state.bodies
     for i in range(state.first, state.moving if len(bodies.held) > 0 else 0):
         bodies.held[i] = False
-    if solver.contacts == 0:
+    rows = solver.contacts + solver.joints.active
+    if rows == 0:
         return OK
     if len(bodies.held) == 0:
         return NEED_COLUMNS
-    too_few = solver.contacts > len(solver.first) or min(2 * solver.contacts, state.count) > len(solver.body_row)
+    too_few = rows > len(solver.first) or min(2 * rows, state.count) >= len(solver.body_row)
     if too_few or (state.spinning and (len(solver.arm_a) == 0 or len(solver.turn) < len(solver.body_row))):
-        state.needed = solver.contacts
+        state.needed = rows
         return NEED_SOLVER
     list_rows(state)
     order_rows(state, dt)
@@ -93,9 +95,11 @@ def gather(state, dt):
         i = solver.body_row[q]
         solver.spin[q] = bodies.spin[i]
         turn_body(solver, q, scale(bodies.turn[i], -1.0))  # to where the step starts
-        solver.reach[q] = length(bodies.half_extents[i]) + length(bodies.offset[i])
+        solver.reach[q] = length(bodies.half_extents[i]) + length(bodies.offset[i]) if state.collides else 0.0
         solver.inverse_inertia[q] = bodies.inverse_inertia[i]
         solver.inverse_products[q] = bodies.inverse_products[i]
+    if solver.joints.active > 0:
+        lay_joints(state)
     return OK
 
 
@@ -108,7 +112,12 @@ def put_back(state, dt):
         if solver.had_impulse[k]:
             bodies.held[solver.body_row[solver.first[k]]] = True
             bodies.held[solver.body_row[solver.second[k]]] = True
-    for q in range(solver.bodies if solver.contacts > 0 else 0):
+    for e in range(solver.joints.active):
+        a, b = solver.joints.row_a[solver.joints.order[e]], solver.joints.row_b[solver.joints.order[e]]
+        for i in (a, b):
+            if i >= 0:
+                bodies.held[i] = True
+    for q in range(solver.bodies if solver.contacts + solver.joints.active > 0 else 0):
         i = solver.body_row[q]
         bodies.place[i] = -1
         if bodies.held[i] and solver.inverse_mass[q] > 0.0:

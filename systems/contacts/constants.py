@@ -35,6 +35,10 @@ SWEEPS = 4  # between two looks at which rows these are
 EXCESS = 0.01  # extents per step: where the speed of a row is wrong by more, its island is struck, and solved until
 SOLVED = EXCESS * LEAST_FURTHER_PASSES / FURTHER_PASSES  # less than this is wrong; the fewer passes, the more is left
 
+# Joints that hold: springs that the passes which push solve, and the others as if they were none.
+JOINT_FREQUENCY = 0.25  # times the rate of the substeps: a fixed one gains nothing by more of them
+JOINT_DAMPING_RATIO = 2.0
+
 # The number of substeps of an island.
 MOST_SAG = 0.005  # extents: no contact sags more under the island's heaviest body,
 OWN_SAG = 0.002  # nor a contact under one body alone: grains, whose contacts are hard

@@ -19,11 +19,12 @@ from .events import disabled_pairs
 from .response_stages import begin_response
 from .resting import find_resting, find_touching, linearise
 from .solving.prediction import predict_rest
-from .solving.solver import solve_contacts, solve_turning_contacts
+from .solving.solver import solve_contacts, solve_joined_contacts, solve_turning_contacts
 from .solving.warm_start import match_warm_start, store_warm_start
 from .static_penetration import resolve_static_penetration
 
 MOTION = ("position", "linear_velocity", "path_velocity")
+EITHER = "colliders or joints"
 NEAR, REST, RESTED = "bodies are near each other", "contacts rest", "contacts rested in the step before"
 
 
@@ -37,10 +38,10 @@ class Response(StagedSystem):
     phase = Phase.RESPONSE
     writes = ("normal_impulse",)
     STAGES = (
-        Stage(begin_response, "where the paths begin", ("pairs",), ("path_velocity",), "colliders"),
+        Stage(begin_response, "where the paths begin", ("pairs",), ("path_velocity",), EITHER),
         Stage(
             predict_rest, "the impulses of the last step act on the prediction, as far as there is something to hold",
-            ("warm_start",), MOTION, "colliders", RESTED,
+            ("warm_start",), MOTION, EITHER, RESTED,
         ),
         Stage(begin_impacts, "no impact yet", ("pairs", "restitution"), ("impacts",), "colliders"),
         Stage(
@@ -52,7 +53,7 @@ class Response(StagedSystem):
         ),
         Stage(
             gather, "the resting bodies and their contacts, by island and colour; substeps of each island", MOTION,
-            ("solver",), "colliders", REST,
+            ("solver",), EITHER, REST,
         ),
         Stage(linearise, "normal and gap of each contact at rest", MOTION, ("solver", "pairs"), "colliders", REST),
         Stage(
@@ -61,13 +62,17 @@ class Response(StagedSystem):
         ),
         Stage(
             solve_contacts, "substeps: forces, warm start, push, move, relax, guard", ("solver",), ("solver",),
-            "no body spins", REST,
+            "no body spins, no joints", REST,
         ),
         Stage(
-            solve_turning_contacts, "the same, with the arms of the contacts", ("solver",), ("solver",), "bodies spin",
-            REST,
+            solve_turning_contacts, "the same, with the arms of the contacts", ("solver",), ("solver",),
+            "bodies spin, no joints", REST,
         ),
-        Stage(put_back, "where the resting bodies are at the end", ("solver",), MOTION, "colliders", REST),
+        Stage(
+            solve_joined_contacts, "the same, with joints before the contacts", ("solver",), ("solver",),
+            "joints",
+        ),
+        Stage(put_back, "where the resting bodies are at the end", ("solver",), MOTION, EITHER, REST),
         Stage(
             resolve_static_penetration, "what the solver has pushed into or through what cannot be moved is put back",
             ("pairs",), MOTION, "colliders", REST,

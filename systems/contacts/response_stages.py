@@ -8,13 +8,13 @@ from ..narrow_phase.manifolds import move_to_start
 
 def begin_response(state, dt):
     """Where the paths begin; the response is idle if nothing is near anything and nothing rested."""
-    if not state.contacts_ready:
+    if state.collides and not state.contacts_ready:
         return RUN_NARROW
     bodies, pairs, memory = state.bodies, state.pairs, state.warm_start
     near = pairs.found if state.moved else pairs.count  # in a step, what is near at its end is among those found
     unknown = state.sweeping and state.moved and state.neighbours_known_until < dt
-    state.response_idle = near == 0 and not unknown and memory.counts[memory.now] == 0
     solver = state.solver
+    state.response_idle = near + solver.joints.active + memory.counts[memory.now] == 0 and not unknown
     solver.islands = solver.squeezed = solver.overloaded = solver.restrained = state.impacts.halted = 0
     state.impacts_recorded = False
     if state.response_idle:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from ...framework.data.adoption import Adoption
@@ -12,6 +15,7 @@ from ...framework.jit.records.schema import Schema
 from ...framework.plugins.registry import PluginStage, Registry
 from ...framework.schedule.stages import Program
 from .. import records
+from ..contacts.solving.records import JOINTS
 from ..record_buffers import with_spare
 from ..scene import Scene
 from ..stage_list import MADE_AGAIN
@@ -43,7 +47,9 @@ class Extensions:
         self.stages: tuple[PluginStage, ...] = ()
         self.written = ColumnCopies(self._table, ())
         self._own: dict[PluginStage, Record] = {}  # what each of them gets
-        self._records: dict[Schema, Record] = {}  # of plugins' own
+        self._records: dict[Schema, Record] = {JOINTS: state.solver.joints}  # of plugins' own; these are shared
+        self.followers: list[Callable[[Any], None]] = []  # what plugins do with the world before each step,
+        self.finishers: list[Callable[[Any], None]] = []  # and after it
         check_stages(registry.stages.values())
         registry.check_stages = check_stages
 
@@ -127,5 +133,6 @@ class Extensions:
         spins = any(needed[stage.name] for stage in self.stages if "spin" in stage.writes)
         return {
             NEEDED: any(needed.values()), **needed,
-            "bodies spin": spins, "no body spins": met["colliders"] and not spins,
+            "bodies spin": spins, "bodies spin, no joints": spins and not met["joints"],
+            "no body spins, no joints": met["colliders"] and not spins and not met["joints"],
         }  # fmt: skip

@@ -15,6 +15,7 @@ from ...framework.schedule.phases import Phase
 from ...framework.schedule.plan import PlannedKernel, kernels_of
 from ...framework.schedule.stages import Program, PythonPart, Stage
 from ...framework.settings import Settings
+from ..contacts.solving.joined import begin_joints
 from ..forces.accumulation import ForceAccumulation
 from ..scene import Scene
 from ..sleeping.stages import look_at_sleepers, rest_sleepers
@@ -77,6 +78,9 @@ class Integration(StagedSystem):
         Stage(
             check_flight, "puts back and takes out bodies whose place or speed cannot be", MOTION,
             (*MOTION, "quarantined"),
+        ),
+        Stage(
+            begin_joints, "which joints hold a body that may move", ("inverse_mass", "still"), ("solver",), "joints"
         ),
         Stage(
             note_path, "the path within the step, on which impacts are found", MOTION, ("path_velocity",), "colliders",

@@ -56,6 +56,8 @@ def kind_of(scene: Scene, integration: Integration, program: Program) -> Kind:
     conditions = frozenset(("", "dynamic bodies", *integration.stages_possible, *extensions))
     if extensions:
         conditions |= {NEEDED}
+    if scene.state.solver.joints.count > 0:
+        conditions |= {"joints", "colliders or joints"}
     if linked is None:
         return dimensions, stages, conditions, None, ()
     asking = dict.fromkeys((*QUERY_SHAPES, *(shape.component for shape in linked.shapes)))
@@ -63,7 +65,7 @@ def kind_of(scene: Scene, integration: Integration, program: Program) -> Kind:
     if scene.state.sleeping:
         conditions |= {"sleeping"}
     if any("spin" in stage.writes for stage in stages if stage.plugin):
-        conditions |= {"bodies spin"}
+        conditions |= {"bodies spin", "bodies spin, no joints"}
     return dimensions, stages, conditions | WITH_COLLIDERS, linked, queries
 
 

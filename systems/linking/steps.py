@@ -33,6 +33,7 @@ class StepLinks:
         self._integration, self._search, self._extensions = integration, search, extensions
         self._state.links = np.zeros(len(PLACES), np.int64)
         self.version = self._forces = NEVER  # of the scene, and how many force systems there were
+        self._joined = False  # there are joints
         self._bounces = False  # some collider does, or has
         self._key: Any = None  # what the linked stages depend on
         self._usual: Any = None  # what of that bodies may change
@@ -41,7 +42,8 @@ class StepLinks:
 
     def follows(self, force_systems: int) -> bool:
         """Whether nothing has changed since the last time that makes other functions necessary."""
-        return self._scene.version == self.version and force_systems == self._forces
+        joined = self._state.solver.joints.count > 0
+        return self._scene.version == self.version and force_systems == self._forces and joined == self._joined
 
     def needs_sweeps(self) -> bool:
         """Whether some body is swept: all of them in the mode, or those whose ccd is set."""
@@ -61,13 +63,14 @@ class StepLinks:
         self.version = NEVER  # until it is done
         scene, state = self._scene, self._state
         collides = state.collides
+        joined = self._joined = state.solver.joints.count > 0
         state.sweeps_ready = sweeps = collides and self.needs_sweeps()
         if collides and not self._bounces:
             self._bounces = bool(np.any(state.colliders.restitution[:, : state.count]))
         usual = (
             scene.linked, scene.registry.version, scene.table.capacity, force_systems, sweeps, collides,
             state.several_levels, state.dynamic > 0, self._search.needs_grids(), state.sleeping,
-            self._extensions.present(),
+            self._extensions.present(), joined,
         )  # fmt: skip
         if self._key is not None and usual == self._usual and collides:  # bodies have come or gone, no more
             self.link_shapes()  # there may have been a query meanwhile, with other shapes
@@ -105,11 +108,13 @@ class StepLinks:
     def _conditions(self) -> dict[str, bool]:
         """What is true of the scene now, as in ``stage_list.CONDITIONS``."""
         state = self._state
-        moves, collides = state.dynamic > 0, state.collides
+        moves, collides, joined = state.dynamic > 0, state.collides, self._joined
         met = {
             "": True,
             "dynamic bodies": moves,
             "colliders": collides,
+            "joints": joined,
+            "colliders or joints": collides or joined,
             "contacts": collides or bool(state.contacts.counts.any()) or state.asleep > 0,  # sleepers have theirs
             "one level": collides and not state.several_levels,
             "several levels": collides and state.several_levels,

@@ -268,6 +268,13 @@ def join_islands(state, dt, needed):
         if awake and pairs.is_solid[c] and (pairs.near_contact[c] or wakes(state, dt, c, reach)):
             one, other = root_of(root, a), root_of(root, b)
             root[max(one, other)] = min(one, other)
+    joints = state.solver.joints
+    for e in range(joints.active):
+        a, b = joints.row_a[joints.order[e]], joints.row_b[joints.order[e]]
+        low, high = min(a, b), max(a, b)
+        if low >= state.first and high < state.dynamic:
+            one, other = root_of(root, low), root_of(root, high)
+            root[max(one, other)] = min(one, other)
     for k in range(pairs.disabled_count):
         for i in (pairs.a[pairs.disabled[k]], pairs.b[pairs.disabled[k]]):
             if i < state.dynamic:
@@ -280,6 +287,11 @@ def join_islands(state, dt, needed):
         carried = a < state.dynamic and state.dynamic <= b < state.moving
         if carried and pairs.is_solid[c] and pairs.near_contact[c] and bodies.rest_steps[b] < needed:
             keeps_awake[root_of(root, a)] = True
+    for e in range(joints.active):
+        a, b = joints.row_a[joints.order[e]], joints.row_b[joints.order[e]]
+        low, high = min(a, b), max(a, b)
+        if state.first <= low < state.dynamic <= high < state.moving and bodies.rest_steps[high] < needed:
+            keeps_awake[root_of(root, low)] = True
 
 
 @part

@@ -75,6 +75,9 @@ def weigh(solver, span, islands):
             if island[a] >= 0:
                 work = dot(push, velocity_at(solver, b, solver.arm_b, k, arms))
             slope[island_of(solver, k)] += work
+    for t in range(islands[0], islands[1] if len(arms) > 1 else islands[0]):
+        if solver.jointed[t]:  # motors and springs give energy
+            slope[t] = -math.inf
 
 
 @part

@@ -78,6 +78,26 @@ def colour_rows(state):
 
 
 @part
+def join_bodies(state):
+    """Number the bodies of joints, which join islands as contacts do."""
+    joints, island, inverse_mass = state.solver.joints, state.solver.island, state.bodies.inverse_mass
+    for e in range(joints.active):
+        a, b = joints.row_a[joints.order[e]], joints.row_b[joints.order[e]]
+        p, q = number_body(state, a) if a >= 0 else -1, number_body(state, b) if b >= 0 else -1
+        if p >= 0 and q >= 0 and inverse_mass[a] > 0.0 and inverse_mass[b] > 0.0:
+            one, other = root_of(island, p), root_of(island, q)
+            island[max(one, other)] = min(one, other)
+
+
+@part
+def island_of_joint(state, j):
+    """The island of a row of joints."""
+    joints, island, place = state.solver.joints, state.solver.island, state.bodies.place
+    a, b = joints.row_a[j], joints.row_b[j]
+    return max(island[place[a]] if a >= 0 else -1, island[place[b]] if b >= 0 else -1)
+
+
+@part
 def number_islands(state):
     """``island`` becomes the number of each body's island, in the order of their first bodies; -1 for what cannot be
     moved. What is known of its bodies is summed up."""
@@ -96,7 +116,7 @@ def number_islands(state):
             count += 1
             solver.lightest[t], solver.most_change[t], solver.mass_of[t], solver.force_of[t] = math.inf, 0.0, 0.0, 0.0
             solver.stiff[t] = solver.own[t] = solver.strike[t] = solver.taken[t] = 0.0
-            solver.size_of[t], solver.leader[t] = 0, i
+            solver.size_of[t], solver.leader[t], solver.jointed[t] = 0, i, False
         solver.number[q] = t
         change = sub(velocity[i], start[i])
         if warm_started[i]:
@@ -108,6 +128,8 @@ def number_islands(state):
     solver.islands = count
     for q in range(solver.bodies):
         island[q] = solver.number[q]
+    for e in range(solver.joints.active):
+        solver.jointed[island_of_joint(state, solver.joints.order[e])] = True
 
 
 @part
@@ -138,6 +160,9 @@ def choose_substeps(solver, t, usual, dt):
     most substeps cannot bear counts as lighter, see ``bears``. From masses, not from impulses, which would change with
     the substeps; by factors of two, so that it seldom changes.
     """
+    if solver.size_of[t] == 0:  # it has joints alone
+        solver.substeps_of[t], solver.hard_of[t], solver.passes[t], solver.bears[t] = usual, False, 0, math.inf
+        return False
     sag = SAG * solver.most_change[t] * dt
     own = sag * solver.own[t] / OWN_SAG
     need = sag * solver.stiff[t] / (solver.lightest[t] * MOST_SAG)
@@ -200,10 +225,30 @@ def place_rows(state):
 
 
 @part
+def place_joints(state):
+    """The rows of joints by range, those of each in their order."""
+    solver, joints, ends = state.solver, state.solver.joints, state.solver.joint_ends
+    for s in range(solver.ranges):
+        ends[s] = 0
+    for e in range(joints.active):
+        ends[solver.range_of[island_of_joint(state, joints.order[e])]] += 1
+    rows = 0
+    for s in range(solver.ranges):  # from how many to where each begins
+        rows, ends[s] = rows + ends[s], rows
+    for e in range(joints.active):
+        s = solver.range_of[island_of_joint(state, joints.order[e])]
+        joints.sorted[ends[s]] = joints.order[e]
+        ends[s] += 1
+    for e in range(joints.active):
+        joints.order[e] = joints.sorted[e]
+
+
+@part
 def order_rows(state, dt):
     """Islands, their substeps, and the order of rows and bodies."""
     solver = state.solver
     colour_rows(state)
+    join_bodies(state)
     number_islands(state)
     weigh_rows(state, dt)
     solver.ranges = 1
@@ -213,3 +258,4 @@ def order_rows(state, dt):
             solver.range_of[t], solver.special[solver.ranges] = solver.ranges, t
             solver.ranges += 1
     place_rows(state)
+    place_joints(state)

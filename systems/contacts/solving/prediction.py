@@ -13,6 +13,7 @@ from ....framework.compilation import packed, part
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add, add_scaled, dot, length, scale, sub
 from ...codes import NEED_COLUMNS, OK
+from .joined import push_joined
 from .warm_start import find_rows, scale_to
 
 
@@ -90,7 +91,7 @@ def predict_rest(state, dt):
     bodies, memory = state.bodies, state.warm_start
     state.any_warm_started = False
     forget_support(state)
-    if state.response_idle or memory.counts[memory.now] == 0:
+    if state.response_idle or (memory.counts[memory.now] == 0 and state.solver.joints.active == 0):
         return OK
     if len(bodies.warm_start_velocity) == 0:
         return NEED_COLUMNS
@@ -101,6 +102,7 @@ def predict_rest(state, dt):
     mark_disabled(state)
     find_closing(state)
     apply_remembered(state)
+    push_joined(state, dt)
     travels = state.force_travels
     for i in range(state.first, state.moving):
         if bodies.warm_started[i]:

@@ -4,6 +4,74 @@ from __future__ import annotations
 
 from ....framework.jit.records.schema import Schema, flag, flags, floats, integer, ints, number, vectors
 
+# Rows of joints, which a plugin writes where joints or their fields change; see joints.
+JOINTS = Schema(
+    "Joints",
+    count=integer(),
+    joint=ints("int32"),  # the joint of a row, by number
+    kind=ints("int8"),  # POINT, LINE, SLIDE, TURN
+    rule=ints("int8"),  # HOLD, LIMIT, DRIVE, SPRING
+    entity_a=ints(),  # 0: the world
+    entity_b=ints(),
+    anchor_a=vectors(),  # m from the body's position, along its own axes; of the world: a place
+    anchor_b=vectors(),
+    axis=vectors(),  # of what slides, along the axes of a; of what turns, as a spin is stored
+    low=floats(),  # m or rad: the least, or the only one,
+    high=floats(),  # and the most
+    target=floats(),  # m/s or rad/s
+    most=floats(),  # N or N m
+    frequency=floats(),  # Hz, of springs
+    damping_ratio=floats(),
+    # what is kept from step to step
+    load=floats(),  # N or N m in the last substep,
+    pull=vectors(),  # and N of a POINT
+    old_load=floats(),  # the same before the step
+    old_pull=vectors(),
+    total=floats(),  # N s or N m s in the step
+    thrust=vectors(),
+    normal=vectors(),  # along which it acts
+    # pairs of bodies that joints keep from touching, the smaller id first, in order
+    apart=integer(),
+    apart_a=ints(),
+    apart_b=ints(),
+    # in a step
+    kept_in=integer(),  # 1 + the number of the step that old_load and old_pull were kept in
+    rows_version=integer(),  # of the rows of bodies
+    row_a=ints("int32"),  # -1: the world, or a body that is gone
+    row_b=ints("int32"),
+    active=integer(),  # rows that take part, in the order of their ranges:
+    order=ints("int32"),
+    sorted=ints("int32"),
+    first=ints("int32"),  # places of the two bodies
+    second=ints("int32"),
+    base_a=vectors(),  # anchors where the step has turned the bodies
+    base_b=vectors(),
+    rail=vectors(),  # axis, likewise
+    between=vectors(),  # m, from a to b where the step starts
+    angle=floats(),  # rad, likewise as the step has turned the bodies
+    # in a range
+    begin=integer(),  # places in ``order``
+    end=integer(),
+    step=number(),  # s of a substep
+    push_rate=floats(),  # 1/s at which error is pushed out,
+    mass_scale=floats(),  # and what makes it soft
+    impulse_scale=floats(),
+    # in a substep
+    arm_a=vectors(),
+    arm_b=vectors(),
+    gap=vectors(),  # m, of a POINT
+    mass=floats(),  # kg or kg m^2
+    inverse=vectors(),  # of the masses of a POINT: diagonal,
+    inverse_products=vectors(),  # and beside it
+    pushing=floats(),  # m/s or rad/s that the passes ask for,
+    opening=floats(),  # and those that do not push
+    soft=flags(),  # where a pass pushes
+    least=floats(),  # N s or N m s
+    greatest=floats(),
+    impulse=floats(),
+    push=vectors(),  # N s of a POINT
+)
+
 SOLVER = Schema(
     "Solver",
     # rows: contacts at rest, in the order of their ranges and colours
@@ -100,6 +168,7 @@ SOLVER = Schema(
     struck=flags(),  # some row is far from solved
     unsolved=flags(),
     leader=ints("int32"),  # row of its first body
+    jointed=flags(),
     # ranges: the ordinary islands, then each special one
     ranges=integer(),
     usual=integer(),  # substeps,
@@ -109,6 +178,7 @@ SOLVER = Schema(
     special=ints("int32"),  # island of a range
     row_ends=ints("int32"),
     body_ends=ints("int32"),
+    joint_ends=ints("int32"),
     # faults: how many bodies, and the row of the first
     squeezed=integer(),  # there is no room where they are pushed
     squeezed_row=integer(),
@@ -116,6 +186,7 @@ SOLVER = Schema(
     overloaded_row=integer(),
     restrained=integer(),  # first bodies of islands to which contacts would have given much energy
     restrained_row=integer(),
+    joints=JOINTS,
 )
 
 ARMS = ("place", "arm_a", "arm_b", "core_a", "core_b", "tangent_mass", "rolling", "rolled")

@@ -1,7 +1,8 @@
 """Rows of the solver: points where two bodies touch. How a row moves its bodies stands here, and nowhere else.
 
 Where bodies spin, each row has an arm to each of its bodies. ``arms`` is ARMS or NO_ARMS, which differ in type: each
-part is compiled as if there were no other, and a world without rotation pays nothing for it.
+part is compiled as if there were no other, and a world without rotation pays nothing for it. Where bodies are joined
+it is JOINTED, one longer than ARMS: substeps solve the joints of their range, too.
 
 A range of rows is a span (first row, end of the rows, first body, end of the bodies, arms).
 """
@@ -14,7 +15,7 @@ from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, divided, dot, item, replace, scale, sub
 from ...integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, shares_of_turn, twist
 
-NO_ARMS, ARMS = (), (True,)
+NO_ARMS, ARMS, JOINTED = (), (True,), (True, True)
 
 
 @inlined

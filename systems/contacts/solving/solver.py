@@ -39,8 +39,10 @@ from ..constants import (
 )  # fmt: skip
 from .guard import excess_speed, finish_substep, mark_struck
 from .hard import choose_hard, leave_open
+from .joints import finish_joints, measure_joints, solve_joints, start_joints, warm_start_joints
 from .rows import (
     ARMS,
+    JOINTED,
     NO_ARMS,
     apply_impulse,
     closing_speed,
@@ -82,6 +84,8 @@ def measure(solver, h, springs, dt, stiff, ends, span):
         solver.had_impulse[k] |= solver.impulse[k] > 0.0
         solver.opening[k], solver.pushing[k], solver.soft[k] = opening, pushing, soft
         any_struck |= excess_speed(solver, k, span[4]) * dt > EXCESS * solver.extent[k]
+    if len(span[4]) > 1:
+        measure_joints(solver)
     return any_struck
 
 
@@ -98,6 +102,8 @@ def apply_forces(solver, h, span):
 @part
 def apply_warm_start(solver, most, span):
     """The impulses of the last substep act again, no more than ``most`` of each: what is more was a blow."""
+    if len(span[4]) > 1:
+        warm_start_joints(solver)
     for k in range(span[0], span[1] if len(span[4]) > 0 and solver.has_rolling else span[0]):
         solver.rolled[k] = scale(solver.normal[k], 0.0)
     for k in range(span[0], span[1]):
@@ -222,6 +228,8 @@ def solve_substep(solver, springs, most, dt, h, kind, ends, span):
     apply_warm_start(solver, most, span)
     if stiff:
         close_in_order(solver, h, span)
+    if len(span[4]) > 1:
+        solve_joints(solver, True)
     solve_pass(solver, solver.pushing, True, span)
     if stiff:
         converge(solver, True, h, span)
@@ -231,6 +239,8 @@ def solve_substep(solver, springs, most, dt, h, kind, ends, span):
         mark_struck(solver, dt, span)
     if ends and solver.any_hard:
         leave_open(solver, h, span)
+    if len(span[4]) > 1:  # once: more often, chains give way more
+        solve_joints(solver, False)
     for _ in range(REFINED_PASSES if kind != ORDINARY else (LAST_RELAX_PASSES if ends else RELAX_PASSES)):
         solve_pass(solver, opening, False, span)
     if stiff:
@@ -239,6 +249,8 @@ def solve_substep(solver, springs, most, dt, h, kind, ends, span):
     for k in range(start, stop):
         solver.total[k] += solver.impulse[k]
         solver.had_impulse[k] |= solver.impulse[k] > 0.0
+    if len(span[4]) > 1:
+        finish_joints(solver)
 
 
 @part
@@ -246,6 +258,8 @@ def is_still(solver, dt, span):
     """Whether an island rests, and its last substep has changed nothing that matters: those that follow would not."""
     start, stop, begin, end, arms = span
     extent, fastest = math.inf, 0.0
+    if len(arms) > 1 and solver.joints.begin < solver.joints.end:
+        return False
     for q in range(begin, end):
         fastest = max(fastest, dot(solver.velocity[q], solver.velocity[q]))
     for k in range(start, stop):
@@ -309,6 +323,8 @@ def solve_range(solver, substeps, kind, dt, span):
     for k in range(span[0], span[1]):
         sag = LOADED * solver.sag * solver.impulse[k] * h / solver.mass[k]
         solver.loaded[k] = 0.0 if stiff else min(sag, MOST_LOADED * solver.extent[k])
+    if len(span[4]) > 1:
+        start_joints(solver, h, substeps / solver.usual)
     measure(solver, h, springs, dt, stiff, False, span)
     most = most_impulse(solver, solver.island[span[2]], substeps) if special else math.inf
     for step in range(substeps):
@@ -382,7 +398,12 @@ def advance(state, dt, arms):
                     turn_body(solver, q, scale(solver.spin[q], -dt))
             if solver.bears[t] < 1.0:
                 lighten(solver, t, span)
-        if span[1] > start:
+        any_joint = False
+        if len(arms) > 1:
+            solver.joints.begin = solver.joints.end if special else 0
+            solver.joints.end = solver.joint_ends[s]
+            any_joint = solver.joints.begin < solver.joints.end
+        if span[1] > start or any_joint:
             substeps, kind = state.substeps, ORDINARY
             if special:
                 substeps, kind = solver.substeps_of[t], HARD if solver.hard_of[t] else REFINED
@@ -404,4 +425,12 @@ def solve_turning_contacts(state, dt):
     """The contacts of bodies of which some spin."""
     if state.solver.contacts > 0:
         advance(state, dt, ARMS)
+    return OK
+
+
+@packed
+def solve_joined_contacts(state, dt):
+    """The joints of bodies, and the contacts where there are joints."""
+    if state.solver.contacts > 0 or state.solver.joints.active > 0:
+        advance(state, dt, JOINTED)
     return OK

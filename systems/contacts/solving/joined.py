@@ -1,0 +1,151 @@
+"""The bodies of joints: which joints take part in a step, what they keep apart, and where they hold their bodies."""
+
+from __future__ import annotations
+
+import math
+
+from ....framework.compilation import inlined, part
+from ....framework.jit.records.record_type import zero_of
+from ....framework.vectors import add, add_scaled, item, replace, scale, sub
+from ...codes import NEED_COLUMNS, OK
+from ...integration.turning import cross_spin
+from .joints import POINT, SLIDE, TURN
+from .rows import turn_body
+from .warm_start import row_of
+
+
+@inlined
+def may_move(state, i):
+    """Whether row i is a body that may move in this step."""
+    return 0 <= i < state.dynamic and state.bodies.inverse_mass[i] > 0.0
+
+
+@inlined
+def sleeps(state, i):
+    """Whether row i is a dynamic body that sleeps."""
+    return 0 <= i < state.dynamic and (i < state.first or state.bodies.still[i] > 0)
+
+
+@part
+def find_active(state):
+    """The rows of joints that hold a body which may move, in their order."""
+    joints, found = state.solver.joints, 0
+    if joints.rows_version != state.version:
+        for j in range(joints.count):
+            a, b = joints.entity_a[j], joints.entity_b[j]
+            joints.row_a[j] = row_of(state, a) if a > 0 else -1
+            joints.row_b[j] = row_of(state, b) if b > 0 else -1
+        joints.rows_version = state.version
+    for j in range(joints.count):
+        a, b = joints.row_a[j], joints.row_b[j]
+        joints.old_load[j], joints.old_pull[j] = joints.load[j], joints.pull[j]
+        joints.total[j], joints.thrust[j] = 0.0, zero_of(state)
+        gone = (a < 0 and joints.entity_a[j] > 0) or (b < 0 and joints.entity_b[j] > 0)
+        if not (gone or sleeps(state, a) or sleeps(state, b)) and (may_move(state, a) or may_move(state, b)):
+            joints.order[found] = j
+            found += 1
+    joints.active, joints.kept_in = found, state.step_number + 1
+
+
+def begin_joints(state, dt):
+    """Which joints take part; all bodies have the columns of those that spin, also where none does."""
+    bodies, zero = state.bodies, zero_of(state)
+    if len(bodies.spin) < state.count or len(bodies.origin) < state.count:
+        return NEED_COLUMNS
+    if not state.spinning:
+        state.spinning = True
+        for i in range(state.count):
+            bodies.spin[i], bodies.turn[i], bodies.inverse_inertia[i] = zero, zero, zero
+            bodies.inverse_products[i], bodies.rolling_radius[i], bodies.rolling_friction[i] = zero, 0.0, 0.0
+    if not state.collides:
+        state.solver.contacts = state.pairs.count = state.pairs.resting_count = 0
+    find_active(state)
+    return OK
+
+
+@part
+def is_apart(joints, a, b):
+    """Whether a joint keeps two bodies, by their ids, from touching."""
+    low, high = 0, joints.apart
+    while low < high:
+        middle = (low + high) // 2
+        one, other = joints.apart_a[middle], joints.apart_b[middle]
+        if one < a or (one == a and other < b):
+            low = middle + 1
+        else:
+            high = middle
+    return low < joints.apart and joints.apart_a[low] == a and joints.apart_b[low] == b
+
+
+def leave_out_joined(state, dt):
+    """Pairs of bodies that a joint keeps from touching are no candidates."""
+    candidates, entity, joints, kept = state.candidates, state.bodies.entity, state.solver.joints, 0
+    if joints.apart == 0:
+        return OK
+    first, second = candidates.first, candidates.second
+    for c in range(candidates.count):
+        a, b = first[c], second[c]
+        first[kept], second[kept] = a, b
+        kept += not is_apart(joints, min(entity[a], entity[b]), max(entity[a], entity[b]))
+    candidates.count = kept
+    return OK
+
+
+@inlined
+def turned(state, i, v):
+    """A vector along the axes of body i, as it is in the world."""
+    rotation = state.bodies.rotation
+    if len(rotation) == 0:
+        return v
+    if len(v) == 2:
+        c, s = math.cos(rotation[i]), math.sin(rotation[i])
+        return replace(replace(v, 0, c * item(v, 0) - s * item(v, 1)), 1, s * item(v, 0) + c * item(v, 1))
+    axis, k = v, 4 * i
+    axis = replace(replace(replace(axis, 0, rotation[k + 1]), 1, rotation[k + 2]), len(v) - 1, rotation[k + 3])
+    half = cross_spin(axis, v)
+    return add(add_scaled(v, half, 2.0 * rotation[k]), scale(cross_spin(axis, half), 2.0))
+
+
+@part
+def push_joined(state, dt):
+    """The forces of the joints in the last step act on the velocities once more, see prediction."""
+    joints, bodies = state.solver.joints, state.bodies
+    velocity, inverse_mass = bodies.linear_velocity, bodies.inverse_mass
+    for e in range(joints.active):
+        j = joints.order[e]
+        if joints.kind[j] == TURN:
+            continue
+        push = scale(joints.pull[j] if joints.kind[j] == POINT else scale(joints.normal[j], joints.load[j]), dt)
+        a, b = joints.row_a[j], joints.row_b[j]
+        if a >= 0 and inverse_mass[a] > 0.0:
+            bodies.warm_started[a], velocity[a] = True, add_scaled(velocity[a], push, -inverse_mass[a])
+        if b >= 0 and inverse_mass[b] > 0.0:
+            bodies.warm_started[b], velocity[b] = True, add_scaled(velocity[b], push, inverse_mass[b])
+
+
+@part
+def lay_joints(state):
+    """Where the joints hold their bodies, as the step has turned these. The world has the place behind all bodies."""
+    solver, joints, bodies, zero = state.solver, state.solver.joints, state.bodies, zero_of(state)
+    ground = solver.bodies
+    solver.velocity[ground], solver.shift[ground], solver.spin[ground] = zero, zero, zero
+    turn_body(solver, ground, zero)
+    solver.inverse_mass[ground], solver.island[ground] = 0.0, -1
+    solver.inverse_inertia[ground], solver.inverse_products[ground] = zero, zero
+    for e in range(joints.active):
+        j = joints.order[e]
+        a, b = joints.row_a[j], joints.row_b[j]
+        joints.first[j] = bodies.place[a] if a >= 0 else ground
+        joints.second[j] = bodies.place[b] if b >= 0 else ground
+        start_a = bodies.previous_position[a] if a >= 0 else zero
+        start_b = bodies.previous_position[b] if b >= 0 else zero
+        joints.between[j] = sub(start_b, start_a)
+        joints.base_a[j] = turned(state, a, joints.anchor_a[j]) if a >= 0 else joints.anchor_a[j]
+        joints.base_b[j] = turned(state, b, joints.anchor_b[j]) if b >= 0 else joints.anchor_b[j]
+        joints.rail[j] = joints.axis[j]
+        if a >= 0 and joints.kind[j] == SLIDE:
+            joints.rail[j] = turned(state, a, joints.axis[j])
+        joints.angle[j] = 0.0
+        if len(zero) == 2 and len(bodies.rotation) > 0:
+            angle = bodies.rotation[b] if b >= 0 else 0.0
+            joints.angle[j] = angle - bodies.rotation[a] if a >= 0 else angle

@@ -1,0 +1,273 @@
+"""Rows of joints in the passes of the solver: what holds two points, a length, a way or an angle.
+
+A joint is a few rows, which stand next to each other. POINT holds two anchors together, LINE the length between them,
+SLIDE how far b's anchor is along an axis of a, TURN an angle. A row HOLDs its value, keeps it within LIMITs, DRIVEs it
+at a speed, or is a SPRING. What holds is as soft as a spring of a frequency that follows the rate of the substeps, and
+is solved without that in the passes that do not push; springs are solved in the pass that pushes alone.
+
+Joints come before the contacts of their range, in the pass that pushes and once in those that do not. Their bodies have
+the columns of bodies that spin, as contacts of such bodies have: see rows.JOINTED.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ....framework.compilation import inlined, part
+from ....framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
+from ...integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
+from ..constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY
+
+POINT, LINE, SLIDE, TURN = range(4)
+HOLD, LIMIT, DRIVE, SPRING = range(4)
+
+
+# -- in a range --------------------------------------------------------------------------------------------------------
+
+
+@part
+def start_joints(solver, h, more):
+    """The joints of a range start with the forces that they had, in substeps of h, of which there are so many times
+    more than usual: errors are pushed out at the usual rate."""
+    joints = solver.joints
+    joints.step = h
+    for e in range(joints.begin, joints.end):
+        j = joints.order[e]
+        joints.impulse[j], joints.push[j] = joints.load[j] * h, scale(joints.pull[j], h)
+        spring = joints.rule[j] == SPRING
+        omega = 2.0 * math.pi * (joints.frequency[j] if spring else JOINT_FREQUENCY / h)
+        damping = 2.0 * (joints.damping_ratio[j] if spring else JOINT_DAMPING_RATIO * more) + h * omega
+        stiffness = h * omega * damping
+        joints.push_rate[j] = omega / damping if damping > 0.0 else 0.0
+        joints.mass_scale[j], joints.impulse_scale[j] = stiffness / (1.0 + stiffness), 1.0 / (1.0 + stiffness)
+
+
+# -- in a substep ------------------------------------------------------------------------------------------------------
+
+
+@inlined
+def turned_with(solver, q, arm):
+    """An arm of body q as that is turned now."""
+    return add(arm, end_of_turn(solver.turn[q], (solver.sine[q], solver.versine[q]), arm))
+
+
+@inlined
+def moved_by(solver, q, arm, along):
+    """What an impulse at the end of an arm of body q changes of the velocity there."""
+    spin = change_of_spin(solver, q, twist(arm, along))
+    return add(scale(along, solver.inverse_mass[q]), cross_spin(spin, arm))
+
+
+@inlined
+def weigh_point(solver, j, zero):
+    """The masses that impulses at two anchors move: the inverse of a matrix."""
+    joints, d = solver.joints, len(zero)
+    a, b, arm_a, arm_b = joints.first[j], joints.second[j], joints.arm_a[j], joints.arm_b[j]
+    if d == 2:
+        w, inertia = solver.inverse_mass[a] + solver.inverse_mass[b], solver.inverse_inertia
+        i_a, i_b = inertia[a], inertia[b]
+        x_a, y_a, x_b, y_b = item(arm_a, 0), item(arm_a, 1), item(arm_b, 0), item(arm_b, 1)
+        xx = w + item(i_a, 0) * y_a * y_a + item(i_b, 0) * y_b * y_b
+        yy = w + item(i_a, 0) * x_a * x_a + item(i_b, 0) * x_b * x_b
+        xy = -item(i_a, 0) * x_a * y_a - item(i_b, 0) * x_b * y_b
+        size = 1.0 / (xx * yy - xy * xy)
+        joints.inverse[j] = replace(replace(zero, 0, yy * size), 1, xx * size)
+        joints.inverse_products[j] = replace(zero, 0, -xy * size)
+        return
+    x, y, z = replace(zero, 0, 1.0), replace(zero, 1, 1.0), replace(zero, d - 1, 1.0)
+    x = add(moved_by(solver, a, arm_a, x), moved_by(solver, b, arm_b, x))
+    y = add(moved_by(solver, a, arm_a, y), moved_by(solver, b, arm_b, y))
+    z = add(moved_by(solver, a, arm_a, z), moved_by(solver, b, arm_b, z))
+    xx, xy, yy = item(x, 0), item(x, 1), item(y, 1)
+    xz, yz, zz = item(x, d - 1), item(y, d - 1), item(z, d - 1)
+    aa, bb, cc = yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy
+    ab, ac, bc = xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz
+    size = xx * aa + xy * ab + xz * ac
+    joints.inverse[j] = replace(replace(replace(zero, 0, aa / size), 1, bb / size), d - 1, cc / size)
+    joints.inverse_products[j] = replace(replace(replace(zero, 0, ab / size), 1, ac / size), d - 1, bc / size)
+
+
+@inlined
+def multiplied(diagonal, others, v):
+    """A symmetric matrix times a vector; others: xy, in space xy, xz, yz."""
+    if len(v) == 2:
+        x = item(diagonal, 0) * item(v, 0) + item(others, 0) * item(v, 1)
+        return replace(replace(v, 0, x), 1, item(others, 0) * item(v, 0) + item(diagonal, 1) * item(v, 1))
+    return symmetric(diagonal, others, v)
+
+
+@part
+def ask(joints, j, value):
+    """What a row asks of the speed of its value, m/s or rad/s, and the impulses that it may have."""
+    rule, h = joints.rule[j], joints.step
+    joints.soft[j], joints.opening[j], joints.pushing[j] = rule != DRIVE, 0.0, 0.0
+    joints.greatest[j] = joints.most[j] * h
+    joints.least[j] = -joints.greatest[j]
+    if rule == DRIVE:
+        joints.opening[j] = joints.pushing[j] = joints.target[j]
+    elif rule != LIMIT:
+        joints.pushing[j] = -joints.push_rate[j] * (value - joints.low[j])
+    else:
+        below, above = value - joints.low[j], joints.high[j] - value
+        lower = below <= above
+        room = below if lower else above
+        speed = -room / h if room > 0.0 else -joints.push_rate[j] * room
+        joints.soft[j] = room <= 0.0
+        joints.pushing[j] = speed if lower else -speed
+        if room > 0.0:
+            joints.opening[j] = joints.pushing[j]
+        if lower:
+            joints.least[j] = 0.0
+        else:
+            joints.greatest[j] = 0.0
+
+
+@part
+def measure_joints(solver):
+    """Where the joints of a range hold their bodies now, and what they ask."""
+    joints, turn, shift, order = solver.joints, solver.turn, solver.shift, solver.joints.order
+    kinds, first, second, base_a, base_b = joints.kind, joints.first, joints.second, joints.base_a, joints.base_b
+    between, arms_a, arms_b, gap = joints.between, joints.arm_a, joints.arm_b, joints.gap
+    for e in range(joints.begin, joints.end):
+        j = order[e]
+        kind, a, b = kinds[j], first[j], second[j]
+        if kind == TURN:
+            axis = joints.axis[j]
+            moved = dot(axis, change_of_spin(solver, a, axis)) + dot(axis, change_of_spin(solver, b, axis))
+            joints.mass[j] = 1.0 / moved if moved > 0.0 else 0.0
+            ask(joints, j, joints.angle[j] + dot(axis, sub(turn[b], turn[a])))
+            continue
+        arm_a, arm_b = turned_with(solver, a, base_a[j]), turned_with(solver, b, base_b[j])
+        way = add(between[j], sub(add(shift[b], arm_b), add(shift[a], arm_a)))
+        if kind == POINT:
+            arms_a[j], arms_b[j], gap[j] = arm_a, arm_b, way
+            weigh_point(solver, j, scale(way, 0.0))
+            continue
+        normal, value = joints.normal[j], length(way)
+        if kind == SLIDE:
+            normal = turned_with(solver, a, joints.rail[j])
+            arm_a, value = add(arm_a, way), dot(way, normal)
+        elif value > 0.0:
+            normal = scale(way, 1.0 / value)
+        arms_a[j], arms_b[j], joints.normal[j] = arm_a, arm_b, normal
+        moved = solver.inverse_mass[a] + solver.inverse_mass[b]
+        joints.mass[j] = 1.0 / (moved + compliance(solver, a, arm_a, normal) + compliance(solver, b, arm_b, normal))
+        ask(joints, j, value)
+
+
+@inlined
+def move_apart(solver, j, impulse):
+    """Push b at its anchor by an impulse, a vector, and a back."""
+    joints = solver.joints
+    a, b = joints.first[j], joints.second[j]
+    w_a, w_b = solver.inverse_mass[a], solver.inverse_mass[b]
+    if w_a > 0.0:
+        solver.velocity[a] = add_scaled(solver.velocity[a], impulse, -w_a)
+        solver.spin[a] = sub(solver.spin[a], change_of_spin(solver, a, twist(joints.arm_a[j], impulse)))
+    if w_b > 0.0:
+        solver.velocity[b] = add_scaled(solver.velocity[b], impulse, w_b)
+        solver.spin[b] = add(solver.spin[b], change_of_spin(solver, b, twist(joints.arm_b[j], impulse)))
+
+
+@inlined
+def give_row(solver, j, impulse):
+    """Let a row that is no POINT act with an impulse."""
+    joints = solver.joints
+    if joints.kind[j] != TURN:
+        move_apart(solver, j, scale(joints.normal[j], impulse))
+        return
+    a, b, twisted = joints.first[j], joints.second[j], scale(joints.axis[j], impulse)
+    if solver.inverse_mass[a] > 0.0:
+        solver.spin[a] = sub(solver.spin[a], change_of_spin(solver, a, twisted))
+    if solver.inverse_mass[b] > 0.0:
+        solver.spin[b] = add(solver.spin[b], change_of_spin(solver, b, twisted))
+
+
+@part
+def warm_start_joints(solver):
+    """The impulses of the last substep act again, with the anchors as they are now."""
+    joints = solver.joints
+    for e in range(joints.begin, joints.end):
+        j = joints.order[e]
+        if joints.kind[j] == POINT:
+            move_apart(solver, j, joints.push[j])
+        else:
+            give_row(solver, j, joints.impulse[j])
+
+
+@inlined
+def speed_between(solver, j):
+    """The velocity of b's anchor as that of a sees it."""
+    joints = solver.joints
+    a, b = joints.first[j], joints.second[j]
+    v_a = add(solver.velocity[a], cross_spin(solver.spin[a], joints.arm_a[j]))
+    return sub(add(solver.velocity[b], cross_spin(solver.spin[b], joints.arm_b[j])), v_a)
+
+
+@inlined
+def solve_row(solver, j, pushes):
+    """The value of a row changes as it asks, as far as its impulses allow."""
+    joints, old = solver.joints, solver.joints.impulse[j]
+    if joints.kind[j] == TURN:
+        speed = dot(joints.axis[j], sub(solver.spin[joints.second[j]], solver.spin[joints.first[j]]))
+    else:
+        speed = dot(joints.normal[j], speed_between(solver, j))
+    if pushes and joints.soft[j]:
+        change = joints.mass_scale[j] * joints.mass[j] * (joints.pushing[j] - speed) - joints.impulse_scale[j] * old
+    else:
+        change = joints.mass[j] * ((joints.pushing[j] if pushes else joints.opening[j]) - speed)
+    new = min(joints.greatest[j], max(joints.least[j], old + change))
+    joints.impulse[j] = new
+    give_row(solver, j, new - old)
+
+
+@part
+def solve_joints(solver, pushes):
+    """One pass over the joints of a range. Columns stand in names, so that no row looks for them again."""
+    joints, velocity, spin, inverse_mass = solver.joints, solver.velocity, solver.spin, solver.inverse_mass
+    inertia, products = solver.inverse_inertia, solver.inverse_products
+    order, kind, rule, first, second = joints.order, joints.kind, joints.rule, joints.first, joints.second
+    arm_a, arm_b, gap, push, most = joints.arm_a, joints.arm_b, joints.gap, joints.push, joints.most
+    diagonal, others = joints.inverse, joints.inverse_products
+    rate, mass_scale, impulse_scale = joints.push_rate, joints.mass_scale, joints.impulse_scale
+    step = joints.step
+    for e in range(joints.begin, joints.end):
+        j = order[e]
+        if not pushes and rule[j] == SPRING:
+            continue
+        if kind[j] != POINT:
+            solve_row(solver, j, pushes)
+            continue
+        a, b, r_a, r_b, old = first[j], second[j], arm_a[j], arm_b[j], push[j]
+        v_a, v_b, s_a, s_b, w_a, w_b = velocity[a], velocity[b], spin[a], spin[b], inverse_mass[a], inverse_mass[b]
+        speed = sub(add(v_b, cross_spin(s_b, r_b)), add(v_a, cross_spin(s_a, r_a)))
+        if pushes:
+            speed = add_scaled(speed, gap[j], rate[j])
+            change = scale(multiplied(diagonal[j], others[j], speed), -mass_scale[j])
+            change = add_scaled(change, old, -impulse_scale[j])
+        else:
+            change = scale(multiplied(diagonal[j], others[j], speed), -1.0)
+        new, limit = add(old, change), most[j] * step
+        if limit < math.inf:
+            size = length(new)
+            if size > limit:
+                new = scale(new, limit / size)
+            change = sub(new, old)
+        push[j] = new
+        if w_a > 0.0:
+            velocity[a] = add_scaled(v_a, change, -w_a)
+            spin[a] = sub(s_a, symmetric(inertia[a], products[a], twist(r_a, change)))
+        if w_b > 0.0:
+            velocity[b] = add_scaled(v_b, change, w_b)
+            spin[b] = add(s_b, symmetric(inertia[b], products[b], twist(r_b, change)))
+
+
+@part
+def finish_joints(solver):
+    """What the joints of a range have done in a substep."""
+    joints = solver.joints
+    for e in range(joints.begin, joints.end):
+        j = joints.order[e]
+        joints.total[j] += joints.impulse[j]
+        joints.thrust[j] = add(joints.thrust[j], joints.push[j])
+        joints.load[j], joints.pull[j] = joints.impulse[j] / joints.step, scale(joints.push[j], 1.0 / joints.step)

@@ -1,0 +1,242 @@
+"""What worlds do with joints: errors, events, going back, files, sleep, contacts between joined bodies."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from helpers_joints import G, at, chain, disc, gaps, joint_world, plank, run
+
+from carom import Phase, Physics, RigidBody, SphereCollider, StepError, System, Transform, World
+from carom.plugins.joints import Ball, Distance, Hinge, Joints, Motor, MousePull, Slider, Weld
+from carom.plugins.rotation import Rotation, Spin
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Hinge(1, 1, anchor=(0, 0)), "two bodies"),
+        (lambda: Distance(None, None), "two bodies"),
+        (lambda: MousePull(None, grip=(0, 0), target=(1, 1)), "two bodies"),
+        (lambda: Hinge(1, 2, anchor=(0, math.nan)), "finite"),
+        (lambda: Hinge(1, 2, anchor=(0, 0), limits=(1.0, -1.0)), "least, most"),
+        (lambda: Hinge(1, 2, anchor=(0, 0), limits=1.0), "two numbers"),
+        (lambda: Hinge(1, 2, anchor=(0, 0), max_torque=-1.0), "at least 0"),
+        (lambda: Hinge(1, 2, anchor=(0, 0), frequency=0.0), "positive"),
+        (lambda: Distance(1, 2, length=(2.0, 1.0)), "least, most"),
+        (lambda: Distance(1, 2, length=-1.0), "at least 0"),
+        (lambda: Distance(1, 2, length=(0.0, 1.0), frequency=2.0), "one length"),
+        (lambda: Weld(1, 2, anchor=(0, 0), breaking_force=0.0), "positive"),
+        (lambda: Slider(1, 2, direction=(0, 0)), "not be 0"),
+        (lambda: Motor(1, 2), "speed or an angle"),
+        (lambda: Motor(1, 2, speed=1.0, angle=1.0), "speed or an angle"),
+    ],
+)
+def test_what_no_joint_can_be_is_refused_at_the_call(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_what_no_world_can_have_is_refused_by_its_step():
+    for place, dimensions, message in (("gone", 2, "no body"), ("static", 2, "no dynamic body"), ("ball", 3, "2 dim")):
+        world = World(Physics(dimensions=dimensions), Joints())
+        body = world.create_entity(Transform((0,) * dimensions), RigidBody(), SphereCollider(0.5))
+        wall = world.create_entity(Transform((3,) * dimensions), SphereCollider(0.5))
+        if place == "gone":
+            world.delete_entity(wall, immediate=True)
+        if place == "static":
+            world.delete_entity(body, immediate=True)
+        world.create_entity(Hinge(None if place == "static" else body, wall, anchor=(0,) * dimensions))
+        with pytest.raises(ValueError, match=message):
+            world.step()
+
+
+def test_joints_belong_to_one_world_with_physics():
+    joints = Joints()
+    with pytest.raises(Exception, match="need physics"):
+        World(Joints())
+    _kept = World(Physics(dimensions=2), joints)
+    with pytest.raises(ValueError, match="belong to world"):
+        World(Physics(dimensions=2), joints)
+
+
+def test_fields_that_do_not_fit_leave_the_joint_as_it_is():
+    world, _ = joint_world()
+    leaf = plank(world, (0.5, 0))
+    hinge = Hinge(None, leaf, anchor=(0, 0), limits=(-0.5, 0.5))
+    world.create_entity(hinge)
+    world.step()
+    with pytest.raises(ValueError, match="least, most"):
+        hinge.lower = 1.0
+    assert hinge.lower == -0.5
+    hinge.lower = -1.0
+    run(world, 300)
+    assert at(world, leaf).rotation == pytest.approx(-1.0, abs=2e-3)
+
+
+def test_joints_of_deleted_bodies_are_lost():
+    world, joints = joint_world()
+    bodies, hinges = chain(world, 3, (1, 0), (0.5, 0.1))
+    lost = []
+    world.on("joint_lost", lambda entity, joint: lost.append((entity, joint.b)))
+    world.step()
+    assert joints.of(bodies[1]) == hinges[1:]
+    world.delete_entity(bodies[1])
+    world.step()
+    assert lost == [(hinges[1], bodies[1]), (hinges[2], bodies[2])]
+    assert not world.entity_exists(hinges[1])
+    assert len(joints) == 1
+    world.delete_entity(hinges[0])
+    before = at(world, bodies[0]).y
+    run(world, 60)
+    assert len(joints) == 0
+    assert at(world, bodies[0]).y < before - 0.4 * G
+
+
+def test_joint_breaks_at_its_force():
+    world, joints = joint_world()
+    for x, most in enumerate((1.2 * G, 0.9 * G)):
+        world.create_entity(Distance(None, disc(world, (x, -1)), anchor_a=(x, 0), breaking_force=most))
+    broken = []
+    world.on("joint_broken", lambda entity, joint: broken.append((joint.breaking_force, world.step_count)))
+    run(world, 30)
+    assert broken == [(pytest.approx(0.9 * G), broken[0][1])]
+    assert broken[0][1] < 3
+    assert len(joints) == 1
+
+
+def test_joined_bodies_touch_only_if_they_may():
+    for connected in (False, True):
+        world, _ = joint_world(0)
+        a, b = disc(world, (0, 0), 0.6), disc(world, (1, 0), 0.6)
+        world.create_entity(Distance(a, b, length=1.0, collide_connected=connected))
+        world.step()
+        assert (len(world.contacts) > 0) == connected
+
+
+def test_same_joints_same_bits_and_back_again():
+    def build():
+        world, joints = joint_world()
+        plank(world, (0, -6), (20, 0.5), mass=50.0)
+        _, hinges = chain(world, 8, (0.8, 0.6), (0.45, 0.1))
+        world.create_entity(Transform((0, -8)), RigidBody(kind="static"))
+        return world, joints, hinges
+
+    world, joints, hinges = build()
+    other, _, _ = build()
+    run(world, 40)
+    run(other, 40)
+    assert world.state_hash() == other.state_hash()
+    snapshot, forces = world.snapshot(), [joints.state(hinge).impulse for hinge in hinges]
+    run(world, 40)
+    later = world.state_hash()
+    assert later != other.state_hash()
+    world.delete_entity(hinges[3])
+    run(world, 3)
+    world.restore(snapshot)
+    assert world.state_hash() == other.state_hash()
+    run(world, 40)
+    assert world.state_hash() == later
+    world.restore(snapshot)
+    world.step()
+    assert not np.allclose([joints.state(hinge).impulse for hinge in hinges], 0 * np.array(forces))
+
+
+def test_saved_world_goes_on_to_the_bit(tmp_path):
+    world, _ = joint_world()
+    chain(world, 8, (0.8, 0.6), (0.45, 0.1))
+    run(world, 40)
+    world.save(tmp_path / "chain.carom")
+    loaded = World.load(tmp_path / "chain.carom", Physics(dimensions=2, gravity=(0, -G)), Rotation(), Joints())
+    run(world, 40)
+    run(loaded, 40)
+    assert loaded.state_hash() == world.state_hash()
+
+
+class Fails(System):
+    """Raises once."""
+
+    phase = Phase.END
+    due = 5
+
+    def process(self, dt):
+        if self.world.step_count == self.due:
+            self.due = -1
+            raise RuntimeError("once")
+
+
+def test_step_that_fails_leaves_the_forces_as_they_were():
+    hashes = []
+    for fails in (False, True):
+        world, _ = joint_world()
+        chain(world, 8, (0.8, 0.6), (0.45, 0.1))
+        system = Fails()
+        system.due = 5 if fails else -1
+        world.add_system(system)
+        for _ in range(20):
+            try:
+                world.step()
+            except StepError:
+                world.step()
+        hashes.append(world.state_hash())
+    assert hashes[0] == hashes[1]
+
+
+def test_joined_bodies_sleep_and_wake_together():
+    world, _ = joint_world(sleeping=True)
+    world.create_entity(Transform((0, -1)), RigidBody(kind="static"), SphereCollider(0.5))
+    bodies = [disc(world, (k, 0.0), 0.3) for k in range(3)]
+    world.create_entity(Transform((1, -10.3)), SphereCollider(10.0))
+    for a, b in itertools.pairwise(bodies):
+        world.create_entity(Distance(a, b))
+    for body in bodies:
+        world.create_entity(Distance(None, body, anchor_a=(at(world, body).x, 2.0)))
+    run(world, 300)
+    asleep = [world.component_for_entity(body, RigidBody).asleep for body in bodies]
+    assert all(asleep)
+    before = [at(world, body).y for body in bodies]
+    world.component_for_entity(bodies[2], RigidBody).apply_impulse((0.0, 1.0))
+    world.step()
+    assert not any(world.component_for_entity(body, RigidBody).asleep for body in bodies)
+    run(world, 5)
+    assert at(world, bodies[2]).y > before[2]
+
+
+@pytest.mark.parametrize("kind", [Ball, Distance])
+def test_pendulum_in_space_keeps_its_moment_about_the_vertical(kind):
+    world = World(Physics(dimensions=3, gravity=(0, 0, -G)), Rotation(), Joints())
+    spin = [Spin(inertia=np.full(3, 0.1))] if kind is Ball else []
+    where = math.sin(0.5), 0.0, -math.cos(0.5)
+    body = world.create_entity(Transform(where), RigidBody(linear_velocity=(0, 1, 0)), SphereCollider(0.1), *spin)
+    world.create_entity(Ball(None, body, anchor=(0, 0, 0)) if kind is Ball else Distance(None, body))
+    if kind is Ball:  # it turns about the pivot, as its velocity says
+        world.component_for_entity(body, Spin).angular_velocity = np.cross(where, (0, 1, 0))
+    before = world.kinetic_energy() + world.potential_energy()
+    for _ in range(300):
+        world.step()
+        x, y, z = at(world, body).position
+        assert math.hypot(x, y, z) == pytest.approx(1.0, abs=2e-3)
+    vx, vy, _ = world.component_for_entity(body, RigidBody).linear_velocity
+    moment, start = x * vy - y * vx, math.sin(0.5)
+    if kind is Ball:
+        moment += 0.1 * np.asarray(world.component_for_entity(body, Spin).angular_velocity)[2]
+        start += 0.1 * np.cross(where, (0, 1, 0))[2]
+    assert moment == pytest.approx(start, rel=1e-3)
+    assert world.kinetic_energy() + world.potential_energy() == pytest.approx(before, abs=0.02 * G)
+
+
+def test_bridge_bears_what_lies_on_it():
+    world, joints = joint_world()
+    bodies, hinges = chain(world, 20, (1, 0), (0.5, 0.1))
+    hinges.append(world.create_entity(Hinge(bodies[-1], None, anchor=(20, 0))))
+    for k in range(5):
+        plank(world, (6 + 2 * k, 0.6), (0.4, 0.4), mass=2.0)
+    run(world, 600)
+    impulse = 0.0
+    for _ in range(600):
+        world.step()
+        impulse += joints.state(hinges[0]).impulse[1] - joints.state(hinges[-1]).impulse[1]
+        assert gaps(world, hinges).max() < 0.03
+    assert impulse == pytest.approx((20 + 10) * G * 10, rel=0.02)  # it still swings a little

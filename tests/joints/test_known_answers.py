@@ -1,0 +1,219 @@
+"""Joints against closed forms: pendulums, springs, ropes, sliders, motors, chains."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from helpers_joints import G, at, chain, disc, energy, gaps, joint_world, plank, run, spin_of
+from worlds import MODES
+
+from carom import Physics, RigidBody, SphereCollider, Transform, World
+from carom.plugins.joints import Distance, Hinge, Joints, Motor, MousePull, Slider, Weld
+from carom.plugins.rotation import BoxCollider
+
+
+def elliptic(k: float) -> float:
+    """The complete integral of the first kind, by the arithmetic and geometric mean."""
+    a, b = 1.0, math.sqrt(1.0 - k * k)
+    while a - b > 1e-15:
+        a, b = 0.5 * (a + b), math.sqrt(a * b)
+    return math.pi / (2.0 * a)
+
+
+def period(angles, dt):
+    """Of a swing, from where it passes the lowest point to the right."""
+    passes = [k + a / (a - b) for k, (a, b) in enumerate(itertools.pairwise(angles)) if a < 0 <= b]
+    return float(np.diff(passes).mean()) * dt
+
+
+@pytest.mark.parametrize(("rate", "bound"), [(60, 3e-4), (120, 1e-4), (240, 3e-5)])
+def test_physical_pendulum_has_the_period_of_the_elliptic_integral(rate, bound):
+    world, _ = joint_world(dt=1.0 / rate)
+    body = disc(world, (math.sin(1.0), -math.cos(1.0)), inertia=0.5)
+    world.create_entity(Hinge(None, body, anchor=(0, 0)))
+    before, angles = energy(world), []
+    for _ in range(10 * rate):
+        world.step()
+        angles.append(math.atan2(at(world, body).x, -at(world, body).y))
+        now = energy(world)
+        assert now <= before + 0.3 * G / rate  # within a swing, as any such steps do
+    assert period(angles, 1.0 / rate) == pytest.approx(4.0 * math.sqrt(1.5 / G) * elliptic(math.sin(0.5)), rel=bound)
+    assert before - now < 0.01 * G
+    assert abs(math.hypot(*at(world, body).position) - 1.0) < 2e-3
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_joints_hold_in_all_modes(mode):
+    world, joints = joint_world(collision=mode)
+    _, hinges = chain(world, 5, (0.8, 0.6), (0.45, 0.1))
+    plank(world, (0.0, -3.0), (0.5, 0.5))
+    floor = world.create_entity(Transform((0, -4)), BoxCollider((20.0, 0.5)))
+    run(world, 600)
+    assert gaps(world, hinges).max() < 0.02
+    assert floor in world.contacts.entity_b
+    assert sum(joints.state(hinges[0]).impulse) != 0.0
+
+
+def test_pendulum_without_spin_or_collider_swings_as_a_point():
+    world = World(Physics(dimensions=2, gravity=(0, -G)), Joints())
+    body = world.create_entity(Transform((math.sin(1.0), -math.cos(1.0))), RigidBody())
+    world.create_entity(Distance(None, body))
+    angles = []
+    for _ in range(600):
+        world.step()
+        angles.append(math.atan2(at(world, body).x, -at(world, body).y))
+    assert period(angles, 1.0 / 60) == pytest.approx(4.0 * math.sqrt(1.0 / G) * elliptic(math.sin(0.5)), rel=3e-4)
+
+
+def test_chain_of_50_hangs_for_a_minute():
+    world, _ = joint_world()
+    _, hinges = chain(world, 50, (0, -1), (0.1, 0.5))
+    run(world, 3600)
+    assert world.kinetic_energy() < 1e-20
+    assert gaps(world, hinges).max() < 0.01
+
+
+def test_chain_of_200_swings_and_stays_together():
+    world, _ = joint_world(on_fault="ignore")
+    _, hinges = chain(world, 200, (1, 0), (0.5, 0.1))
+    worst = 0.0
+    for _ in range(60):
+        run(world, 10)
+        worst = max(worst, gaps(world, hinges).max())
+    assert worst < 0.2
+
+
+def test_free_chain_keeps_its_momentum():
+    world, _ = joint_world(0)
+    bodies, _ = chain(world, 20, (1, 0), (0.5, 0.1), hangs=False)
+    for k, body in enumerate(bodies):
+        world.component_for_entity(body, RigidBody).linear_velocity = (0.0, math.sin(k))
+    before, momentum = world.kinetic_energy(), world.momentum()
+    for _ in range(1000):
+        world.step()
+    np.testing.assert_allclose(world.momentum(), momentum, atol=1e-12)
+    assert world.kinetic_energy() < before
+
+
+def test_spring_has_its_period_and_decay():
+    world, _ = joint_world(0)
+    body = disc(world, (0, -1.3))
+    world.create_entity(Distance(None, body, length=1.0, frequency=2.0, damping_ratio=0.1))
+    offsets = []
+    for _ in range(180):
+        world.step()
+        offsets.append(at(world, body).y + 1.0)
+    ways = np.array(offsets)
+    assert period(ways, 1.0 / 60) == pytest.approx(0.5 / math.sqrt(0.99), rel=0.01)
+    lowest = [-y for x, y, z in zip(ways, ways[1:], ways[2:], strict=False) if y < x and y <= z]
+    decay = math.log(lowest[0] / lowest[3]) / 3
+    assert 0.6 < decay < 0.85  # 2 pi 0.1 / sqrt(0.99) = .63 with many substeps
+
+
+def test_rope_never_pushes_and_holds():
+    world, joints = joint_world()
+    body = disc(world, (0, -0.2))
+    rope = world.create_entity(Distance(None, body, length=(0, 1)))
+    run(world, 10)
+    assert at(world, body).y == pytest.approx(-0.2 - 0.5 * G * 40 * 41 / 240**2)  # it falls freely
+    lowest = 0.0
+    for _ in range(300):
+        world.step()
+        lowest = min(lowest, at(world, body).y)
+    assert -1.001 < lowest < -1.0
+    assert joints.state(rope).impulse[1] == pytest.approx(G / 60)
+    world.component_for_entity(rope, Distance).length = (0, 0.5)  # a crane pulls it up
+    run(world, 300)
+    assert at(world, body).y == pytest.approx(-0.5, abs=1e-3)
+
+
+def test_slider_obeys_the_incline_and_stops_at_its_limit():
+    slope = -math.radians(30)
+    along = np.array((math.cos(slope), math.sin(slope)))
+    world, joints = joint_world()
+    body = plank(world, (0, 0), angle=slope)
+    slider = world.create_entity(Slider(None, body, direction=along, limits=(None, 2.0)))
+    run(world, 30)
+    assert joints.state(slider).speed == pytest.approx(G * 0.5 * 0.5, rel=1e-5)
+    for _ in range(150):
+        world.step()
+        assert abs(np.dot((-along[1], along[0]), at(world, body).position)) < 1e-3
+    assert joints.state(slider).value == pytest.approx(2.0, abs=1e-3)
+    assert joints.state(slider).speed == pytest.approx(0.0, abs=1e-9)
+    assert at(world, body).rotation == pytest.approx(slope, abs=1e-4)
+
+
+def test_motor_gives_its_torque_then_its_speed():
+    world, joints = joint_world(0)
+    wheel = disc(world, (0, 0), 1.0, inertia=2.0)
+    hinge = world.create_entity(Hinge(None, wheel, anchor=(0, 0), motor_speed=5.0, max_torque=4.0))
+    run(world, 30)
+    assert spin_of(world, wheel) == pytest.approx(4.0 / 2.0 * 0.5, rel=1e-12)
+    assert joints.state(hinge).torque == pytest.approx(4.0 / 60)
+    run(world, 200)
+    assert spin_of(world, wheel) == pytest.approx(5.0, rel=1e-12)
+    world.component_for_entity(hinge, Hinge).motor_speed = -3.0
+    run(world, 600)
+    assert spin_of(world, wheel) == pytest.approx(-3.0, rel=1e-12)
+
+
+@pytest.mark.parametrize(("share", "holds"), [(1.02, True), (0.98, False)])
+def test_motor_holds_a_pose_if_its_torque_is_enough(share, holds):
+    world, _ = joint_world()
+    arm = plank(world, (1, 0), (1.0, 0.1), mass=2.0)
+    world.create_entity(Hinge(None, arm, anchor=(0, 0)))
+    world.create_entity(Motor(None, arm, angle=0.0, max_torque=share * 2.0 * G))
+    run(world, 300)
+    assert (abs(at(world, arm).rotation) < 0.01) == holds
+
+
+def test_hinge_stops_at_its_limits():
+    world, joints = joint_world()
+    leaf = plank(world, (0.5, 0))
+    hinge = world.create_entity(Hinge(None, leaf, anchor=(0, 0), limits=(-0.7, 0.7)))
+    run(world, 300)
+    assert joints.state(hinge).value == pytest.approx(-0.7, abs=2e-3)
+    assert world.kinetic_energy() < 1e-20
+    assert joints.state(hinge).torque == pytest.approx(0.5 * math.cos(0.7) * G / 60, rel=1e-3)
+
+
+def test_mouse_lifts_a_body_which_sags_by_its_weight():
+    world, _ = joint_world()
+    body = disc(world, (0, 0))
+    world.create_entity(MousePull(body, grip=(0, 0), target=(2, 1), max_force=100.0))
+    run(world, 300)
+    np.testing.assert_allclose(at(world, body).position, (2.0, 1.0 - G / (10 * math.pi) ** 2), atol=2e-3)
+
+
+def test_mouse_lifts_nothing_that_is_too_heavy():
+    world, _ = joint_world()
+    body = disc(world, (0, 0))
+    world.create_entity(MousePull(body, grip=(0, 0), target=(0, 1), max_force=0.5 * G))
+    run(world, 60)
+    assert at(world, body).y == pytest.approx(-0.25 * G, rel=0.05)
+
+
+def test_welded_cantilever_sinks_a_little():
+    world, _ = joint_world(substeps=16)
+    before = None
+    for k in range(5):
+        body = plank(world, (k + 0.5, 0), (0.5, 0.25))
+        world.create_entity(Weld(before, body, anchor=(k, 0)))
+        before = body
+    run(world, 600)
+    assert before is not None
+    assert -0.01 < at(world, before).y < -0.001
+
+
+def test_contacts_and_joints_hold_together():
+    """A door lies on a ball: levers."""
+    world, joints = joint_world()
+    board = plank(world, (0.5, 0), (0.5, 0.1))
+    hinge = world.create_entity(Hinge(None, board, anchor=(0, 0)))
+    world.create_entity(Transform((0.75, -0.6)), SphereCollider(0.5))
+    run(world, 300)
+    assert world.kinetic_energy() < 1e-12
+    assert joints.state(hinge).impulse[1] == pytest.approx((1.0 - 0.5 / 0.75) * G / 60, rel=0.02)
