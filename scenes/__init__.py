@@ -3,7 +3,8 @@
 Every scene follows one protocol, ``build(settings, seed=0) -> World``; ``settings=None`` selects the scene's
 own default. A file given to ``carom run FILE.py`` follows the same protocol.
 
-The scenes are in folders by subject: motion, impacts, gases, rest, levels and turning. All can be imported from here.
+The scenes are in folders by subject: motion, impacts, gases, rest, levels, turning and joined. All can be imported from
+here.
 
 >>> from carom import scenes
 >>> world = scenes.get("billiards").build(seed=3)
@@ -11,6 +12,7 @@ The scenes are in folders by subject: motion, impacts, gases, rest, levels and t
 
 from .gases import asteroids, fastgas, gas2d, gas3d, mixed2d, player_query, thermal_gas
 from .impacts import billiards, bouncing, bullets, cradle, drops, galperin, oblique, shots
+from .joined import bridge, car, crane, ragdoll
 from .levels import conveyor, lift, maze, platforms, player, static_world
 from .motion import freefall, jump, orbit, spring
 from .protocol import Build, Scene
@@ -55,6 +57,10 @@ _SCENES: dict[str, Scene] = {
         dominoes.SCENE,
         tumbler.SCENE,
         rubble.SCENE,
+        bridge.SCENE,
+        ragdoll.SCENE,
+        car.SCENE,
+        crane.SCENE,
     )
 }
 
@@ -79,9 +85,12 @@ __all__ = [
     "billiards",
     "billiards_spin",
     "bouncing",
+    "bridge",
     "bullets",
+    "car",
     "conveyor",
     "cradle",
+    "crane",
     "dominoes",
     "drops",
     "fastgas",
@@ -105,6 +114,7 @@ __all__ = [
     "player",
     "player_query",
     "pyramid",
+    "ragdoll",
     "rubble",
     "shots",
     "spring",

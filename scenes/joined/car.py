@@ -1,0 +1,67 @@
+"""A car with sprung wheels and a motor drives over hills."""
+
+from __future__ import annotations
+
+import math
+
+from ...components import RigidBody, SphereCollider, Transform
+from ...components.spin import Spin
+from ...framework import Settings, World
+from ...plugins import Physics
+from ...plugins.joints import Hinge, Joints, Motor, Slider
+from ...plugins.rotation import BoxCollider, Rotation
+from ..protocol import Scene
+from ..sizes import real
+
+LENGTH, START = 120.0, -6.0  # m of road, and where the car starts
+PIECE = 1.0  # m of a piece of road
+HILL, WAVE = 0.6, 15.0  # m
+WHEEL, BASE = 0.4, 1.3  # m: radius, and from the middle of the car to an axle
+SPEED = 30.0  # rad/s of the wheels
+TORQUE = 60.0  # N m
+SPRING, RATIO = 4.0, 0.7  # Hz of the suspension, and its damping ratio
+TRAVEL = 0.25  # m
+SETTINGS = Settings()
+
+
+def height(x: float) -> float:
+    """Of the road: flat at both ends."""
+    rise = min(1.0, max(0.0, x / 10.0)) * min(1.0, max(0.0, (LENGTH - 20.0 - x) / 10.0))
+    return HILL * rise * (1.0 - math.cos(2.0 * math.pi * x / WAVE))
+
+
+def build(settings: Settings | None = None, seed: int = 0, *, speed: float = SPEED) -> World:
+    """A motor turns the rear wheel against the car, up to ``speed``; ``seed`` changes nothing."""
+    speed = real(speed, "speed")
+    world = World(Physics(dimensions=2, gravity=(0.0, -9.81)), Rotation(), Joints(), settings=settings or SETTINGS)
+    for k in range(-20, int(LENGTH / PIECE)):
+        low, high = height(k * PIECE), height((k + 1) * PIECE)
+        slope, thick = math.atan2(high - low, PIECE), 1.0
+        middle = (k + 0.5) * PIECE + thick * math.sin(slope), 0.5 * (low + high) - thick * math.cos(slope)
+        half = 0.5 * math.hypot(PIECE, high - low) + 0.1, thick
+        world.create_entity(Transform(middle, slope), BoxCollider(half, friction=0.9))
+    axle = WHEEL
+    chassis = world.create_entity(
+        Transform((START, axle + 0.5)), RigidBody(mass=20.0), BoxCollider((1.8, 0.25), friction=0.3), Spin()
+    )
+    for side in (-1, 1):
+        wheel = world.create_entity(
+            Transform((START + side * BASE, axle)), RigidBody(mass=2.0), SphereCollider(WHEEL, friction=0.9), Spin()
+        )
+        hub = world.create_entity(Transform((START + side * BASE, axle)), RigidBody(mass=1.0), Spin(inertia=0.05))
+        spring = {"frequency": SPRING, "damping_ratio": RATIO, "rest": -0.1}
+        world.create_entity(Slider(chassis, hub, direction=(0.0, 1.0), limits=(-TRAVEL, TRAVEL), **spring))
+        world.create_entity(Hinge(hub, wheel, anchor=(START + side * BASE, axle)))
+        if side < 0:
+            world.create_entity(Motor(chassis, wheel, speed=-speed, max_torque=TORQUE))
+    return world
+
+
+SCENE = Scene(
+    name="car",
+    description="a car with sprung wheels and a motor drives over hills",
+    build=build,
+    seconds=12.0,
+    view=((-10.0, -4.0), (100.0, 12.0)),
+    settings=SETTINGS,
+)

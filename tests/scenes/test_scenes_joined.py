@@ -1,0 +1,69 @@
+"""Scenes with joints: a bridge, ragdolls, a car, a crane."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from helpers_joints import gaps
+
+from carom import Transform
+from carom.plugins.joints import Hinge
+from carom.scenes import bridge, car, crane, ragdoll
+
+
+def hinges(world):
+    return [entity for entity, _ in world.get_component(Hinge)]
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_bridge_bears_what_falls_on_it(seed):
+    with bridge.build(seed=seed) as world:
+        worst = 0.0
+        for _ in range(60):
+            for _ in range(10):
+                world.step()
+            worst = max(worst, gaps(world, hinges(world)).max())
+        assert worst < 0.1
+        places = world.bodies.dynamic.position
+        assert places[:, 1].min() > -4.0
+        assert world.kinetic_energy() < 100.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_ragdolls_are_not_torn_and_stay_on_the_stairs(seed):
+    with ragdoll.build(seed=seed) as world:
+        worst, joints = 0.0, hinges(world)
+        for _ in range(60):
+            for _ in range(10):
+                world.step()
+            worst = max(worst, gaps(world, joints).max())
+        assert worst < 0.1
+        places = world.bodies.dynamic.position
+        ends = np.clip(np.ceil(places[:, 0] / ragdoll.STEP[0]), 1, ragdoll.STEPS) * ragdoll.STEP[1]
+        assert (places[:, 1] > -ends - 0.1).all()
+        assert world.kinetic_energy() < 50.0
+
+
+def test_the_car_drives_over_the_hills():
+    with car.build() as world:
+        lowest = math.inf
+        for _ in range(600):
+            world.step()
+            place = world.component_for_entity(world.bodies.dynamic.entity[0], Transform)
+            lowest = min(lowest, place.y - car.height(place.x))
+        assert place.x > 40.0
+        assert lowest > car.WHEEL
+        assert abs(place.rotation) < 0.5
+        assert gaps(world, hinges(world)).max() < 0.05
+
+
+def test_the_crane_carries_the_crate_across():
+    with crane.build() as world:
+        highest = 0.0
+        for _ in range(1200):
+            world.step()
+            highest = max(highest, world.bodies.dynamic.position[1, 1])
+        assert highest > crane.BEAM - crane.SHORT - 2.0
+        assert world.bodies.dynamic.position[1, 0] > crane.SPAN - 2.0
