@@ -27,7 +27,7 @@ def make_quiet_step(pipeline: Any, physics: Any) -> Callable[[], bool] | None:
     contents, clock, faults, profiler = pipeline.contents, pipeline.clock, pipeline.faults, pipeline.profiler
     changes, dead, registry, name = contents.log, contents.dead, pipeline.world.registry, pipeline.world.name
     table, scene, links, sleepers = physics.table, physics.scene, physics.links, physics.sleepers
-    followers = physics.extensions.followers
+    unsettled = physics.extensions.unsettled
     contacts, copies, words, alarm = physics.contacts, physics.copies, program.state.words, program.alarm
     number, others_write, found, pushed = map(
         program.state.word_of, ("step_number", "others_write", "found_current", "pushed")
@@ -40,7 +40,7 @@ def make_quiet_step(pipeline: Any, physics: Any) -> Callable[[], bool] | None:
             changes.dirty or dead or processors.changed or order.version != order_version or table.kind_changed
             or table.version + table.members_version + registry.version != scene.structure
             or table.static_version != scene.static_version or physics.parts_version != parts_version
-            or links.version != scene.version or physics.must_check or followers or sleepers.on or words[others_write]
+            or links.version != scene.version or physics.must_check or unsettled() or sleepers.on or words[others_write]
             or events.of_esper or (events.handlers and events.any_handlers()) or pipeline.in_step
         ):  # fmt: skip
             return False

@@ -9,7 +9,8 @@ import numpy as np
 from ...framework import NoPhysicsError, Plugin, World
 from ...systems.contacts.solving.joints import POINT, TURN
 from ...systems.contacts.solving.records import JOINTS
-from .components import KINDS, WORLD, Ball, Changes, Distance, Hinge, Joint, Motor, MousePull, Place, Slider, Weld
+from .joint import WORLD, Changes, Joint, Place
+from .kinds import KINDS, Ball, Cone, Distance, Hinge, Motor, MousePull, Slider, Weld
 
 # What a row keeps from step to step.
 KEPT = ("load", "pull", "normal", "total", "thrust")
@@ -21,13 +22,14 @@ class JointState(NamedTuple):
     impulse
         (d,) N s, on b
     torque
-        N m s, on b, beside that of the impulse; in 3D 0
+        N m s, on b, beside that of the impulse; in 3D (3,)
     value, speed
-        rad of a Hinge, a Weld or a Motor, m of a Slider or a Distance, and the change per second; else 0
+        rad of a Hinge, a Weld, a Motor or the twist of a Cone, m of a Slider or a Distance, and the change per second;
+        else 0
     """
 
     impulse: np.ndarray
-    torque: float
+    torque: float | np.ndarray
     value: float
     speed: float
 
@@ -52,6 +54,7 @@ class Joints(Plugin):
         self.world, physics = world, world.physics
         self._physics: Any = physics
         self._record: Any = physics.record(JOINTS)
+        self._log = world._contents().log
         self._seen: Any = None  # what the rows depend on
         self._joints: dict[int, Joint] = {}  # by entity, which ascend
         self._spans: dict[int, tuple[int, int]] = {}  # their rows
@@ -60,6 +63,7 @@ class Joints(Plugin):
         world.events.define("joint_lost", "joint_broken")
         self._physics.extensions.followers.append(self._follow)
         self._physics.extensions.finishers.append(self._finish)
+        self._physics.extensions.waiting.append(lambda: self._breaking or self._now() != self._seen)
         super().install(world)
 
     def __len__(self) -> int:
@@ -73,13 +77,13 @@ class Joints(Plugin):
         """Of the joint of that entity; KeyError if it has none that a step has taken."""
         record, physics, (start, stop) = self._record, self._physics, self._spans[entity]
         joint = self._joints[entity]
-        impulse, torque, value, speed = np.zeros(physics.dimensions), 0.0, 0.0, 0.0
+        impulse, torque, value, speed = np.zeros(physics.dimensions), np.zeros(physics.dimensions), 0.0, 0.0
         for j in range(start, stop):
             kind = record.kind[j]
             if kind == POINT:
                 impulse += record.thrust[j]
-            elif kind == TURN:
-                torque += float(record.total[j])
+            elif kind >= TURN:
+                torque += record.total[j] * record.normal[j]
             else:
                 impulse += record.total[j] * record.normal[j]
         a, b = (self._moving(entity) for entity in (joint.a, joint.b))
@@ -89,12 +93,12 @@ class Joints(Plugin):
             value = float(np.linalg.norm(point_b - point_a))
             speed = float((speed_b - speed_a) @ (point_b - point_a) / value) if value > 0.0 else 0.0
         elif isinstance(joint, Slider):
-            along = a[0].axes @ joint.along
+            along = a[0].axes @ joint.axis_a
             value = float(along @ (point_b - point_a))
             speed = float(along @ (speed_b - _speed_at(a, point_b)))
-        elif isinstance(joint, (Hinge, Weld, Motor)):
-            value, speed = b[0].angle - a[0].angle - (0.0 if isinstance(joint, Motor) else joint.start), b[2] - a[2]
-        return JointState(impulse, torque, value, speed)
+        elif isinstance(joint, (Hinge, Weld, Motor, Cone)):
+            value, speed = _turned(joint, a, b)
+        return JointState(impulse, float(torque[0]) if physics.dimensions == 2 else torque, value, speed)
 
     # -- snapshots --------------------------------------------------------------------------------
 
@@ -117,9 +121,8 @@ class Joints(Plugin):
 
     def _follow(self, world: World) -> None:
         """Which joints there are, and their fields, if anything has changed."""
-        physics, contents = self._physics, world._contents()
-        seen = contents.log.rounds, physics.table.version, Changes.count
-        if seen == self._seen:
+        contents = world._contents()
+        if self._now() == self._seen:
             return
         found: dict[int, Joint] = {}
         for kind in KINDS:
@@ -133,7 +136,11 @@ class Joints(Plugin):
         ended = [(entity, found.pop(entity)) for entity in lost]
         self._write(found)
         self._end(ended, "joint_lost")
-        self._seen = contents.log.rounds, physics.table.version, Changes.count
+        self._seen = self._now()
+
+    def _now(self) -> tuple[int, int, int]:
+        """Another value whenever entities or bodies have come or gone, or a field was set."""
+        return self._log.rounds, self._physics.table.version, Changes.count
 
     def _has_bodies(self, joint: Joint) -> bool:
         return all(entity == WORLD or self._row(entity) >= 0 for entity in (joint.a, joint.b))
@@ -147,8 +154,8 @@ class Joints(Plugin):
         for body in (joint.a, joint.b):
             if body != WORLD and self._row(body) < 0:
                 raise ValueError(f"{name} joins entity {body}, which is no body of world {physics._world.name!r}")
-        if joint.flat_only and physics.dimensions == 3:
-            raise ValueError(f"{name} is a joint of worlds of 2 dimensions; Ball and Distance are for 3, too")
+        if physics.dimensions not in joint.dimensions:
+            raise ValueError(f"{name} is no joint of worlds of {physics.dimensions} dimensions")
         for field in (field for field in joint.columns.values() if field.item == "vector"):
             field.check_dimensions(joint._values.get(field.name, 0.0), physics.dimensions, entity)
         moving = physics.table.stops[0]
@@ -182,7 +189,7 @@ class Joints(Plugin):
             joint = joints[entity]
             record.joint[j], record.kind[j], record.rule[j] = entity, row.kind, row.rule
             record.entity_a[j], record.entity_b[j] = joint.a, joint.b
-            record.anchor_a[j], record.anchor_b[j] = joint.at_a, joint.at_b
+            record.anchor_a[j], record.anchor_b[j] = row.ends or (joint.at_a, joint.at_b)
             record.axis[j] = (1.0, *zero[1:]) if row.axis is None else row.axis
             for name in ("low", "high", "target", "most", "frequency", "damping_ratio"):
                 getattr(record, name)[j] = getattr(row, name)
@@ -248,6 +255,15 @@ class Joints(Plugin):
                 self.world.events.dispatch(event, entity, joint)
 
 
+def _turned(joint: Joint, a: tuple[Place, Any, Any], b: tuple[Place, Any, Any]) -> tuple[float, float]:
+    """(angle of b against a about the axis of a joint, its change per second)."""
+    if len(a[0].position) == 2:
+        return b[0].angle - a[0].angle - joint.start, b[2] - a[2]
+    axis, side_a, side_b = a[0].axes @ joint.axis_a, a[0].axes @ joint.side_a, b[0].axes @ joint.side_b
+    angle = np.arctan2(axis @ np.cross(side_a, side_b), side_a @ side_b)
+    return float(angle), float(axis @ (b[2] - a[2]))
+
+
 def _speed_at(moving: tuple[Place, Any, Any], point: Any) -> Any:
     """The velocity of a body's point."""
     place, velocity, spin = moving
@@ -265,4 +281,7 @@ def _matrix(q: Any) -> np.ndarray:
     ))  # fmt: skip
 
 
-__all__ = ["Ball", "Distance", "Hinge", "Joint", "JointState", "Joints", "Motor", "MousePull", "Slider", "Weld"]
+__all__ = [
+    "KINDS", "Ball", "Cone", "Distance", "Hinge", "Joint", "JointState", "Joints", "Motor", "MousePull", "Slider",
+    "Weld",
+]  # fmt: skip

@@ -49,9 +49,14 @@ class Extensions:
         self._own: dict[PluginStage, Record] = {}  # what each of them gets
         self._records: dict[Schema, Record] = {JOINTS: state.solver.joints}  # of plugins' own; these are shared
         self.followers: list[Callable[[Any], None]] = []  # what plugins do with the world before each step,
-        self.finishers: list[Callable[[Any], None]] = []  # and after it
+        self.finishers: list[Callable[[Any], None]] = []  # after it,
+        self.waiting: list[Callable[[], bool]] = []  # and whether they have something to do
         check_stages(registry.stages.values())
         registry.check_stages = check_stages
+
+    def unsettled(self) -> bool:
+        """Whether a plugin has something to do before or after this step."""
+        return bool(self.waiting) and any(waits() for waits in self.waiting)
 
     def follow(self, program: Program) -> bool:
         """Between two steps: what plugins and bodies there are now. True if the program has got other stages."""

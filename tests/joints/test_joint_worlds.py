@@ -40,7 +40,7 @@ def test_what_no_joint_can_be_is_refused_at_the_call(make, message):
 
 
 def test_what_no_world_can_have_is_refused_by_its_step():
-    for place, dimensions, message in (("gone", 2, "no body"), ("static", 2, "no dynamic body"), ("ball", 3, "2 dim")):
+    for place, dimensions, message in (("gone", 2, "no body"), ("static", 2, "no dynamic body"), ("ball", 3, "axis")):
         world = World(Physics(dimensions=dimensions), Joints())
         body = world.create_entity(Transform((0,) * dimensions), RigidBody(), SphereCollider(0.5))
         wall = world.create_entity(Transform((3,) * dimensions), SphereCollider(0.5))

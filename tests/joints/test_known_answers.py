@@ -76,6 +76,22 @@ def test_chain_of_50_hangs_for_a_minute():
     assert gaps(world, hinges).max() < 0.01
 
 
+@pytest.mark.parametrize("way", [(0, -1), (1, 0)])
+def test_chain_holds_a_hundred_times_its_weight(way):
+    world, joints = joint_world(on_fault="ignore")
+    half = (0.1, 0.5) if way[1] else (0.5, 0.1)
+    bodies, hinges = chain(world, 20, way, half)
+    heavy = disc(world, 20.5 * np.asarray(way), 0.4, mass=2000.0, inertia=160.0)
+    hinges.append(world.create_entity(Hinge(bodies[-1], heavy, anchor=20 * np.asarray(way))))
+    worst = 0.0
+    for _ in range(120):
+        run(world, 10)
+        worst = max(worst, gaps(world, hinges).max())
+    assert worst < (0.03 if way[1] else 0.1)  # it hangs, or swings from the horizontal
+    if way[1]:
+        assert joints.state(hinges[0]).impulse[1] == pytest.approx(2020 * G / 60, rel=0.02)
+
+
 def test_chain_of_200_swings_and_stays_together():
     world, _ = joint_world(on_fault="ignore")
     _, hinges = chain(world, 200, (1, 0), (0.5, 0.1))

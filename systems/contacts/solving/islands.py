@@ -13,7 +13,7 @@ import math
 
 from ....framework.compilation import part
 from ....framework.jit.records.record_type import zero_of
-from ....framework.vectors import dot, sub
+from ....framework.vectors import dot, length, sub
 from ...bits import lowest_bit
 from ...islands import root_of
 from ...shapes.tolerances import smaller_extent
@@ -22,6 +22,7 @@ from ..constants import (
     FURTHER_WORK,
     LEAST_FURTHER_PASSES,
     LEAST_WORK_SUBSTEPS,
+    MOST_GIVE,
     MOST_SAG,
     MOST_SUBSTEPS,
     OWN_SAG,
@@ -30,6 +31,7 @@ from ..constants import (
     STRUCK,
     SUBSTEP_WORK,
 )  # fmt: skip
+from .joints import HOLD, LIMIT, LINE
 
 COLOURS = 62  # bits of a mask; rows of a body beyond them share the last one
 
@@ -98,6 +100,20 @@ def island_of_joint(state, j):
 
 
 @part
+def weigh_joint(state, j):
+    """How much a row of joints gives way, for its size, under a force on it."""
+    solver, joints, inverse_mass = state.solver, state.solver.joints, state.bodies.inverse_mass
+    a, b, t = joints.row_a[j], joints.row_b[j], island_of_joint(state, j)
+    solver.jointed[t] = True
+    w_a, w_b = inverse_mass[a] if a >= 0 else 0.0, inverse_mass[b] if b >= 0 else 0.0
+    size = max(length(joints.anchor_a[j]) if w_a > 0.0 else 0.0, length(joints.anchor_b[j]) if w_b > 0.0 else 0.0)
+    if joints.kind[j] == LINE:
+        size = joints.low[j] if joints.rule[j] == HOLD else joints.high[j]
+    if joints.kind[j] <= LINE and joints.rule[j] <= LIMIT and size > 0.0:
+        solver.give[t] = max(solver.give[t], (w_a + w_b) / size)
+
+
+@part
 def number_islands(state):
     """``island`` becomes the number of each body's island, in the order of their first bodies; -1 for what cannot be
     moved. What is known of its bodies is summed up."""
@@ -116,7 +132,7 @@ def number_islands(state):
             count += 1
             solver.lightest[t], solver.most_change[t], solver.mass_of[t], solver.force_of[t] = math.inf, 0.0, 0.0, 0.0
             solver.stiff[t] = solver.own[t] = solver.strike[t] = solver.taken[t] = 0.0
-            solver.size_of[t], solver.leader[t], solver.jointed[t] = 0, i, False
+            solver.size_of[t], solver.leader[t], solver.jointed[t], solver.give[t] = 0, i, False, 0.0
         solver.number[q] = t
         change = sub(velocity[i], start[i])
         if warm_started[i]:
@@ -129,7 +145,7 @@ def number_islands(state):
     for q in range(solver.bodies):
         island[q] = solver.number[q]
     for e in range(solver.joints.active):
-        solver.jointed[island_of_joint(state, solver.joints.order[e])] = True
+        weigh_joint(state, solver.joints.order[e])
 
 
 @part
@@ -158,12 +174,15 @@ def choose_substeps(solver, t, usual, dt):
     Its contacts may have to bear its heaviest body: the sag under that falls with the square of the substeps, what one
     is struck by goes in by 1 / substeps. Where the own weight of bodies asks for too many, contacts are hard. What the
     most substeps cannot bear counts as lighter, see ``bears``. From masses, not from impulses, which would change with
-    the substeps; by factors of two, so that it seldom changes.
+    the substeps; by factors of two, so that it seldom changes. Joints are like contacts in this.
     """
+    sag = SAG * solver.most_change[t] * dt
+    pulled = sag * solver.give[t] / (solver.lightest[t] * MOST_GIVE)
     if solver.size_of[t] == 0:  # it has joints alone
         solver.substeps_of[t], solver.hard_of[t], solver.passes[t], solver.bears[t] = usual, False, 0, math.inf
-        return False
-    sag = SAG * solver.most_change[t] * dt
+        while float(solver.substeps_of[t] ** 2) < pulled and solver.substeps_of[t] < LEAST_WORK_SUBSTEPS:
+            solver.substeps_of[t] *= 2
+        return solver.substeps_of[t] > usual
     own = sag * solver.own[t] / OWN_SAG
     need = sag * solver.stiff[t] / (solver.lightest[t] * MOST_SAG)
     hard = own > float(usual * usual)
@@ -173,7 +192,7 @@ def choose_substeps(solver, t, usual, dt):
     ratio = solver.stiff[t] / (solver.lightest[t] * solver.own[t])
     struck = STRIKE * strike * ratio if strike > STRUCK else 0.0
     most = max(LEAST_WORK_SUBSTEPS, min(MOST_SUBSTEPS, SUBSTEP_WORK // solver.size_of[t]))
-    asked, substeps = max(need, struck * struck), usual
+    asked, substeps = max(need, struck * struck, pulled), usual
     while float(substeps * substeps) < asked and 2 * substeps <= most:
         substeps *= 2
     solver.substeps_of[t], solver.hard_of[t] = substeps, hard

@@ -94,11 +94,14 @@ def leave_out_joined(state, dt):
 @inlined
 def turned(state, i, v):
     """A vector along the axes of body i, as it is in the world."""
-    rotation = state.bodies.rotation
+    rotation, axes = state.bodies.rotation, state.bodies.axes
     if len(rotation) == 0:
         return v
     if len(v) == 2:
-        c, s = math.cos(rotation[i]), math.sin(rotation[i])
+        if len(axes) > 0 and state.bodies.axes_rotation[i] == rotation[i]:
+            c, s = axes[4 * i], axes[4 * i + 2]
+        else:
+            c, s = math.cos(rotation[i]), math.sin(rotation[i])
         return replace(replace(v, 0, c * item(v, 0) - s * item(v, 1)), 1, s * item(v, 0) + c * item(v, 1))
     axis, k = v, 4 * i
     axis = replace(replace(replace(axis, 0, rotation[k + 1]), 1, rotation[k + 2]), len(v) - 1, rotation[k + 3])
@@ -113,7 +116,7 @@ def push_joined(state, dt):
     velocity, inverse_mass = bodies.linear_velocity, bodies.inverse_mass
     for e in range(joints.active):
         j = joints.order[e]
-        if joints.kind[j] == TURN:
+        if joints.kind[j] >= TURN:
             continue
         push = scale(joints.pull[j] if joints.kind[j] == POINT else scale(joints.normal[j], joints.load[j]), dt)
         a, b = joints.row_a[j], joints.row_b[j]
@@ -142,10 +145,10 @@ def lay_joints(state):
         joints.between[j] = sub(start_b, start_a)
         joints.base_a[j] = turned(state, a, joints.anchor_a[j]) if a >= 0 else joints.anchor_a[j]
         joints.base_b[j] = turned(state, b, joints.anchor_b[j]) if b >= 0 else joints.anchor_b[j]
-        joints.rail[j] = joints.axis[j]
-        if a >= 0 and joints.kind[j] == SLIDE:
-            joints.rail[j] = turned(state, a, joints.axis[j])
-        joints.angle[j] = 0.0
-        if len(zero) == 2 and len(bodies.rotation) > 0:
+        if joints.kind[j] == SLIDE or len(zero) == 3:
+            joints.rail[j] = turned(state, a, joints.axis[j]) if a >= 0 else joints.axis[j]
+        elif joints.kind[j] == TURN:
+            joints.rail[j], joints.angle[j] = joints.axis[j], 0.0
+        if joints.kind[j] == TURN and len(zero) == 2 and len(bodies.rotation) > 0:
             angle = bodies.rotation[b] if b >= 0 else 0.0
             joints.angle[j] = angle - bodies.rotation[a] if a >= 0 else angle

@@ -1,9 +1,11 @@
 """Rows of joints in the passes of the solver: what holds two points, a length, a way or an angle.
 
 A joint is a few rows, which stand next to each other. POINT holds two anchors together, LINE the length between them,
-SLIDE how far b's anchor is along an axis of a, TURN an angle. A row HOLDs its value, keeps it within LIMITs, DRIVEs it
-at a speed, or is a SPRING. What holds is as soft as a spring of a frequency that follows the rate of the substeps, and
-is solved without that in the passes that do not push; springs are solved in the pass that pushes alone.
+SLIDE how far b's anchor is along an axis of a. Others are angles: TURN about an axis; in space ALIGN, by how much an
+axis of b leads away from one of a in one direction, and CONE, by how much in all. A row HOLDs its value, keeps it
+within LIMITs, DRIVEs it at a speed, brings it there as a SERVO, or is a SPRING. What holds is as soft as a spring of a
+frequency that follows the rate of the substeps, and is solved without that in the passes that do not push; springs are
+solved in the pass that pushes alone.
 
 Joints come before the contacts of their range, in the pass that pushes and once in those that do not. Their bodies have
 the columns of bodies that spin, as contacts of such bodies have: see rows.JOINTED.
@@ -18,8 +20,9 @@ from ....framework.vectors import add, add_scaled, dot, item, length, replace, s
 from ...integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
 from ..constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY
 
-POINT, LINE, SLIDE, TURN = range(4)
-HOLD, LIMIT, DRIVE, SPRING = range(4)
+POINT, LINE, SLIDE, TURN, ALIGN, CONE = range(6)
+HOLD, LIMIT, DRIVE, SPRING, SERVO = range(5)
+BRAKES = 0.9  # of the speed from which a servo could just stop in time
 
 
 # -- in a range --------------------------------------------------------------------------------------------------------
@@ -96,15 +99,37 @@ def multiplied(diagonal, others, v):
     return symmetric(diagonal, others, v)
 
 
+@inlined
+def angle_of(solver, j):
+    """(axis, angle) of a row of angles."""
+    joints = solver.joints
+    a, b, rail = joints.first[j], joints.second[j], joints.rail[j]
+    if len(rail) == 2:
+        return rail, joints.angle[j] + item(solver.turn[b], 0) - item(solver.turn[a], 0)
+    axis = turned_with(solver, a, rail)
+    end_a, end_b = turned_with(solver, a, joints.base_a[j]), turned_with(solver, b, joints.base_b[j])
+    across = cross_spin(end_a, end_b)
+    if joints.kind[j] == ALIGN:
+        return axis, dot(axis, across)
+    if joints.kind[j] == TURN:
+        return axis, math.atan2(dot(axis, across), dot(end_a, end_b))
+    size = length(across)
+    return scale(across, 1.0 / size) if size > 0.0 else axis, math.atan2(size, dot(end_a, end_b))
+
+
 @part
 def ask(joints, j, value):
     """What a row asks of the speed of its value, m/s or rad/s, and the impulses that it may have."""
     rule, h = joints.rule[j], joints.step
-    joints.soft[j], joints.opening[j], joints.pushing[j] = rule != DRIVE, 0.0, 0.0
+    joints.soft[j], joints.opening[j], joints.pushing[j] = rule in (HOLD, SPRING), 0.0, 0.0
     joints.greatest[j] = joints.most[j] * h
     joints.least[j] = -joints.greatest[j]
     if rule == DRIVE:
         joints.opening[j] = joints.pushing[j] = joints.target[j]
+    elif rule == SERVO:
+        away = value - joints.low[j]
+        stops = BRAKES * math.sqrt(2.0 * joints.most[j] * abs(away) / joints.mass[j]) if joints.mass[j] > 0.0 else 0.0
+        joints.opening[j] = joints.pushing[j] = -math.copysign(min(joints.push_rate[j] * abs(away), stops), away)
     elif rule != LIMIT:
         joints.pushing[j] = -joints.push_rate[j] * (value - joints.low[j])
     else:
@@ -125,17 +150,17 @@ def ask(joints, j, value):
 @part
 def measure_joints(solver):
     """Where the joints of a range hold their bodies now, and what they ask."""
-    joints, turn, shift, order = solver.joints, solver.turn, solver.shift, solver.joints.order
+    joints, shift, order = solver.joints, solver.shift, solver.joints.order
     kinds, first, second, base_a, base_b = joints.kind, joints.first, joints.second, joints.base_a, joints.base_b
     between, arms_a, arms_b, gap = joints.between, joints.arm_a, joints.arm_b, joints.gap
     for e in range(joints.begin, joints.end):
         j = order[e]
         kind, a, b = kinds[j], first[j], second[j]
-        if kind == TURN:
-            axis = joints.axis[j]
+        if kind >= TURN:
+            axis, angle = angle_of(solver, j)
             moved = dot(axis, change_of_spin(solver, a, axis)) + dot(axis, change_of_spin(solver, b, axis))
-            joints.mass[j] = 1.0 / moved if moved > 0.0 else 0.0
-            ask(joints, j, joints.angle[j] + dot(axis, sub(turn[b], turn[a])))
+            joints.normal[j], joints.mass[j] = axis, 1.0 / moved if moved > 0.0 else 0.0
+            ask(joints, j, angle)
             continue
         arm_a, arm_b = turned_with(solver, a, base_a[j]), turned_with(solver, b, base_b[j])
         way = add(between[j], sub(add(shift[b], arm_b), add(shift[a], arm_a)))
@@ -173,10 +198,10 @@ def move_apart(solver, j, impulse):
 def give_row(solver, j, impulse):
     """Let a row that is no POINT act with an impulse."""
     joints = solver.joints
-    if joints.kind[j] != TURN:
+    if joints.kind[j] < TURN:
         move_apart(solver, j, scale(joints.normal[j], impulse))
         return
-    a, b, twisted = joints.first[j], joints.second[j], scale(joints.axis[j], impulse)
+    a, b, twisted = joints.first[j], joints.second[j], scale(joints.normal[j], impulse)
     if solver.inverse_mass[a] > 0.0:
         solver.spin[a] = sub(solver.spin[a], change_of_spin(solver, a, twisted))
     if solver.inverse_mass[b] > 0.0:
@@ -208,8 +233,8 @@ def speed_between(solver, j):
 def solve_row(solver, j, pushes):
     """The value of a row changes as it asks, as far as its impulses allow."""
     joints, old = solver.joints, solver.joints.impulse[j]
-    if joints.kind[j] == TURN:
-        speed = dot(joints.axis[j], sub(solver.spin[joints.second[j]], solver.spin[joints.first[j]]))
+    if joints.kind[j] >= TURN:
+        speed = dot(joints.normal[j], sub(solver.spin[joints.second[j]], solver.spin[joints.first[j]]))
     else:
         speed = dot(joints.normal[j], speed_between(solver, j))
     if pushes and joints.soft[j]:

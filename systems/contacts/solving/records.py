@@ -9,13 +9,13 @@ JOINTS = Schema(
     "Joints",
     count=integer(),
     joint=ints("int32"),  # the joint of a row, by number
-    kind=ints("int8"),  # POINT, LINE, SLIDE, TURN
-    rule=ints("int8"),  # HOLD, LIMIT, DRIVE, SPRING
+    kind=ints("int8"),  # POINT, LINE, SLIDE, TURN, ALIGN, CONE
+    rule=ints("int8"),  # HOLD, LIMIT, DRIVE, SPRING, SERVO
     entity_a=ints(),  # 0: the world
     entity_b=ints(),
-    anchor_a=vectors(),  # m from the body's position, along its own axes; of the world: a place
-    anchor_b=vectors(),
-    axis=vectors(),  # of what slides, along the axes of a; of what turns, as a spin is stored
+    anchor_a=vectors(),  # m from the body's position, along its own axes, of the world a place; of angles in space unit
+    anchor_b=vectors(),  # vectors, likewise
+    axis=vectors(),  # along the axes of a, of what slides or turns; of what turns in a plane (1, 0)
     low=floats(),  # m or rad: the least, or the only one,
     high=floats(),  # and the most
     target=floats(),  # m/s or rad/s
@@ -29,7 +29,7 @@ JOINTS = Schema(
     old_pull=vectors(),
     total=floats(),  # N s or N m s in the step
     thrust=vectors(),
-    normal=vectors(),  # along which it acts
+    normal=vectors(),  # along which it acts, or about which
     # pairs of bodies that joints keep from touching, the smaller id first, in order
     apart=integer(),
     apart_a=ints(),
@@ -169,6 +169,7 @@ SOLVER = Schema(
     unsolved=flags(),
     leader=ints("int32"),  # row of its first body
     jointed=flags(),
+    give=floats(),  # 1 / (kg m): largest inverse mass of a joint over its length
     # ranges: the ordinary islands, then each special one
     ranges=integer(),
     usual=integer(),  # substeps,

@@ -298,7 +298,8 @@ def scale_impulses(solver, by, span):
 def most_impulse(solver, t, substeps):
     """The most that a substep may start with: what bears the loads of island t, or pushes all of it out. What is more
     was a blow, which does not act again."""
-    pushes = solver.mass_of[t] * solver.push_rate * DEEP / solver.own[t]
+    own = solver.own[t]  # 0: of joints alone
+    pushes = solver.mass_of[t] * solver.push_rate * DEEP / own if own > 0.0 else 0.0
     return MOST_LOAD * (solver.force_of[t] / substeps + pushes)
 
 

@@ -3,154 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ...framework.data.columns import special_column
-from ...framework.data.component import Component
 from ...framework.typing import Vector
-from ...systems.contacts.solving.joints import DRIVE, HOLD, LIMIT, LINE, POINT, SLIDE, SPRING, TURN
-
-WORLD = 0  # in place of a body
-FREE = -math.inf, math.inf
-
-
-class Row(NamedTuple):
-    """One row of a joint, as the record ``Joints`` has it."""
-
-    kind: int
-    rule: int
-    low: float = 0.0
-    high: float = 0.0
-    target: float = 0.0
-    most: float = math.inf
-    frequency: float = 0.0
-    damping_ratio: float = 0.0
-    axis: Any = None  # of what slides, along the axes of a
-
-
-class Place(NamedTuple):
-    """Where a body is, or the world."""
-
-    position: Any
-    axes: Any  # (d, d), those of the body as columns
-    angle: float
-
-    def local(self, point: Any) -> np.ndarray:
-        """A point of the world, as the body has it."""
-        return self.axes.T @ (np.asarray(point, float) - self.position)
-
-    def point(self, local: Any) -> np.ndarray:
-        return self.position + self.axes @ np.asarray(local, float)
-
-
-class Changes:
-    """How often a field of any joint has been set: worlds look again when that is another number."""
-
-    count = 0
-
-
-def optional(**options: Any) -> Any:
-    """A number that need not be given."""
-    return special_column(default=None, optional=True, kw_only=True, **options)
-
-
-class Joint(Component, abstract=True):
-    """What all joints have.
-
-    collide_connected
-        whether the two bodies may touch
-    breaking_force
-        N, or None: the joint is gone after a step in which its mean force was higher, and joint_broken is sent
-    """
-
-    __slots__ = ()
-    plugin: ClassVar[str] = "joints"
-    flat_only: ClassVar[bool] = False  # in worlds of 2 dimensions alone
-    fixed: ClassVar[tuple[str, ...]] = ("a", "b", "anchor")  # where these are set the joint begins anew
-
-    a: int | None
-    b: int | None
-    collide_connected: bool = special_column(default=False, dtype=bool, kw_only=True)
-    breaking_force: float | None = special_column(default=None, optional=True, positive=True, kw_only=True)
-    attached: bool = special_column(default=False, init=False, dtype=bool)
-    at_a: Vector = special_column(default=0.0, init=False, item="vector")  # the anchors, along the axes of each body
-    at_b: Vector = special_column(default=0.0, init=False, item="vector")
-    start: float = special_column(default=0.0, init=False)  # m or rad: the value of the row that has one
-
-    def __init__(self, *args: Any, **values: Any) -> None:
-        given = self._named(args, values)
-        for name in ("a", "b"):
-            if given.get(name, WORLD) is None:
-                given[name] = WORLD
-        super().__init__(**given)
-        if self.a == self.b:
-            raise ValueError(f"{type(self).__name__} needs two bodies, got {self.a or None} twice")
-        self.check()
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if name in self.columns and self._values is not None:
-            if name in ("a", "b") and value is None:
-                value = WORLD
-            before = dict(self._values)
-            super().__setattr__(name, value)
-            if self.attached:
-                try:
-                    self.check()
-                except ValueError:
-                    self._values = before
-                    raise
-                if name in self.fixed:
-                    self._values["attached"] = False
-            Changes.count += 1
-            return
-        super().__setattr__(name, value)
-
-    def _ends(self, name: str, value: Any) -> tuple[Any, Any]:
-        try:
-            low, high = value
-        except TypeError:
-            raise ValueError(f"{type(self).__name__}.{name} must be two numbers (least, most), got {value!r}") from None
-        return low, high
-
-    def check(self) -> None:
-        """ValueError for fields that do not go together."""
-
-    def in_order(self, name: str, low: float | None, high: float | None) -> tuple[float, float]:
-        """Two limits, none where they are None; ValueError if the first is the larger."""
-        least, most = -math.inf if low is None else low, math.inf if high is None else high
-        if least > most:
-            raise ValueError(f"{type(self).__name__}.{name} must be (least, most), got ({low}, {high})")
-        return least, most
-
-    def attach(self, a: Place, b: Place) -> None:
-        """The bodies stand where the joint takes hold of them."""
-        raise NotImplementedError
-
-    def rows(self, dimensions: int) -> list[Row]:
-        """The rows that it is now."""
-        raise NotImplementedError
-
-    def hold(self, a: Place, b: Place, anchor: Any) -> None:
-        """Anchors at a point of the world."""
-        self.keep(at_a=a.local(anchor), at_b=b.local(anchor), start=b.angle - a.angle)
-
-    def keep(self, **values: Any) -> None:
-        """Set what is hidden."""
-        self._values.update(values)  # type: ignore[union-attr]
-
-    def moving(self, row: Row, limits: tuple[float, float], drive: tuple[float | None, float | None]) -> list[Row]:
-        """The rows that limit a value, whose 0 is at ``row.low``, drive it, or are its spring. drive: (speed, most)."""
-        rows, (speed, most) = [], drive
-        if limits != FREE:
-            rows.append(row._replace(rule=LIMIT, low=row.low + limits[0], high=row.low + limits[1]))
-        if speed is not None:
-            rows.append(row._replace(rule=DRIVE, target=speed, most=math.inf if most is None else most))
-        if self.frequency is not None:  # type: ignore[attr-defined]
-            rest, ratio = self.rest, self.damping_ratio  # type: ignore[attr-defined]
-            rows.append(row._replace(rule=SPRING, low=row.low + rest, frequency=self.frequency, damping_ratio=ratio))  # type: ignore[attr-defined]
-        return rows
+from ...systems.contacts.solving.joints import CONE, DRIVE, HOLD, LIMIT, LINE, POINT, SERVO, SLIDE, SPRING
+from .joint import FREE, WORLD, Joint, Place, Row, optional
 
 
 class Distance(Joint):
@@ -216,12 +76,14 @@ class Distance(Joint):
 
 
 class Hinge(Joint):
-    """Two bodies that turn about a common point of a plane.
+    """Two bodies that turn about a common point, in space about a common axis.
 
     a, b
         entities of two bodies; None: the world
     anchor
         the point, where the bodies are when the world takes the joint
+    axis
+        in space, the direction of the axis, in the world as they are then
     limits
         rad, (least, most), of b against a as they are then; also the fields ``lower`` and ``upper``
     motor_speed, max_torque
@@ -231,11 +93,12 @@ class Hinge(Joint):
     """
 
     __slots__ = ()
-    flat_only: ClassVar[bool] = True
+    fixed: ClassVar[tuple[str, ...]] = ("a", "b", "anchor", "axis")
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
     anchor: Vector = special_column(item="vector")
+    axis: Vector = special_column(default=0.0, item="vector", kw_only=True)
     lower: float | None = optional()
     upper: float | None = optional()
     motor_speed: float | None = optional()
@@ -254,11 +117,12 @@ class Hinge(Joint):
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, self.anchor)
+        self.hold_axis(a, b, self.axis)
 
     def rows(self, dimensions: int) -> list[Row]:
         limits = self.in_order("limits", self.lower, self.upper)
-        turn = Row(TURN, HOLD, self.start)
-        return [Row(POINT, HOLD), *self.moving(turn, limits, (self.motor_speed, self.max_torque))]
+        moving = self.moving(self.turn(dimensions), limits, (self.motor_speed, self.max_torque))
+        return [Row(POINT, HOLD), *self.aligned(dimensions), *moving]
 
 
 class Ball(Joint):
@@ -281,7 +145,6 @@ class Weld(Joint):
     """Two bodies that stay as they are to each other; ``anchor`` is a point of the world where they are held."""
 
     __slots__ = ()
-    flat_only: ClassVar[bool] = True
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
@@ -289,9 +152,10 @@ class Weld(Joint):
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, self.anchor)
+        self.hold_axis(a, b, (0.0, 0.0, 1.0))
 
     def rows(self, dimensions: int) -> list[Row]:
-        return [Row(POINT, HOLD), Row(TURN, HOLD, self.start)]
+        return [Row(POINT, HOLD), *self.aligned(dimensions), self.turn(dimensions)]
 
 
 class Slider(Joint):
@@ -308,7 +172,6 @@ class Slider(Joint):
     """
 
     __slots__ = ()
-    flat_only: ClassVar[bool] = True
     fixed: ClassVar[tuple[str, ...]] = ("a", "b", "direction")
 
     a: int | None = special_column(dtype=int, minimum=0)
@@ -321,7 +184,6 @@ class Slider(Joint):
     frequency: float | None = optional(positive=True)
     damping_ratio: float = special_column(default=0.0, minimum=0.0, kw_only=True)
     rest: float = special_column(default=0.0, kw_only=True)
-    along: Vector = special_column(default=0.0, init=False, item="vector")  # the axis, along those of a
 
     def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:
         if limits is not None:
@@ -335,12 +197,16 @@ class Slider(Joint):
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, b.position if self.b != WORLD else a.position)
-        self.keep(along=a.axes.T @ (np.asarray(self.direction) / np.linalg.norm(self.direction)))
+        self.hold_axis(a, b, self.direction)
+        if len(a.position) == 2:
+            self.keep(axis_a=a.axes.T @ (np.asarray(self.direction) / np.linalg.norm(self.direction)))
 
     def rows(self, dimensions: int) -> list[Row]:
-        limits, (x, y) = self.in_order("limits", self.lower, self.upper), self.along
-        along = self.moving(Row(SLIDE, HOLD, axis=(x, y)), limits, (self.motor_speed, self.max_force))
-        return [Row(SLIDE, HOLD, axis=(-y, x)), Row(TURN, HOLD, self.start), *along]
+        limits, along = self.in_order("limits", self.lower, self.upper), np.asarray(self.axis_a)
+        sides = [(-along[1], along[0])] if dimensions == 2 else [self.side_a, np.cross(along, self.side_a)]
+        across = [Row(SLIDE, HOLD, axis=side) for side in sides]
+        moving = self.moving(Row(SLIDE, HOLD, axis=along), limits, (self.motor_speed, self.max_force))
+        return [*across, *self.aligned(dimensions), self.turn(dimensions), *moving]
 
 
 class Motor(Joint):
@@ -349,20 +215,22 @@ class Motor(Joint):
     speed
         rad/s
     angle
-        rad of b against a, in place of a speed
+        rad of b against a as they are then, in place of a speed
     max_torque
         N m at most; None: no limit
+    axis
+        in space, about which, in the world as the bodies are when the world takes the joint
     """
 
     __slots__ = ()
-    flat_only: ClassVar[bool] = True
-    fixed: ClassVar[tuple[str, ...]] = ("a", "b")
+    fixed: ClassVar[tuple[str, ...]] = ("a", "b", "axis")
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(default=WORLD, dtype=int, minimum=0)
     speed: float | None = optional()
     angle: float | None = optional()
     max_torque: float | None = optional(minimum=0.0)
+    axis: Vector = special_column(default=0.0, item="vector", kw_only=True)
 
     def check(self) -> None:
         if (self.speed is None) == (self.angle is None):
@@ -370,12 +238,57 @@ class Motor(Joint):
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, b.position)
+        self.hold_axis(a, b, self.axis)
 
     def rows(self, dimensions: int) -> list[Row]:
-        most = math.inf if self.max_torque is None else self.max_torque
+        row = self.turn(dimensions)._replace(most=math.inf if self.max_torque is None else self.max_torque)
         if self.angle is not None:
-            return [Row(TURN, HOLD, self.angle, most=most)]
-        return [Row(TURN, DRIVE, target=self.speed or 0.0, most=most)]
+            return [row._replace(rule=SERVO, low=row.low + self.angle)]
+        return [row._replace(rule=DRIVE, target=self.speed or 0.0)]
+
+
+class Cone(Joint):
+    """Two bodies in space that keep a common point: b's axis leaves that of a by ``swing`` at most, and turns about it
+    within ``twist``: a shoulder.
+
+    anchor, axis
+        of both, in the world as they are when the world takes the joint
+    swing
+        rad, at most pi
+    twist
+        rad, (least, most); also the fields ``lower`` and ``upper``
+    """
+
+    __slots__ = ()
+    dimensions: ClassVar[tuple[int, ...]] = (3,)
+    fixed: ClassVar[tuple[str, ...]] = ("a", "b", "anchor", "axis")
+
+    a: int | None = special_column(dtype=int, minimum=0)
+    b: int | None = special_column(dtype=int, minimum=0)
+    anchor: Vector = special_column(item="vector")
+    axis: Vector = special_column(item="vector")
+    swing: float = special_column(default=math.pi, minimum=0.0, kw_only=True)
+    lower: float | None = optional()
+    upper: float | None = optional()
+
+    def __init__(self, *args: Any, twist: Any = None, **values: Any) -> None:
+        if twist is not None:
+            values["lower"], values["upper"] = self._ends("twist", twist)
+        super().__init__(*args, **values)
+
+    def check(self) -> None:
+        self.in_order("twist", self.lower, self.upper)
+
+    def attach(self, a: Place, b: Place) -> None:
+        self.hold(a, b, self.anchor)
+        self.hold_axis(a, b, self.axis)
+
+    def rows(self, dimensions: int) -> list[Row]:
+        rows, twist = [Row(POINT, HOLD)], self.in_order("twist", self.lower, self.upper)
+        rows.append(Row(CONE, LIMIT, -math.inf, self.swing, axis=self.side_a, ends=(self.axis_a, self.axis_b)))
+        if twist != FREE:
+            rows.append(self.turn(dimensions)._replace(rule=LIMIT, low=twist[0], high=twist[1]))
+        return rows
 
 
 class MousePull(Joint):
@@ -409,4 +322,4 @@ class MousePull(Joint):
         return [Row(POINT, SPRING, most=most, frequency=self.frequency, damping_ratio=self.damping_ratio)]
 
 
-KINDS: tuple[type[Joint], ...] = (Distance, Hinge, Ball, Weld, Slider, Motor, MousePull)
+KINDS: tuple[type[Joint], ...] = (Distance, Hinge, Ball, Cone, Weld, Slider, Motor, MousePull)

@@ -1,0 +1,184 @@
+"""What all joints have: fields, the moment in which they take hold of their bodies, and rows of the solver."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from ...framework.data.columns import special_column
+from ...framework.data.component import Component
+from ...framework.typing import Vector
+from ...systems.contacts.solving.joints import ALIGN, DRIVE, HOLD, LIMIT, SPRING, TURN
+
+WORLD = 0  # in place of a body
+FREE = -math.inf, math.inf
+
+
+class Row(NamedTuple):
+    """One row of a joint, as the record ``Joints`` has it."""
+
+    kind: int
+    rule: int
+    low: float = 0.0
+    high: float = 0.0
+    target: float = 0.0
+    most: float = math.inf
+    frequency: float = 0.0
+    damping_ratio: float = 0.0
+    axis: Any = None  # along the axes of a, of what slides or turns
+    ends: Any = None  # of angles in space: unit vectors along the axes of a and of b
+
+
+class Place(NamedTuple):
+    """Where a body is, or the world."""
+
+    position: Any
+    axes: Any  # (d, d), those of the body as columns
+    angle: float
+
+    def local(self, point: Any) -> np.ndarray:
+        """A point of the world, as the body has it."""
+        return self.axes.T @ (np.asarray(point, float) - self.position)
+
+    def point(self, local: Any) -> np.ndarray:
+        return self.position + self.axes @ np.asarray(local, float)
+
+
+class Changes:
+    """How often a field of any joint has been set: worlds look again when that is another number."""
+
+    count = 0
+
+
+def optional(**options: Any) -> Any:
+    """A number that need not be given."""
+    return special_column(default=None, optional=True, kw_only=True, **options)
+
+
+class Joint(Component, abstract=True):
+    """What all joints have.
+
+    collide_connected
+        whether the two bodies may touch
+    breaking_force
+        N, or None: the joint is gone after a step in which its mean force was higher, and joint_broken is sent
+    """
+
+    __slots__ = ()
+    plugin: ClassVar[str] = "joints"
+    dimensions: ClassVar[tuple[int, ...]] = (2, 3)  # of its worlds
+    fixed: ClassVar[tuple[str, ...]] = ("a", "b", "anchor")  # where these are set the joint begins anew
+
+    a: int | None
+    b: int | None
+    collide_connected: bool = special_column(default=False, dtype=bool, kw_only=True)
+    breaking_force: float | None = special_column(default=None, optional=True, positive=True, kw_only=True)
+    attached: bool = special_column(default=False, init=False, dtype=bool)
+    at_a: Vector = special_column(default=0.0, init=False, item="vector")  # the anchors, along the axes of each body
+    at_b: Vector = special_column(default=0.0, init=False, item="vector")
+    start: float = special_column(default=0.0, init=False)  # m or rad: the value of the row that has one
+    # in space: the axis, and a direction at right angles to it, along the axes of each body
+    axis_a: Vector = special_column(default=0.0, init=False, item="vector")
+    axis_b: Vector = special_column(default=0.0, init=False, item="vector")
+    side_a: Vector = special_column(default=0.0, init=False, item="vector")
+    side_b: Vector = special_column(default=0.0, init=False, item="vector")
+
+    def __init__(self, *args: Any, **values: Any) -> None:
+        given = self._named(args, values)
+        for name in ("a", "b"):
+            if given.get(name, WORLD) is None:
+                given[name] = WORLD
+        super().__init__(**given)
+        if self.a == self.b:
+            raise ValueError(f"{type(self).__name__} needs two bodies, got {self.a or None} twice")
+        self.check()
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in self.columns and self._values is not None:
+            if name in ("a", "b") and value is None:
+                value = WORLD
+            before = dict(self._values)
+            super().__setattr__(name, value)
+            if self.attached:
+                try:
+                    self.check()
+                except ValueError:
+                    self._values = before
+                    raise
+                if name in self.fixed:
+                    self._values["attached"] = False
+            Changes.count += 1
+            return
+        super().__setattr__(name, value)
+
+    def _ends(self, name: str, value: Any) -> tuple[Any, Any]:
+        try:
+            low, high = value
+        except TypeError:
+            raise ValueError(f"{type(self).__name__}.{name} must be two numbers (least, most), got {value!r}") from None
+        return low, high
+
+    def check(self) -> None:
+        """ValueError for fields that do not go together."""
+
+    def in_order(self, name: str, low: float | None, high: float | None) -> tuple[float, float]:
+        """Two limits, none where they are None; ValueError if the first is the larger."""
+        least, most = -math.inf if low is None else low, math.inf if high is None else high
+        if least > most:
+            raise ValueError(f"{type(self).__name__}.{name} must be (least, most), got ({low}, {high})")
+        return least, most
+
+    def attach(self, a: Place, b: Place) -> None:
+        """The bodies stand where the joint takes hold of them."""
+        raise NotImplementedError
+
+    def rows(self, dimensions: int) -> list[Row]:
+        """The rows that it is now."""
+        raise NotImplementedError
+
+    def hold(self, a: Place, b: Place, anchor: Any) -> None:
+        """Anchors at a point of the world."""
+        self.keep(at_a=a.local(anchor), at_b=b.local(anchor), start=b.angle - a.angle)
+
+    def hold_axis(self, a: Place, b: Place, axis: Any) -> None:
+        """In space, an axis of both."""
+        axis = np.asarray(axis, float)
+        if len(a.position) == 2:
+            return
+        if axis.shape != (3,) or not axis.any():
+            raise ValueError(f"{type(self).__name__} needs an axis in a world of 3 dimensions, got {axis.tolist()}")
+        axis = axis / np.linalg.norm(axis)
+        side = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+        side /= np.linalg.norm(side)
+        self.keep(axis_a=a.axes.T @ axis, axis_b=b.axes.T @ axis, side_a=a.axes.T @ side, side_b=b.axes.T @ side)
+
+    def turn(self, dimensions: int) -> Row:
+        """About the axis; its value is 0 where the joint took hold."""
+        if dimensions == 2:
+            return Row(TURN, HOLD, self.start)
+        return Row(TURN, HOLD, axis=self.axis_a, ends=(self.side_a, self.side_b))
+
+    def aligned(self, dimensions: int) -> list[Row]:
+        """The axes of both bodies stay parallel."""
+        if dimensions == 2:
+            return []
+        axes, sides = (self.axis_a, self.axis_b), (self.side_a, np.cross(self.axis_a, self.side_a))
+        return [Row(ALIGN, HOLD, axis=side, ends=axes) for side in sides]
+
+    def keep(self, **values: Any) -> None:
+        """Set what is hidden."""
+        self._values.update(values)  # type: ignore[union-attr]
+
+    def moving(self, row: Row, limits: tuple[float, float], drive: tuple[float | None, float | None]) -> list[Row]:
+        """The rows that limit a value, whose 0 is at ``row.low``, drive it, or are its spring. drive: (speed, most)."""
+        rows, (speed, most) = [], drive
+        if limits != FREE:
+            rows.append(row._replace(rule=LIMIT, low=row.low + limits[0], high=row.low + limits[1]))
+        if speed is not None:
+            rows.append(row._replace(rule=DRIVE, target=speed, most=math.inf if most is None else most))
+        if self.frequency is not None:  # type: ignore[attr-defined]
+            rest, ratio = self.rest, self.damping_ratio  # type: ignore[attr-defined]
+            rows.append(row._replace(rule=SPRING, low=row.low + rest, frequency=self.frequency, damping_ratio=ratio))  # type: ignore[attr-defined]
+        return rows

@@ -1,0 +1,151 @@
+"""Joints of three dimensions against closed forms: hinges, welds, sliders, cones, a gyroscope."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers_joints import G, at, run
+
+from carom import Physics, RigidBody, Settings, Transform, World
+from carom.plugins.joints import Ball, Cone, Hinge, Joints, Motor, Slider, Weld
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
+
+TURN = (math.cos(0.3), 0.2 * math.sin(0.3), -0.6 * math.sin(0.3), math.sqrt(0.6) * math.sin(0.3))
+
+
+def space(gravity: Any = (0.0, 0.0, -G), **settings: Any) -> tuple[World, Joints]:
+    joints = Joints()
+    return World(Physics(dimensions=3, gravity=gravity), Rotation(), joints, settings=Settings(**settings)), joints
+
+
+def block(world: World, place: Any, half: Any = (0.5, 0.1, 0.2), mass: float = 1.0, rotation: Any = 0.0) -> int:
+    return world.create_entity(Transform(place, rotation), RigidBody(mass=mass), BoxCollider(half, mask=0), Spin())
+
+
+def spin_of(world: World, body: int) -> np.ndarray:
+    return np.array(world.component_for_entity(body, Spin).angular_velocity)
+
+
+def test_door_swings_about_its_axis_with_its_period():
+    world, joints = space()
+    body = block(world, (0.5, 0, 0))
+    hinge = world.create_entity(Hinge(None, body, anchor=(0, 0, 0), axis=(0, 2, 0)))
+    moment = (0.25 + 0.04) / 3.0 + 0.25  # about the axis, of 1 kg
+    angles = []
+    for _ in range(600):
+        world.step()
+        state = joints.state(hinge)
+        angles.append(state.value - math.pi / 2)
+        x, y, z = at(world, body).position
+        assert abs(y) < 1e-9
+        assert math.hypot(x, z) == pytest.approx(0.5, abs=2e-3)
+        assert math.cos(math.atan2(-z, x) - state.value) > 1.0 - 1e-5
+    passes = [k + a / (a - b) for k, (a, b) in enumerate(itertools.pairwise(angles)) if a < 0 <= b]
+    exact = 4.0 * math.sqrt(moment / (G * 0.5)) * 1.8540746773013719  # K(sin(45 degrees)): it falls from 90
+    assert np.diff(passes).mean() / 60 == pytest.approx(exact, rel=2e-3)
+
+
+def test_hinge_has_a_motor_and_limits():
+    world, joints = space(0)
+    axis = np.array((1.0, 2.0, 2.0)) / 3.0
+    body = world.create_entity(Transform((1, 2, 3), TURN), RigidBody(), Spin(inertia=np.full(3, 2.0)))
+    hinge = Hinge(None, body, anchor=(1, 2, 3), axis=axis, motor_speed=4.0, max_torque=4.0)
+    entity = world.create_entity(hinge)
+    run(world, 30)
+    np.testing.assert_allclose(spin_of(world, body), axis, atol=1e-9)  # T t / I
+    np.testing.assert_allclose(joints.state(entity).torque, 4.0 / 60 * axis, atol=1e-9)
+    assert joints.state(entity).value == pytest.approx(0.25, abs=0.02)
+    run(world, 120)
+    np.testing.assert_allclose(spin_of(world, body), 4.0 * axis, atol=1e-6)
+    hinge.motor_speed, hinge.lower, hinge.upper = 0.5, -3.0, 2.0
+    run(world, 1200)
+    assert joints.state(entity).value == pytest.approx(2.0, abs=0.02)
+    np.testing.assert_allclose(spin_of(world, body), 0.0, atol=1e-6)
+
+
+def test_motor_turns_to_an_angle_in_space():
+    world, joints = space(0)
+    body = world.create_entity(Transform((0, 0, 0), TURN), RigidBody(), Spin(inertia=np.full(3, 2.0)))
+    motor = world.create_entity(Motor(None, body, angle=1.0, axis=(0, 0, 1), max_torque=20.0))
+    run(world, 300)
+    assert joints.state(motor).value == pytest.approx(1.0, abs=0.01)
+
+
+def test_welded_blocks_fly_as_one():
+    world, _ = space(0)
+    a, b = block(world, (0, 0, 0), rotation=TURN), block(world, (1, 0.3, 0))
+    world.create_entity(Weld(a, b, anchor=(0.5, 0, 0)))
+    for body, speed in ((a, (0, 1, 0)), (b, (0, -1, 0.5))):
+        world.component_for_entity(body, RigidBody).linear_velocity = speed
+    distance = np.linalg.norm(np.subtract(at(world, a).position, at(world, b).position))
+    momentum = world.momentum()
+    for _ in range(300):
+        world.step()
+        np.testing.assert_allclose(world.momentum(), momentum, atol=1e-12)
+        now = np.linalg.norm(np.subtract(at(world, a).position, at(world, b).position))
+        assert now == pytest.approx(distance, abs=0.02)
+    np.testing.assert_allclose(spin_of(world, a), spin_of(world, b), atol=0.02)
+    product = abs(np.dot(at(world, a).rotation, at(world, b).rotation))
+    assert product == pytest.approx(math.cos(0.3), abs=0.01)  # half the angle between both
+
+
+def test_slider_in_space_stops_at_its_limit():
+    world, joints = space()
+    along = np.array((0.6, 0.0, -0.8))
+    body = block(world, (0, 0, 0), rotation=TURN)
+    slider = world.create_entity(Slider(None, body, direction=along, limits=(-1.0, 2.0)))
+    run(world, 30)
+    assert joints.state(slider).speed == pytest.approx(G * 0.8 * 0.5, rel=1e-5)
+    run(world, 120)
+    assert joints.state(slider).value == pytest.approx(2.0, abs=2e-3)
+    np.testing.assert_allclose(at(world, body).position, 2.0 * along, atol=5e-3)
+    assert abs(np.dot(at(world, body).rotation, TURN)) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_cone_bounds_swing_and_twist():
+    world, joints = space()
+    body = block(world, (0, 0, 0.5), half=(0.1, 0.2, 0.5))
+    cone = world.create_entity(Cone(None, body, anchor=(0, 0, 0), axis=(0, 0, 1), swing=0.5, twist=(-0.3, 0.3)))
+    world.component_for_entity(body, Spin).angular_velocity = np.array((0.3, 0.2, 2.0))
+    for _ in range(600):
+        world.step()
+        x, y, z = at(world, body).position
+        assert math.atan2(math.hypot(x, y), z) < 0.53
+        assert abs(joints.state(cone).value) < 0.35
+    assert math.atan2(math.hypot(x, y), z) == pytest.approx(0.5, abs=0.01)
+
+
+def test_gyroscope_precesses():
+    """A wheel at the end of a horizontal arm goes round at m g r / (I w)."""
+    world, _ = space(dt=1 / 240)
+    inertia, arm, speed = np.array((0.5, 0.26, 0.26)), 0.5, 60.0
+    wheel = world.create_entity(Transform((arm, 0, 0)), RigidBody(), Spin(inertia=inertia))
+    rate = G * arm / (inertia[0] * speed)
+    spin = world.component_for_entity(wheel, Spin)
+    spin.angular_velocity = np.array((speed, 0.0, rate))
+    world.component_for_entity(wheel, RigidBody).linear_velocity = (0.0, rate * arm, 0.0)
+    world.create_entity(Ball(None, wheel, anchor=(0, 0, 0)))
+    run(world, 240)
+    x, y, z = at(world, wheel).position
+    assert math.atan2(y, x) == pytest.approx(rate, rel=0.02)
+    assert abs(z) < 0.02
+    assert math.hypot(x, y) == pytest.approx(arm, abs=2e-3)
+
+
+def test_hinges_and_cones_need_their_axis():
+    world, _ = space()
+    body = block(world, (0, 0, 0))
+    entity = world.create_entity(Hinge(None, body, anchor=(0, 0, 0)))
+    with pytest.raises(ValueError, match="axis"):
+        world.step()
+    world.delete_entity(entity, immediate=True)
+    world.step()
+    flat = World(Physics(dimensions=2), Joints())
+    disc = flat.create_entity(Transform((0, 0)), RigidBody())
+    flat.create_entity(Cone(None, disc, anchor=(0, 0), axis=(0, 1)))
+    with pytest.raises(ValueError, match="2 dimensions"):
+        flat.step()
