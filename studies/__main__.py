@@ -16,7 +16,7 @@ from carom.lab.cli.usage_errors import Problem, did_you_mean
 from carom.lab.reporting.progress import Progress
 from carom.lab.reporting.text import TextTable
 
-from . import ladder, scaling, settings, startup
+from . import ladder, scaling, settings, spins, startup
 from .accuracy import accuracy_command
 from .limits import tables as limits
 from .page import between_marks, into_option, show
@@ -69,6 +69,7 @@ STUDIES = {
         long="A million bodies too: needs some gigabytes.",
     ),
     "settings": Study("What each field of Settings costs and buys.", settings.axes, settings.report, 5),
+    "spins": Study("What bodies that turn cost.", spins.axes, spins.report, 5),
     "startup": Study(
         "The time to the first step of a new process, by scene.", startup.axes, startup.report, 3,
         usual=(startup.COMMANDS_AXIS, "asteroids"),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -44,11 +44,11 @@ class Idle(System):
         pass
 
 
-def _drifting(n: int, *components: Any, dimensions: int = 2, gravity: float = 0.0, **how: Any) -> World:
-    """Bodies that never meet. how: integrator, rotation and fields of RigidBody."""
+def drifting(n: int, *components: Any, dimensions: int = 2, gravity: float = 0.0, **how: Any) -> World:
+    """Bodies that never meet. how: plugins, integrator, rotation and fields of RigidBody."""
     settings = Settings(integrator=how.pop("integrator", "semi_implicit_euler"))
     down = (0.0, -gravity, 0.0)[:dimensions]
-    world = World(Physics(dimensions=dimensions, gravity=down), settings=settings)
+    world = World(Physics(dimensions=dimensions, gravity=down), *how.pop("plugins", ()), settings=settings)
     side = math.ceil(n ** (1 / dimensions))
     places = np.stack(np.unravel_index(np.arange(n), (side,) * dimensions), axis=1) * SPACING
     transform = Transform.many(places, rotation=how.pop("rotation", 0.0))
@@ -71,7 +71,7 @@ def _with(world: World, system: Any) -> World:
 
 
 def _walled(n: int) -> World:
-    world = _drifting(n, _spheres())
+    world = drifting(n, _spheres())
     far = 2.0 * SPACING * math.sqrt(n)
     for centre, half in (((far, 0), (1, far)), ((-far, 0), (1, far)), ((0, far), (far, 1)), ((0, -far), (far, 1))):
         world.create_entity(Transform(centre), AABBCollider(half))
@@ -104,20 +104,20 @@ class Rung:
 
 BARE = "drifting"
 RUNGS: tuple[Rung, ...] = (
-    Rung(BARE, "", lambda n, seed: _drifting(n)),
-    Rung("gravity", BARE, lambda n, seed: _drifting(n, gravity=9.81)),
-    Rung("constant_force", BARE, lambda n, seed: _drifting(n, constant_force=(0.0, -9.81))),
-    Rung("linear_damping", BARE, lambda n, seed: _drifting(n, linear_damping=0.1)),
-    Rung("max_linear_speed", BARE, lambda n, seed: _drifting(n, max_linear_speed=10.0)),
-    Rung("rotation", BARE, lambda n, seed: _drifting(n, rotation=0.3)),
-    Rung("3D", BARE, lambda n, seed: _drifting(n, dimensions=3)),
-    Rung("a system of the game", BARE, lambda n, seed: _with(_drifting(n), Idle())),
-    Rung("a force system", "gravity", lambda n, seed: _with(_drifting(n, gravity=9.81), Drag())),
-    Rung("velocity_verlet", "gravity", lambda n, seed: _drifting(n, gravity=9.81, integrator="velocity_verlet")),
-    Rung("spheres, apart", BARE, lambda n, seed: _drifting(n, _spheres())),
-    Rung("boxes, apart", BARE, lambda n, seed: _drifting(n, _boxes())),
-    Rung("boxes, turned", "boxes, apart", lambda n, seed: _drifting(n, _boxes(), rotation=0.3)),
-    Rung("two levels", "boxes, apart", lambda n, seed: _drifting(n, SphereCollider.many(radius=0.8), _boxes())),
+    Rung(BARE, "", lambda n, seed: drifting(n)),
+    Rung("gravity", BARE, lambda n, seed: drifting(n, gravity=9.81)),
+    Rung("constant_force", BARE, lambda n, seed: drifting(n, constant_force=(0.0, -9.81))),
+    Rung("linear_damping", BARE, lambda n, seed: drifting(n, linear_damping=0.1)),
+    Rung("max_linear_speed", BARE, lambda n, seed: drifting(n, max_linear_speed=10.0)),
+    Rung("rotation", BARE, lambda n, seed: drifting(n, rotation=0.3)),
+    Rung("3D", BARE, lambda n, seed: drifting(n, dimensions=3)),
+    Rung("a system of the game", BARE, lambda n, seed: _with(drifting(n), Idle())),
+    Rung("a force system", "gravity", lambda n, seed: _with(drifting(n, gravity=9.81), Drag())),
+    Rung("velocity_verlet", "gravity", lambda n, seed: drifting(n, gravity=9.81, integrator="velocity_verlet")),
+    Rung("spheres, apart", BARE, lambda n, seed: drifting(n, _spheres())),
+    Rung("boxes, apart", BARE, lambda n, seed: drifting(n, _boxes())),
+    Rung("boxes, turned", "boxes, apart", lambda n, seed: drifting(n, _boxes(), rotation=0.3)),
+    Rung("two levels", "boxes, apart", lambda n, seed: drifting(n, SphereCollider.many(radius=0.8), _boxes())),
     Rung("walls", "spheres, apart", lambda n, seed: _walled(n)),
     Rung("elastic impacts", "walls", lambda n, seed: gas.gas2d(seed=seed, n=n)),
     Rung("contacts at rest", "walls", lambda n, seed: _resting(n)),
@@ -136,15 +136,15 @@ def axes(quick: bool = False, long: bool = False) -> list[Axis]:
     return [axis(FEW if quick else BODIES)]
 
 
-def axis(bodies: int, steps: int = STEPS) -> Axis:
+def axis(bodies: int, steps: int = STEPS, by_feature: Mapping[str, Rung] = BY_FEATURE) -> Axis:
     """Nanoseconds per body and step of each rung; bytes of the columns per body, and the kernels that a step calls."""
 
     def measure(feature: str, repeat: int) -> dict[str, float]:
-        make = partial(BY_FEATURE[feature].build, bodies, repeat)
+        make = partial(by_feature[feature].build, bodies, repeat)
         return {"ns": nanoseconds_per_step(make, feature, steps) / bodies}
 
     def facts(feature: str) -> dict[str, Any]:
-        with contextlib.closing(BY_FEATURE[feature].build(bodies, 0)) as world:
+        with contextlib.closing(by_feature[feature].build(bodies, 0)) as world:
             kit.run(world, WARM_UP_STEPS)
             with world.profile():
                 world.step()
@@ -152,7 +152,7 @@ def axis(bodies: int, steps: int = STEPS) -> Axis:
             held = sum(column.bytes for column in world.plan().columns if column.of == "body")
         return {"kernels": kernels, "bytes": held}
 
-    return Axis(FEATURE, f"{bodies:,} bodies", tuple(BY_FEATURE), measure, facts)
+    return Axis(FEATURE, f"{bodies:,} bodies", tuple(by_feature), measure, facts)
 
 
 def extra(sample: Sample, beside: Sample) -> Spread:

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.trading.charts import TIME, figure
 from carom.lab.trading.records import Trade
-from studies import ladder, startup
+from studies import ladder, spins, startup
 from studies.__main__ import STUDIES, cli
 from studies.accuracy import published, summary
 from studies.runner import Axis, run
@@ -126,6 +126,18 @@ def test_the_ladder_measures_each_rung_beside_another():
     assert spheres.facts["bytes"] > bare.facts["bytes"] > 0
     pairs = zip(gravity.figures["ns"].values, bare.figures["ns"].values, strict=True)
     assert ladder.extra(gravity, bare).values == tuple(one - other for one, other in pairs)
+
+
+def test_what_turns_is_measured_beside_the_same_scene_without():
+    result = run([ladder.axis(20, 2, spins.BY_FEATURE)], repeats=2)
+    (table,), _ = spins.report(result)
+    assert [row[:2] for row in table.rows] == [(rung.feature, rung.beside) for rung in spins.RUNGS if rung.beside]
+    (line,) = result.lines
+    still, turning = line.sample("stacks of AABBs"), line.sample("stacks of boxes with a Spin")
+    more = set(turning.facts["kernels"]) - set(still.facts["kernels"])
+    assert {"turn_bodies", "share_spins", "solve_turning_contacts", "take_spins"} <= more
+    pairs = zip(turning.figures["ns"].values, still.figures["ns"].values, strict=True)
+    assert spins.times(turning, still).values == tuple(one / other for one, other in pairs)
 
 
 def test_startup_times_processes_with_caches_of_their_own(studies, monkeypatch):
