@@ -6,12 +6,13 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, length, row, scale, store, sub
+from ..ccd.search_bounds import FAST
 from ..ccd.turning_touch import first_touch_of_turn
-from ..integration.turning import is_turned, turn_of_arm
+from ..integration.turning import cross_spin, is_turned, turn_of_arm
 from ..narrow_phase.manifolds import centre_offset_at_start, evaluate_pair, forget_manifold, has_manifold
 from ..shapes.convex.points import MOST_POINTS, contact_points
 from ..shapes.linking.convex_by_address import convex_at, rounding_by_address
-from ..shapes.tolerances import turning_margin
+from ..shapes.tolerances import reach_of, smaller_extent, turning_margin
 from .constants import UNREACHED
 
 TILT = 0.1  # rad: faces whose normals are so near that of the contact touch along their length, or soon will
@@ -71,6 +72,19 @@ def lay_arms(state, dt, r, gap):
 
 
 @part
+def slides_past(state, a, b, normal, arm_a, arm_b):
+    """Whether surfaces that touch stay where they are along the normal while their bodies turn, as those of a turntable
+    and of what it carries: by less than a part of the smaller body, all over it. In a plane nothing does."""
+    bodies = state.bodies
+    if len(normal) == 2:
+        return False
+    reach = min(reach_of(bodies, a), reach_of(bodies, b))
+    way = abs(dot(cross_spin(bodies.turn[a], arm_a), normal)) + reach * length(cross_spin(bodies.turn[a], normal))
+    way += abs(dot(cross_spin(bodies.turn[b], arm_b), normal)) + reach * length(cross_spin(bodies.turn[b], normal))
+    return way <= FAST * smaller_extent(bodies, a, b)
+
+
+@part
 def lay_first_touch(state, r):
     """The rows of a pair of which one body turns far, if it touches on the way: at one point, as they are turned then.
 
@@ -87,6 +101,8 @@ def lay_first_touch(state, r):
     left_a, left_b = scale(bodies.turn[a], share - 1.0), scale(bodies.turn[b], share - 1.0)
     arm_a = add(add(bodies.offset[a], turn_of_arm(left_a, bodies.offset[a])), add_scaled(point, normal, -0.5 * gap))
     arm_b = sub(add(arm_a, scale(normal, gap)), add_scaled(start, travel, share))
+    if share == 0.0 and slides_past(state, a, b, normal, arm_a, arm_b):
+        return  # the points of the end of the step are as good, and more
     if bodies.rolling_radius[a] > 0.0:
         arm_a = scale(normal, bodies.rolling_radius[a])
     if bodies.rolling_radius[b] > 0.0:

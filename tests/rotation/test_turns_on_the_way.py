@@ -53,3 +53,22 @@ def test_a_thin_bar_passes_through_no_ball_and_strikes_none_that_it_does_not_mee
     assert struck[gaps < -1e-3].all()
     assert not struck[gaps > 5e-3].any()
     assert min((gaps < -1e-3).sum(), (gaps > 1e-3).sum()) > 15
+
+
+@pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
+@pytest.mark.parametrize("w", [0.2, 2.0])
+def test_a_turntable_whose_rim_goes_far_carries_a_box_level(w, mode):
+    """It leaves the circle by w dt / 2 of its way, outwards."""
+    seconds, dt, about = 2.0, 1 / 60, np.array((0, w, 0))
+    with World(Physics(3, gravity=(0, -10, 0)), Rotation(), settings=Settings(collision=mode, dt=dt)) as world:
+        table = BoxCollider((9, 0.5, 9), friction=2)
+        world.create_entity(Transform((0, -0.5, 0)), RigidBody(kind="kinematic"), Spin(about), table)
+        body, place = RigidBody(1, (0, 0, -w)), Transform((1, 0.1, 0))
+        entity = world.create_entity(place, body, Spin(about), BoxCollider((0.1, 0.1, 0.1), friction=2))
+        for _ in range(round(seconds / dt)):
+            world.step()
+        place = world.component_for_entity(entity, Transform)
+        x, q = np.array(place.position), np.array(place.rotation)
+    assert abs(x[1] - 0.1) < 1e-4
+    assert np.hypot(q[1], q[3]) < 1e-3  # half the tilt
+    assert np.hypot(x[0], x[2]) == pytest.approx(np.exp(w * w * dt * seconds / 2), rel=2e-3)
