@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from ....framework.compilation import part
 from ....framework.vectors import add, dot, sub
+from ...integration.turning import is_turned
 from ..approach import centre_offset, centre_offset_at_start
 from ..constants import ALONG, IDLE, LOAD, OPEN, UNREACHED
 from .rows import closing_speed, room_of
@@ -78,6 +79,8 @@ def leave_out_of_reach(state):
         if solver.hard[k] and solver.apart[k]:
             body = solver.first[k] if solver.inverse_mass[solver.first[k]] > 0.0 else solver.second[k]
             a, b = pairs.a[c], pairs.b[c]
+            if state.spinning and (is_turned(bodies, a) or is_turned(bodies, b)):
+                continue  # turning brings its points nearer as well
             travel = sub(centre_offset(bodies, a, b), centre_offset_at_start(bodies, a, b))
             if held[body] > 0.0 and solver.gap[k] + dot(travel, solver.normal[k]) > OPEN * solver.extent[k]:
                 solver.gap[k] += UNREACHED * solver.extent[k]
