@@ -24,6 +24,7 @@ from ..constants import (
     SOLVED,
     SWEEPS,
 )  # fmt: skip
+from .joints import relax_struck
 from .rows import closing_speed, relax_listed, velocity_at
 
 
@@ -189,6 +190,8 @@ def finish_substep(solver, bias_rate, any_struck, h, dt, span):
     turn, count = 0, find_unsolved(solver, 0, any_struck, dt, span, islands)
     while count > 0:
         for _ in range(SWEEPS):
+            if len(span[4]) > 1:
+                relax_struck(solver, turn)
             relax_listed(solver, count, span[4])
         weigh(solver, span, islands)
         turn += SWEEPS

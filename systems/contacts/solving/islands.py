@@ -106,6 +106,7 @@ def weigh_joint(state, j):
     a, b, t = joints.row_a[j], joints.row_b[j], island_of_joint(state, j)
     solver.jointed[t] = True
     w_a, w_b = inverse_mass[a] if a >= 0 else 0.0, inverse_mass[b] if b >= 0 else 0.0
+    solver.borne[t] = min(solver.borne[t], w_a if w_a > 0.0 else w_b, w_b if w_b > 0.0 else w_a)
     size = max(length(joints.anchor_a[j]) if w_a > 0.0 else 0.0, length(joints.anchor_b[j]) if w_b > 0.0 else 0.0)
     if joints.kind[j] == LINE:
         size = joints.low[j] if joints.rule[j] == HOLD else joints.high[j]
@@ -132,7 +133,8 @@ def number_islands(state):
             count += 1
             solver.lightest[t], solver.most_change[t], solver.mass_of[t], solver.force_of[t] = math.inf, 0.0, 0.0, 0.0
             solver.stiff[t] = solver.own[t] = solver.strike[t] = solver.taken[t] = 0.0
-            solver.size_of[t], solver.leader[t], solver.jointed[t], solver.give[t] = 0, i, False, 0.0
+            solver.size_of[t], solver.leader[t] = 0, i
+            solver.jointed[t], solver.give[t], solver.borne[t] = False, 0.0, math.inf
         solver.number[q] = t
         change = sub(velocity[i], start[i])
         if warm_started[i]:
@@ -174,15 +176,16 @@ def choose_substeps(solver, t, usual, dt):
     Its contacts may have to bear its heaviest body: the sag under that falls with the square of the substeps, what one
     is struck by goes in by 1 / substeps. Where the own weight of bodies asks for too many, contacts are hard. What the
     most substeps cannot bear counts as lighter, see ``bears``. From masses, not from impulses, which would change with
-    the substeps; by factors of two, so that it seldom changes. Joints are like contacts in this.
+    the substeps; by factors of two, so that it seldom changes. Joints may have to bear the heaviest body of joints.
     """
-    sag = SAG * solver.most_change[t] * dt
-    pulled = sag * solver.give[t] / (solver.lightest[t] * MOST_GIVE)
+    sag, least = SAG * solver.most_change[t] * dt, usual
+    pulled = sag * solver.give[t] / (solver.borne[t] * MOST_GIVE)
+    while float(least * least) < pulled and 2 * least <= LEAST_WORK_SUBSTEPS:
+        least *= 2
+    solver.stiffness_of[t] = least
     if solver.size_of[t] == 0:  # it has joints alone
-        solver.substeps_of[t], solver.hard_of[t], solver.passes[t], solver.bears[t] = usual, False, 0, math.inf
-        while float(solver.substeps_of[t] ** 2) < pulled and solver.substeps_of[t] < LEAST_WORK_SUBSTEPS:
-            solver.substeps_of[t] *= 2
-        return solver.substeps_of[t] > usual
+        solver.substeps_of[t], solver.hard_of[t], solver.passes[t], solver.bears[t] = least, False, 0, math.inf
+        return least > usual
     own = sag * solver.own[t] / OWN_SAG
     need = sag * solver.stiff[t] / (solver.lightest[t] * MOST_SAG)
     hard = own > float(usual * usual)
@@ -192,7 +195,7 @@ def choose_substeps(solver, t, usual, dt):
     ratio = solver.stiff[t] / (solver.lightest[t] * solver.own[t])
     struck = STRIKE * strike * ratio if strike > STRUCK else 0.0
     most = max(LEAST_WORK_SUBSTEPS, min(MOST_SUBSTEPS, SUBSTEP_WORK // solver.size_of[t]))
-    asked, substeps = max(need, struck * struck, pulled), usual
+    asked, substeps = max(need, struck * struck), least
     while float(substeps * substeps) < asked and 2 * substeps <= most:
         substeps *= 2
     solver.substeps_of[t], solver.hard_of[t] = substeps, hard

@@ -29,17 +29,18 @@ BRAKES = 0.9  # of the speed from which a servo could just stop in time
 
 
 @part
-def start_joints(solver, h, more):
-    """The joints of a range start with the forces that they had, in substeps of h, of which there are so many times
-    more than usual: errors are pushed out at the usual rate."""
+def start_joints(solver, h, period, usual):
+    """The joints of a range start with the forces that they had, in substeps of h. They are as stiff as in substeps of
+    ``period``, whatever blows ask for: changes of it would give energy to what is stretched. What is stiffer than
+    ``usual`` pushes errors out at the usual rate."""
     joints = solver.joints
     joints.step = h
     for e in range(joints.begin, joints.end):
         j = joints.order[e]
         joints.impulse[j], joints.push[j] = joints.load[j] * h, scale(joints.pull[j], h)
         spring = joints.rule[j] == SPRING
-        omega = 2.0 * math.pi * (joints.frequency[j] if spring else JOINT_FREQUENCY / h)
-        damping = 2.0 * (joints.damping_ratio[j] if spring else JOINT_DAMPING_RATIO * more) + h * omega
+        omega = 2.0 * math.pi * (joints.frequency[j] if spring else JOINT_FREQUENCY / period)
+        damping = 2.0 * (joints.damping_ratio[j] if spring else JOINT_DAMPING_RATIO * usual / period) + h * omega
         stiffness = h * omega * damping
         joints.push_rate[j] = omega / damping if damping > 0.0 else 0.0
         joints.mass_scale[j], joints.impulse_scale[j] = stiffness / (1.0 + stiffness), 1.0 / (1.0 + stiffness)
@@ -181,17 +182,23 @@ def measure_joints(solver):
 
 
 @inlined
-def move_apart(solver, j, impulse):
-    """Push b at its anchor by an impulse, a vector, and a back."""
-    joints = solver.joints
-    a, b = joints.first[j], joints.second[j]
-    w_a, w_b = solver.inverse_mass[a], solver.inverse_mass[b]
+def columns_of(solver):
+    """What impulses change, and how: in names, so that no row looks for them again."""
+    return solver.velocity, solver.spin, solver.inverse_mass, solver.inverse_inertia, solver.inverse_products
+
+
+@inlined
+def push_apart(columns, ends, arms, impulse):
+    """Push the second of two bodies at the end of its arm by an impulse, a vector, and the first one back."""
+    velocity, spin, inverse_mass, inertia, products = columns
+    (a, b), (arm_a, arm_b) = ends, arms
+    w_a, w_b = inverse_mass[a], inverse_mass[b]
     if w_a > 0.0:
-        solver.velocity[a] = add_scaled(solver.velocity[a], impulse, -w_a)
-        solver.spin[a] = sub(solver.spin[a], change_of_spin(solver, a, twist(joints.arm_a[j], impulse)))
+        velocity[a] = add_scaled(velocity[a], impulse, -w_a)
+        spin[a] = sub(spin[a], symmetric(inertia[a], products[a], twist(arm_a, impulse)))
     if w_b > 0.0:
-        solver.velocity[b] = add_scaled(solver.velocity[b], impulse, w_b)
-        solver.spin[b] = add(solver.spin[b], change_of_spin(solver, b, twist(joints.arm_b[j], impulse)))
+        velocity[b] = add_scaled(velocity[b], impulse, w_b)
+        spin[b] = add(spin[b], symmetric(inertia[b], products[b], twist(arm_b, impulse)))
 
 
 @inlined
@@ -199,7 +206,8 @@ def give_row(solver, j, impulse):
     """Let a row that is no POINT act with an impulse."""
     joints = solver.joints
     if joints.kind[j] < TURN:
-        move_apart(solver, j, scale(joints.normal[j], impulse))
+        ends, arms = (joints.first[j], joints.second[j]), (joints.arm_a[j], joints.arm_b[j])
+        push_apart(columns_of(solver), ends, arms, scale(joints.normal[j], impulse))
         return
     a, b, twisted = joints.first[j], joints.second[j], scale(joints.normal[j], impulse)
     if solver.inverse_mass[a] > 0.0:
@@ -211,11 +219,12 @@ def give_row(solver, j, impulse):
 @part
 def warm_start_joints(solver):
     """The impulses of the last substep act again, with the anchors as they are now."""
-    joints = solver.joints
+    joints, columns, order, kind = solver.joints, columns_of(solver), solver.joints.order, solver.joints.kind
+    first, second, arm_a, arm_b, push = joints.first, joints.second, joints.arm_a, joints.arm_b, joints.push
     for e in range(joints.begin, joints.end):
-        j = joints.order[e]
-        if joints.kind[j] == POINT:
-            move_apart(solver, j, joints.push[j])
+        j = order[e]
+        if kind[j] == POINT:
+            push_apart(columns, (first[j], second[j]), (arm_a[j], arm_b[j]), push[j])
         else:
             give_row(solver, j, joints.impulse[j])
 
@@ -248,14 +257,12 @@ def solve_row(solver, j, pushes):
 
 @part
 def solve_joints(solver, pushes):
-    """One pass over the joints of a range. Columns stand in names, so that no row looks for them again."""
-    joints, velocity, spin, inverse_mass = solver.joints, solver.velocity, solver.spin, solver.inverse_mass
-    inertia, products = solver.inverse_inertia, solver.inverse_products
+    """One pass over the joints of a range."""
+    joints, columns, velocity, spin = solver.joints, columns_of(solver), solver.velocity, solver.spin
     order, kind, rule, first, second = joints.order, joints.kind, joints.rule, joints.first, joints.second
     arm_a, arm_b, gap, push, most = joints.arm_a, joints.arm_b, joints.gap, joints.push, joints.most
-    diagonal, others = joints.inverse, joints.inverse_products
+    diagonal, others, step = joints.inverse, joints.inverse_products, joints.step
     rate, mass_scale, impulse_scale = joints.push_rate, joints.mass_scale, joints.impulse_scale
-    step = joints.step
     for e in range(joints.begin, joints.end):
         j = order[e]
         if not pushes and rule[j] == SPRING:
@@ -264,8 +271,7 @@ def solve_joints(solver, pushes):
             solve_row(solver, j, pushes)
             continue
         a, b, r_a, r_b, old = first[j], second[j], arm_a[j], arm_b[j], push[j]
-        v_a, v_b, s_a, s_b, w_a, w_b = velocity[a], velocity[b], spin[a], spin[b], inverse_mass[a], inverse_mass[b]
-        speed = sub(add(v_b, cross_spin(s_b, r_b)), add(v_a, cross_spin(s_a, r_a)))
+        speed = sub(add(velocity[b], cross_spin(spin[b], r_b)), add(velocity[a], cross_spin(spin[a], r_a)))
         if pushes:
             speed = add_scaled(speed, gap[j], rate[j])
             change = scale(multiplied(diagonal[j], others[j], speed), -mass_scale[j])
@@ -279,20 +285,47 @@ def solve_joints(solver, pushes):
                 new = scale(new, limit / size)
             change = sub(new, old)
         push[j] = new
-        if w_a > 0.0:
-            velocity[a] = add_scaled(v_a, change, -w_a)
-            spin[a] = sub(s_a, symmetric(inertia[a], products[a], twist(r_a, change)))
-        if w_b > 0.0:
-            velocity[b] = add_scaled(v_b, change, w_b)
-            spin[b] = add(s_b, symmetric(inertia[b], products[b], twist(r_b, change)))
+        push_apart(columns, (a, b), (r_a, r_b), change)
 
 
 @part
-def finish_joints(solver):
-    """What the joints of a range have done in a substep."""
-    joints = solver.joints
+def relax_struck(solver, turn):
+    """A pass without pushing over the joints of islands whose contacts have further passes, as they have."""
+    joints, columns = solver.joints, columns_of(solver)
     for e in range(joints.begin, joints.end):
         j = joints.order[e]
-        joints.total[j] += joints.impulse[j]
-        joints.thrust[j] = add(joints.thrust[j], joints.push[j])
-        joints.load[j], joints.pull[j] = joints.impulse[j] / joints.step, scale(joints.push[j], 1.0 / joints.step)
+        a, b = joints.first[j], joints.second[j]
+        t = max(solver.island[a], solver.island[b])
+        if not solver.struck[t] or turn >= solver.passes[t] or joints.rule[j] == SPRING:
+            continue
+        if joints.kind[j] != POINT:
+            solve_row(solver, j, False)
+            continue
+        old, speed = joints.push[j], speed_between(solver, j)
+        new, limit = sub(old, multiplied(joints.inverse[j], joints.inverse_products[j], speed)), joints.most[j]
+        size = length(new)
+        if size > limit * joints.step:
+            new = scale(new, limit * joints.step / size)
+        joints.push[j] = new
+        push_apart(columns, (a, b), (joints.arm_a[j], joints.arm_b[j]), sub(new, old))
+
+
+@part
+def add_joints(solver):
+    """What the joints of a range have done in a substep."""
+    joints, order, impulse, push = solver.joints, solver.joints.order, solver.joints.impulse, solver.joints.push
+    total, thrust = joints.total, joints.thrust
+    for e in range(joints.begin, joints.end):
+        j = order[e]
+        total[j] += impulse[j]
+        thrust[j] = add(thrust[j], push[j])
+
+
+@part
+def keep_joints(solver):
+    """The forces of the last substep, for the next step."""
+    joints = solver.joints
+    by = 1.0 / joints.step
+    for e in range(joints.begin, joints.end):
+        j = joints.order[e]
+        joints.load[j], joints.pull[j] = joints.impulse[j] * by, scale(joints.push[j], by)

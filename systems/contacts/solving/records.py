@@ -170,6 +170,8 @@ SOLVER = Schema(
     leader=ints("int32"),  # row of its first body
     jointed=flags(),
     give=floats(),  # 1 / (kg m): largest inverse mass of a joint over its length
+    borne=floats(),  # inverse mass of the heaviest body of joints
+    stiffness_of=ints("int32"),  # its joints are as stiff as with so many substeps
     # ranges: the ordinary islands, then each special one
     ranges=integer(),
     usual=integer(),  # substeps,

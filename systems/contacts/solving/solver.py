@@ -39,7 +39,7 @@ from ..constants import (
 )  # fmt: skip
 from .guard import excess_speed, finish_substep, mark_struck
 from .hard import choose_hard, leave_open
-from .joints import finish_joints, measure_joints, solve_joints, start_joints, warm_start_joints
+from .joints import add_joints, keep_joints, measure_joints, solve_joints, start_joints, warm_start_joints
 from .rows import (
     ARMS,
     JOINTED,
@@ -250,7 +250,7 @@ def solve_substep(solver, springs, most, dt, h, kind, ends, span):
         solver.total[k] += solver.impulse[k]
         solver.had_impulse[k] |= solver.impulse[k] > 0.0
     if len(span[4]) > 1:
-        finish_joints(solver)
+        add_joints(solver)
 
 
 @part
@@ -325,7 +325,8 @@ def solve_range(solver, substeps, kind, dt, span):
         sag = LOADED * solver.sag * solver.impulse[k] * h / solver.mass[k]
         solver.loaded[k] = 0.0 if stiff else min(sag, MOST_LOADED * solver.extent[k])
     if len(span[4]) > 1:
-        start_joints(solver, h, substeps / solver.usual)
+        period = dt / (solver.stiffness_of[solver.island[span[2]]] if special else solver.usual)
+        start_joints(solver, h, period, dt / solver.usual)
     measure(solver, h, springs, dt, stiff, False, span)
     most = most_impulse(solver, solver.island[span[2]], substeps) if special else math.inf
     for step in range(substeps):
@@ -337,6 +338,8 @@ def solve_range(solver, substeps, kind, dt, span):
             repeat_substep(solver, left, h, span)
             break
     scale_impulses(solver, float(substeps), span)
+    if len(span[4]) > 1:
+        keep_joints(solver)
 
 
 @part
