@@ -16,6 +16,7 @@ import numpy as np
 from ...components import AABBCollider, SphereCollider
 from ...components.spin import Spin
 from ...framework import World
+from ...plugins.joints import KINDS, Hinge
 from ...systems.shapes.rotation import axes_of
 from ..cli.usage_errors import Problem
 from ..measure.body_shapes import Floats
@@ -154,10 +155,29 @@ class PymunkSpace:
                 shape = _shape(pymunk, bodies[k], rows.corners[k].tolist(), float(rows.rounding[k]))
                 shape.elasticity, shape.friction = restitution, float(friction[k])
                 self.space.add(shape)
+        self._join(pymunk, world)
         if index == "hash":
             reach = np.array([np.abs(corners).max() for corners in moving.corners]) + moving.rounding
             size = HASH_CELL * 2 * float(reach.max())
             self.space.use_spatial_hash(size, HASH_CELLS_PER_BODY * (len(moving.mass) + len(fixed.mass)))
+
+    def _join(self, pymunk: ModuleType, world: World) -> None:
+        """The hinges, with their limits and motors, of a world that has made no step yet."""
+        _refuse("joints that are no hinges", [world.get_component(kind) for kind in KINDS if kind is not Hinge])
+        of_entity = dict(zip(np.sort(world.bodies.dynamic.entity).tolist(), self.bodies, strict=True))
+        for _, joint in world.get_component(Hinge):
+            a, b = (of_entity.get(body, self.space.static_body) for body in (joint.a, joint.b))
+            made, free = [pymunk.PivotJoint(a, b, tuple(map(float, joint.anchor)))], b.angle - a.angle
+            _refuse("springs of hinges", joint.frequency is not None)
+            if joint.lower is not None or joint.upper is not None:
+                low, high = (-math.inf if joint.lower is None else joint.lower), joint.upper
+                made.append(pymunk.RotaryLimitJoint(a, b, free + low, free + (math.inf if high is None else high)))
+            if joint.motor_speed is not None:
+                made.append(pymunk.SimpleMotor(a, b, -joint.motor_speed))
+                made[-1].max_force = math.inf if joint.max_torque is None else joint.max_torque
+            for constraint in made:
+                constraint.collide_bodies = joint.collide_connected
+            self.space.add(*made)
 
     def step(self, count: int) -> None:
         """Take ``count`` steps."""
