@@ -16,7 +16,7 @@ from ..impacts.impulses import STOPPED
 from ..integration.trajectory import along, path_of
 from ..narrow_phase.manifolds import centre_offset, deepest_possible, evaluate_pair
 from ..narrow_phase.stages import is_solid_pair, layers_meet
-from ..shapes.tolerances import smaller_extent
+from ..shapes.tolerances import SAME_PLACE, smaller_extent
 from .approach import first_touch_on_segment, segment_start
 from .bodies import note_squeezed
 
@@ -51,11 +51,11 @@ def how_deep(state, c, a, b):
 @part
 def keep_out(state, c, a, b):
     """Move the one of a and b that can be moved out of the other, where it is deeper than it may, and take the speed
-    that leads there; returns whether it was."""
+    that leads there; returns how far it was moved."""
     bodies = state.bodies
     far, normal = how_deep(state, c, a, b)
     if not far > 0.0:
-        return False
+        return 0.0
     i, fixed, sign = (b, a, 1.0) if bodies.inverse_mass[b] > 0.0 else (a, b, -1.0)
     bodies.position[i] = add_scaled(bodies.position[i], normal, sign * far)
     velocity = bodies.linear_velocity[i]
@@ -64,7 +64,7 @@ def keep_out(state, c, a, b):
     closing = sign * dot(velocity, normal)
     if closing < 0.0:
         bodies.linear_velocity[i] = add_scaled(bodies.linear_velocity[i], normal, -sign * closing)
-    return True
+    return far
 
 
 @part
@@ -96,13 +96,13 @@ def keep_out_of_all(state, i):
     bodies, moved = state.bodies, False
     for k in range(state.dynamic, state.count):
         if bodies.shape[k] >= 0 and layers_meet(state, i, k) and is_solid_pair(state, i, k):
-            moved |= keep_out(state, NO_PAIR, i, k)
+            moved |= keep_out(state, NO_PAIR, i, k) > 0.0
     return moved
 
 
 def resolve_static_penetration(state, dt):
     """Put the bodies that the solver has moved out of what cannot be moved."""
-    pairs = state.pairs
+    pairs, bodies = state.pairs, state.bodies
     if state.solver.contacts == 0 and not state.any_warm_started:
         return OK
     for turn in range(ROUNDS):
@@ -112,14 +112,14 @@ def resolve_static_penetration(state, dt):
             fixed, i = max(a, b), min(a, b)  # dynamic rows come first
             if not (fixed >= first and i < state.dynamic and pairs.is_solid[c] and is_moved_by_solver(state, i)):
                 continue
-            if keep_out(state, c, a, b):
-                moved = True
-                if turn == ROUNDS - 1:
-                    note_squeezed(state.solver, i)
+            far = keep_out(state, c, a, b)
+            moved |= far > 0.0
+            if turn == ROUNDS - 1 and far > SAME_PLACE * smaller_extent(bodies, a, b):  # more than rounding
+                note_squeezed(state.solver, i)
         if not moved:
             break
     for i in range(state.first, state.dynamic if not state.pairs_filtered else 0):
-        if state.bodies.shape[i] >= 0 and is_moved_by_solver(state, i) and is_astray(state, i, dt):
+        if bodies.shape[i] >= 0 and is_moved_by_solver(state, i) and is_astray(state, i, dt):
             for _ in range(ROUNDS):
                 if not keep_out_of_all(state, i):
                     break
