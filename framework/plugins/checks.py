@@ -191,7 +191,8 @@ def check_corner(plugin: Any, first: Any, second: Any, corner: Any) -> None:
     where = f"plugin {plugin.name}: corner {name} of {_name(first)} and {_name(second)}"
     if not inspect.isfunction(plain_function(corner)):
         raise PluginError(f"{where}: corner= takes a function of (a, b, d, slop)")
-    _check_arity(where, plain_function(corner), ("a", "b", "d", "slop"))
+    convex = (first is Convex) + (second is Convex)
+    _check_arity(where, plain_function(corner), ("a", "b", "d", "slop", *HELPERS[convex]))
     for a, b, d in _samples(first, second):
         result = _call(where, corner, (a, b, d, np.float64(0.01)), a)
         if not isinstance(result, (bool, np.bool_)):

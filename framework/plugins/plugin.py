@@ -120,7 +120,7 @@ class Plugin:
         the rounding as further arguments.
 
         ``corner(a, b, d, slop)`` may tell a touch of two corners, which pushes nothing: what slides over a row of such
-        shapes would catch there.
+        shapes would catch there. With Convex it gets support and rounding, too.
         """
 
         def register(function: Any) -> Any:

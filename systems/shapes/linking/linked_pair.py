@@ -96,7 +96,7 @@ class LinkedPair:
     def corner(self) -> Linked | None:
         if self.pair.corner is None:
             return None
-        touches = self._registered("touches", self.pair.corner, "d, slop", helpers=False)
+        touches = self._registered("touches", self.pair.corner, "d, slop")
         return Linked(named(make_corner(touches, *self._records)), corner_signature(self.dimensions))
 
     def functions(self, sweeps: bool) -> Iterator[Linked]:
@@ -116,7 +116,7 @@ class LinkedPair:
         )
         return one, two
 
-    def _registered(self, name: str, function: Any, values: str, helpers: bool = True) -> Any:
+    def _registered(self, name: str, function: Any, values: str) -> Any:
         """name(record of a, a, record of b, b, values) that calls a registered function as the plugin wrote it."""
         scope: dict[str, Any] = {"function": user_function(function), "array_of": array_of, "convex_at": convex_at}
         arguments = []
@@ -127,7 +127,7 @@ class LinkedPair:
                 scope[kind] = parameter_tuple(shape)
                 arguments.append(parameters_source(shape, record, row, kind))
         arguments.append(values)
-        for k, helper in enumerate(self._helpers() if helpers else ()):
+        for k, helper in enumerate(self._helpers()):
             scope[f"helper{k}"] = helper
             arguments.append(f"helper{k}")
         title = f'"""{self.pair.names}, {self.dimensions}D."""'
@@ -166,7 +166,7 @@ def _shared_pair(first: Shape | None, second: Shape | None, pair: Pair, dimensio
 @lru_cache(maxsize=CACHE_SIZE)
 def convex_sides(first: Shape, second: Shape, pair: Pair) -> tuple[bool, bool]:
     """Which of the two the pair takes by the addresses of support and rounding."""
-    if not pair.helpers or not is_long(pair.function) or pair.corner is not None:  # a corner may look at any field
+    if not pair.helpers or not is_long(pair.function):
         return False, False
     if len(pair.helpers) == 4:
         return True, True
