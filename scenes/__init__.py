@@ -17,7 +17,7 @@ from .levels import conveyor, lift, maze, platforms, player, static_world
 from .motion import freefall, jump, orbit, spring
 from .protocol import Build, Scene
 from .rest import few, pile, pile2d, pile3d, pyramid, stack
-from .turning import billiards_spin, dominoes, flipper, rubble, tumbler
+from .turning import billiards_spin, dominoes, flipper, hills, rubble, tumbler
 
 _SCENES: dict[str, Scene] = {
     scene.name: scene
@@ -61,6 +61,7 @@ _SCENES: dict[str, Scene] = {
         ragdoll.SCENE,
         car.SCENE,
         crane.SCENE,
+        hills.SCENE,
     )
 }
 
@@ -100,6 +101,7 @@ __all__ = [
     "gas2d",
     "gas3d",
     "get",
+    "hills",
     "jump",
     "lift",
     "maze",

@@ -29,6 +29,7 @@ _NAMES = {
     "plugins.half_space": ("HalfSpaceCollider",),
     "plugins.one_way_segment": ("OneWaySegmentCollider",),
     "plugins.springs": ("Spring", "Springs"),
+    "plugins.terrain": ("ChainSegmentCollider", "create_chain"),
     "plugins.tile_grid": ("TileGridCollider", "cells_of_text"),
 }  # fmt: skip
 _MODULES = {name: module for module, names in _NAMES.items() for name in names}

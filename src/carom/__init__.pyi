@@ -8,6 +8,8 @@ from .plugins.half_space import HalfSpaceCollider as HalfSpaceCollider
 from .plugins.one_way_segment import OneWaySegmentCollider as OneWaySegmentCollider
 from .plugins.springs import Spring as Spring
 from .plugins.springs import Springs as Springs
+from .plugins.terrain import ChainSegmentCollider as ChainSegmentCollider
+from .plugins.terrain import create_chain as create_chain
 from .plugins.tile_grid import TileGridCollider as TileGridCollider
 from .plugins.tile_grid import cells_of_text as cells_of_text
 from .systems import *

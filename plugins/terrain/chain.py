@@ -1,0 +1,85 @@
+"""A chain: a static polyline in 2D, one entity for each of its segments."""
+
+from __future__ import annotations
+
+from typing import Any, Unpack
+
+import numpy as np
+
+from ...components import Transform
+from ...components.colliders import MaterialFields
+from ...framework import Column, World
+from ...framework.typing import Vector
+from .segment import ChainSegmentCollider
+
+POSITION = Column(item="vector", owner="create_chain", name="position")
+
+
+def create_chain(
+    world: World,
+    points: Any,
+    *,
+    loop: bool = False,
+    thickness: float = 0.0,
+    position: Vector = (0.0, 0.0),
+    **material: Unpack[MaterialFields],
+) -> range:
+    """Create the segments of a polyline, solid on its right; the ids of their entities, which are consecutive.
+
+    points
+        (n, 2) m, relative to ``position``; ground is drawn from left to right, an island clockwise, a cave
+        counter-clockwise
+    loop
+        whether the last point is joined to the first
+    thickness
+        m, how far behind the line the centres of bodies may be that are still pushed out to the front
+    material
+        friction, restitution, sensor, layer and mask, of all segments
+    """
+    if world.dimensions != 2:
+        raise ValueError(f"create_chain: a chain is for 2D worlds, this world is {world.dimensions}D")
+    places = _checked(points, loop) + POSITION.checked(position)
+    starts, ends = places, np.roll(places, -1, axis=0)
+    before, after = np.roll(places, 1, axis=0), np.roll(places, -2, axis=0)
+    if not loop:
+        before[0], after[-2] = places[0], places[-1]
+        starts, ends, before, after = starts[:-1], ends[:-1], before[:-1], after[:-1]
+    middles = 0.5 * (starts + ends)
+    return world.create_entities(
+        len(middles),
+        Transform.many(middles),
+        ChainSegmentCollider.many(
+            start=starts - middles,
+            end=ends - middles,
+            before=before - middles,
+            after=after - middles,
+            thickness=thickness,
+            **material,
+        ),
+    )
+
+
+def _checked(points: Any, loop: bool) -> np.ndarray:
+    """As an array; ValueError if they are no polyline."""
+    try:
+        array = np.asarray(points, float)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    least = 3 if loop else 2
+    if array.ndim != 2 or array.shape[1:] != (2,) or len(array) < least:
+        got = f"an array of shape {array.shape}" if isinstance(points, np.ndarray) else repr(points)
+        raise ValueError(f"create_chain: points must be {least} or more pairs of numbers, got {got}")
+    bad = ~np.isfinite(array).all(axis=1)
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise ValueError(f"create_chain: points must be finite, point {i} is {tuple(array[i].tolist())}")
+    same = (array == np.roll(array, -1, axis=0)).all(axis=1)
+    if not loop:
+        same[-1] = False
+    if same.any():
+        i = int(np.argmax(same))
+        raise ValueError(
+            f"create_chain: points must differ from the next one, "
+            f"points {i} and {(i + 1) % len(array)} are both {tuple(array[i].tolist())}"
+        )
+    return array

@@ -1,0 +1,262 @@
+"""Terrain: chains of segments under what rolls, slides, falls and rests on them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from worlds import position, velocity
+
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import Settings, World
+from carom.plugins import Physics, capsule, convex_polygon, terrain
+from carom.plugins.capsule import CapsuleCollider
+from carom.plugins.convex_polygon import ConvexPolygonCollider
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
+from carom.plugins.terrain import ChainSegmentCollider, create_chain
+from carom.scenes import hills
+
+pytestmark = pytest.mark.slow  # its shapes take long to compile
+
+G = 10.0
+MODES = ("discrete", "continuous", "event_driven")
+SHAPES = {
+    "ball": lambda **c: SphereCollider(0.4, **c),
+    "crate": lambda **c: AABBCollider((0.4, 0.3), **c),
+    "box": lambda **c: BoxCollider((0.4, 0.3), **c),
+    "capsule": lambda **c: CapsuleCollider(0.2, 0.3, **c),
+    "polygon": lambda **c: ConvexPolygonCollider.regular(5, 0.4, **c),
+}
+each_mode = pytest.mark.parametrize("mode", MODES)
+
+
+def make_world(gravity=(0.0, -G), **settings):
+    plugins = Rotation(), terrain.plugin, capsule.plugin, convex_polygon.plugin
+    return World(Physics(dimensions=2, gravity=gravity), *plugins, settings=Settings(**settings))
+
+
+def throw(world, place, velocity, shape, *, spin=True, rotation=0.0, **collider):
+    parts = [Transform(place, rotation), RigidBody(linear_velocity=velocity), SHAPES[shape](**collider)]
+    if spin and shape != "crate":
+        parts.append(Spin())
+    return world.create_entity(*parts)
+
+
+def angle(world, entity):
+    return world.component_for_entity(entity, Transform).rotation
+
+
+@each_mode
+@pytest.mark.parametrize("tilt", [0.0, 0.5])
+def test_what_slides_over_a_hundred_joints_keeps_height_speed_and_angle(mode, tilt):
+    """At 30 m/s without friction; lengths of segments are uneven. A world that is turned as a whole does the same."""
+    along, up = np.array((math.cos(tilt), math.sin(tilt))), np.array((-math.sin(tilt), math.cos(tilt)))
+    world = make_world(tuple(-G * up), collision=mode)
+    x = np.cumsum(np.random.default_rng(1).uniform(0.3, 1.7, 120)) - 20.0
+    create_chain(world, x[:, None] * along, friction=0.0)
+    heights = {"ball": 0.4, "crate": 0.3, "box": 0.3, "capsule": 0.2}
+    if tilt:
+        del heights["crate"]  # it does not turn
+    angles = {shape: tilt + (math.pi / 2.0 if shape == "capsule" else 0.0) for shape in heights}  # that one lies
+    bodies = {
+        shape: throw(world, 6.0 * k * along + height * up, 30.0 * along, shape, friction=0.0, rotation=angles[shape])
+        for k, (shape, height) in enumerate(heights.items())
+    }
+    for _ in range(120):
+        world.step()
+    for k, (shape, entity) in enumerate(bodies.items()):
+        near = 1e-9 if shape == "ball" else 1e-3 if shape == "capsule" else 1e-5  # what turns trembles a little
+        assert position(world, entity) @ up == pytest.approx(heights[shape], abs=near)
+        assert position(world, entity) @ along == pytest.approx(6.0 * k + 60.0, abs=near)
+        assert velocity(world, entity) @ along == pytest.approx(30.0, abs=near)
+        if shape != "ball":
+            assert angle(world, entity) == pytest.approx(angles[shape], abs=near)
+    world.close()
+
+
+@each_mode
+def test_nobody_passes_the_hills(mode):
+    """Sixty bodies of four kinds, thrown about; the centre of each stays above the line for ten seconds."""
+    points = hills.ground()
+    with hills.build(Settings(collision=mode), seed=3) as world:
+        bodies = world.bodies.dynamic.entity.tolist()
+        random = np.random.default_rng(0)
+        for entity in bodies:
+            world.component_for_entity(entity, RigidBody).linear_velocity = random.uniform(-8.0, 8.0, 2)
+        for _ in range(600):
+            world.step()
+            x, y = world.bodies.dynamic.position.T
+            assert (y > np.interp(x, *points.T)).all()
+        assert len({entity for c in world.contacts for entity in (c.entity_a, c.entity_b)} & set(bodies)) == len(bodies)
+
+
+@pytest.mark.parametrize("mode", MODES[1:])
+def test_nothing_fast_passes_in_swept_worlds(mode):
+    """Small and thin bodies that cover many times their size in a step."""
+    world = make_world(collision=mode)
+    x = np.arange(-40.0, 40.5, 0.5)
+    ground = np.stack((x, np.sin(x) + 0.3 * np.sin(5.0 * x)), axis=1)
+    create_chain(world, np.concatenate((((-45.0, 60.0),), ground, ((45.0, 60.0),))))
+    random = np.random.default_rng(5)
+    for k in range(80):
+        parts = (SphereCollider(0.02), AABBCollider((0.3, 0.01)), BoxCollider((0.3, 0.15)))[k % 3]
+        spin = () if k % 3 == 1 else (Spin(random.uniform(-5.0, 5.0)),)
+        way = (random.uniform(-60.0, 60.0), random.uniform(-300.0, -50.0))
+        world.create_entity(Transform((-39.5 + k, 20.0)), RigidBody(linear_velocity=way), parts, *spin)
+    for _ in range(120):
+        world.step()
+        places = world.bodies.dynamic.position
+        assert (places[:, 1] > np.interp(places[:, 0], *ground.T) - 1e-3).all()
+    world.close()
+
+
+@each_mode
+def test_a_ball_swings_in_a_parabola_of_many_segments(mode):
+    """Without friction the speed is that of the height; and it comes up as high on the other side."""
+    world = make_world(collision=mode, dt=1 / 240)
+    x = np.linspace(-3.0, 3.0, 1201)
+    create_chain(world, np.stack((x, x**2 / 4.0), axis=1))
+    start = np.array((-2.0, 1.0)) + 0.1 * np.array((1.0, 1.0)) / math.sqrt(2.0)
+    ball = world.create_entity(Transform(start), RigidBody(), SphereCollider(0.1))
+    path = []
+    for _ in range(480):
+        world.step()
+        path.append((*position(world, ball), *velocity(world, ball)))
+    x, y, u, v = np.array(path).T
+    energy = G * y + 0.5 * (u * u + v * v)
+    assert energy == pytest.approx(G * start[1], rel=0.02)
+    assert y.min() == pytest.approx(0.1, abs=1e-3)
+    assert x.max() == pytest.approx(-start[0], abs=0.03)
+    assert (y - x**2 / 4.0 > 0.09).all()
+    world.close()
+
+
+@each_mode
+def test_boxes_rest_on_slopes_and_across_joints_with_two_points(mode):
+    world = make_world(collision=mode)
+    slope = math.atan(0.5)
+    create_chain(world, [(-10, 5), (0, 0), (2, 0), (3, 0), (4, 0), (14, 5), (24, 5), (24, 0)], friction=0.8)
+    places = [(-5.0, 2.5), (9.0, 2.5)]
+    boxes = [
+        throw(world, (x - 0.3 * side * math.sin(slope), y + 0.3 * math.cos(slope)), (0, 0), "box",
+              rotation=side * slope, friction=0.8)
+        for (x, y), side in zip(places, (-1.0, 1.0), strict=True)
+    ]  # fmt: skip
+    boxes.append(throw(world, (3.0, 0.3), (0, 0), "box", friction=0.8))  # above a joint
+    boxes.append(throw(world, (23.8, 5.3), (0, 0), "box", friction=0.8))
+    before = [(*position(world, entity), angle(world, entity)) for entity in boxes]
+    for _ in range(300):
+        world.step()
+    for entity, was in zip(boxes, before, strict=True):
+        assert (*position(world, entity), angle(world, entity)) == pytest.approx(was, abs=1e-3)
+        assert velocity(world, entity) == pytest.approx((0, 0), abs=1e-5)
+    world.close()
+
+
+def test_a_ball_in_a_valley_touches_both_sides():
+    world = make_world()
+    create_chain(world, [(-4, 4), (0, 0), (4, 4)])
+    ball = throw(world, (0.0, 0.6), (0, 0), "ball")
+    for _ in range(120):
+        world.step()
+    assert position(world, ball) == pytest.approx((0, 0.4 * math.sqrt(2.0)), abs=2e-3)
+    assert [contact.entity_a for contact in world.contacts] == [1, 2]
+    world.close()
+
+
+@each_mode
+def test_what_bounces_on_a_joint_bounces_as_high(mode):
+    world = make_world(collision=mode, integrator="velocity_verlet")
+    create_chain(world, [(x, 0.0) for x in range(-5, 6)], restitution=1.0)
+    balls = [throw(world, (x, 1.4), (0, 0), "ball", restitution=1.0) for x in (-3.0, 0.3, 2.0)]
+    highest = 0.0
+    for k in range(600):
+        world.step()
+        if k > 480:
+            highest = np.maximum(highest, [position(world, ball)[1] for ball in balls])
+    assert highest == pytest.approx(1.4, abs=1e-5)
+    world.close()
+
+
+def test_one_side_is_solid():
+    """From behind a ball passes; rays see the front only; with a thickness it comes out where it went in."""
+    world = make_world(gravity=(0.0, 0.0))
+    chain = create_chain(world, [(0, 0), (2, 0), (4, 0)])
+    ball = throw(world, (1.0, -1.0), (0, 6.0), "ball")
+    for _ in range(60):
+        world.step()
+    assert position(world, ball)[1] > 4.0
+    assert velocity(world, ball)[0] == 0.0
+    assert world.ray_cast((1.0, 0.5), (0, -1))[0].entity == chain[0]
+    assert not world.ray_cast((3.0, -0.5), (0, 1), max_distance=1.0)
+    create_chain(world, [(10, 0), (14, 0)], thickness=0.5)
+    inside = throw(world, (12.0, -0.4), (0, 0), "ball")
+    for _ in range(60):
+        world.step()
+    assert position(world, inside)[1] > 0.39
+    world.close()
+
+
+def test_loops_are_solid_on_the_right():
+    """Clockwise an island, counter-clockwise a cave, with corners of 90 degrees."""
+    world = make_world()
+    square = np.array(((-3.0, -1.0), (3.0, -1.0), (3.0, 1.0), (-3.0, 1.0)))
+    create_chain(world, square[::-1], loop=True)
+    create_chain(world, 4.0 * square, loop=True)
+    on_top, below = throw(world, (0.0, 2.0), (3.0, 0), "ball"), throw(world, (0.0, -2.0), (3.0, 0), "ball")
+    for _ in range(240):
+        world.step()
+        for entity in (on_top, below):
+            x, y = position(world, entity)
+            assert abs(x) < 12.0 - 0.39
+            assert abs(y) < 4.0 - 0.39
+            assert max(abs(x) - 3.0, abs(y) - 1.0) > 0.25
+    world.close()
+
+
+def test_it_is_saved_and_goes_on_to_the_bit(tmp_path):
+    with hills.build(n=8) as world:
+        for _ in range(60):
+            world.step()
+        world.save(tmp_path / "hills")
+        plugins = Rotation(), terrain.plugin, capsule.plugin, convex_polygon.plugin
+        with World.load(tmp_path / "hills", Physics(dimensions=2, gravity=(0.0, -hills.GRAVITY)), *plugins) as other:
+            for _ in range(60):
+                world.step()
+                other.step()
+            assert world.state_hash() == other.state_hash()
+
+
+@pytest.mark.parametrize(
+    ("points", "options", "message"),
+    [
+        ([(0, 0)], {}, r"create_chain: points must be 2 or more pairs of numbers, got \[\(0, 0\)\]"),
+        ([(0, 0), (1, 0)], {"loop": True}, "points must be 3 or more pairs"),
+        (np.zeros((4, 3)), {}, r"pairs of numbers, got an array of shape \(4, 3\)"),
+        ("hill", {}, "pairs of numbers, got 'hill'"),
+        ([(0, 0), (1, math.nan)], {}, r"points must be finite, point 1 is \(1.0, nan\)"),
+        ([(0, 0), (1, 0), (1, 0)], {}, r"points 1 and 2 are both \(1.0, 0.0\)"),
+        ([(0, 0), (1, 0), (1, 1), (0, 0)], {"loop": True}, r"points 3 and 0 are both \(0.0, 0.0\)"),
+        ([(0, 0), (1, 0)], {"thickness": -1.0}, r"ChainSegmentCollider.thickness .*-1.0"),
+    ],
+)
+def test_bad_points_are_refused(points, options, message):
+    world = make_world()
+    with pytest.raises(ValueError, match=message):
+        create_chain(world, points, **options)
+    assert not len(world.bodies)
+    world.close()
+
+
+def test_it_is_refused_in_3d_and_on_what_moves():
+    world = World(Physics(dimensions=3), terrain.plugin)
+    with pytest.raises(ValueError, match="create_chain: a chain is for 2D worlds, this world is 3D"):
+        create_chain(world, [(0, 0), (1, 0)])
+    world.close()
+    world = make_world()
+    segment = ChainSegmentCollider((-1, 0), (1, 0), (-1, 0), (1, 0))
+    entity = world.create_entity(Transform((0, 0)), RigidBody(), segment)
+    with pytest.raises(ValueError, match=f"entity {entity} has ChainSegmentCollider, which no RigidBody can have"):
+        world.step()
+    world.close()
