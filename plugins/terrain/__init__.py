@@ -1,6 +1,15 @@
 """Terrain: ground of many pieces that bodies roll and slide over without catching where the pieces meet."""
 
 from .chain import create_chain
+from .mesh import create_height_field, create_triangle_mesh
 from .segment import ChainSegmentCollider, plugin
+from .triangle import TerrainTriangleCollider
 
-__all__ = ["ChainSegmentCollider", "create_chain", "plugin"]
+__all__ = [
+    "ChainSegmentCollider",
+    "TerrainTriangleCollider",
+    "create_chain",
+    "create_height_field",
+    "create_triangle_mesh",
+    "plugin",
+]

@@ -29,7 +29,10 @@ _NAMES = {
     "plugins.half_space": ("HalfSpaceCollider",),
     "plugins.one_way_segment": ("OneWaySegmentCollider",),
     "plugins.springs": ("Spring", "Springs"),
-    "plugins.terrain": ("ChainSegmentCollider", "create_chain"),
+    "plugins.terrain": (
+        "ChainSegmentCollider", "TerrainTriangleCollider",
+        "create_chain", "create_height_field", "create_triangle_mesh",
+    ),
     "plugins.tile_grid": ("TileGridCollider", "cells_of_text"),
 }  # fmt: skip
 _MODULES = {name: module for module, names in _NAMES.items() for name in names}

@@ -1,0 +1,207 @@
+"""One triangle of a mesh: a collider that knows its neighbours, so that nothing catches at inner edges.
+
+A triangle is solid behind its front, from which its corners run counter-clockwise. It has the contacts along its own
+normal of what is above it and, at edges from which both faces fall away, those whose normals are between the two.
+"""
+
+from __future__ import annotations
+
+import collections
+import math
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from ...components import Collider, RigidBody
+from ...framework import Component, Convex, column
+from ...framework.compilation import part
+from ...framework.typing import VectorField
+from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
+from ..standard_shapes import convex_convex
+from .segment import BEHIND, BESIDE, NEAR, NONE, PART, STRAIGHT, TILT, WHOLE, plugin, sharp
+
+# One edge: a point of it, the direction out of the triangle in its plane, that through the neighbour, whether the
+# neighbour falls away, and how far the triangle counts beyond an edge from which it does not.
+Edge = collections.namedtuple("Edge", "at outward through falls room")
+
+
+@plugin.shape(cost=5)
+class TerrainTriangleCollider(Collider):
+    """A static triangle in a 3D world, solid behind its front.
+
+    a, b, c
+        (3,) m, the corners relative to the centre, counter-clockwise as seen from the front
+    beyond_ab, beyond_bc, beyond_ca
+        (3,) m, the third corner of the triangle on the other side of an edge; where there is none, a, b or c
+    thickness
+        m, a body whose centre is so far behind the triangle is still pushed out to its front
+    """
+
+    __slots__ = ()
+
+    dimensions: ClassVar[tuple[int, ...]] = (3,)
+    excludes: ClassVar[Mapping[type[Component], str]] = {RigidBody: "terrain is static, leave it out"}
+    a: VectorField = column(item="vector")
+    b: VectorField = column(item="vector")
+    c: VectorField = column(item="vector")
+    beyond_ab: VectorField = column(item="vector")
+    beyond_bc: VectorField = column(item="vector")
+    beyond_ca: VectorField = column(item="vector")
+    thickness: float = column(default=0.0, minimum=0.0)
+
+    def _fill(self, given: Mapping[str, Any]) -> None:
+        super()._fill(given)
+        a, b, c = (np.asarray(corner, float) for corner in (self.a, self.b, self.c))
+        if not np.cross(b - a, c - a).any():
+            raise ValueError(f"TerrainTriangleCollider: a, b and c must not be on a line, got {a}, {b} and {c}")
+
+    @classmethod
+    def sample(cls, **common: Any) -> Self:
+        a, b, c = (-0.5, 0.0, -0.5), (0.0, 0.0, 0.5), (0.5, 0.0, -0.5)
+        return cls(a, b, c, (-1.0, -0.5, 0.5), (1.0, -0.5, 0.5), (0.0, -0.5, -1.5), **common)
+
+    @staticmethod
+    def bounds(shape, dimensions):
+        """At least a quarter as thick as long: tolerances follow the extent."""
+        x = max(abs(shape.a[0]), max(abs(shape.b[0]), abs(shape.c[0])))
+        y = max(abs(shape.a[1]), max(abs(shape.b[1]), abs(shape.c[1])))
+        z = max(abs(shape.a[2]), max(abs(shape.b[2]), abs(shape.c[2])))
+        least = 0.25 * max(x, max(y, z))
+        return (1.0 + BESIDE) * max(x, least), (1.0 + BESIDE) * max(y, least), (1.0 + BESIDE) * max(z, least)
+
+    @staticmethod
+    def support(shape, direction):
+        one, two, three = dot(shape.a, direction), dot(shape.b, direction), dot(shape.c, direction)
+        if one >= two and one >= three:
+            return shape.a
+        return shape.b if two >= three else shape.c
+
+
+@plugin.kernel
+def cross3(u, v):
+    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+
+
+@plugin.kernel
+def corner_towards(a, direction):
+    """The triangle's own support."""
+    one, two, three = dot(a.a, direction), dot(a.b, direction), dot(a.c, direction)
+    if one >= two and one >= three:
+        return a.a
+    return a.b if two >= three else a.c
+
+
+@part
+def edge_of(start, end, beyond, normal, room):
+    """The Edge from start to end."""
+    along = sub(end, start)
+    along = divided(along, length(along))
+    outward, through = cross3(along, normal), sub(beyond, start)
+    through = add_scaled(through, along, -dot(through, along))
+    far = length(through)
+    if far == 0.0:  # as a vertical wall below
+        return Edge(start, outward, negative(normal), True, 0.0)
+    through = divided(through, far)
+    falls = dot(through, normal) < -STRAIGHT
+    return Edge(start, outward, through, falls, 0.0 if falls else room)
+
+
+@part
+def part_above(b, at, normal, edge, known, support):
+    """(kind, height, how far it is beyond the edge) of what of a shape's face is on the inner side of an edge.
+
+    at: from the edge's point to the shape's centre; known: (kind, height, nearest point from the shape's centre).
+    """
+    kind, height, nearest = known
+    nearest = add(at, nearest)
+    out, level = dot(edge.outward, nearest), dot(normal, nearest)
+    if out <= edge.room:
+        return kind, height, 0.0
+    inner = add(at, support(b, negative(add_scaled(normal, edge.outward, TILT))))
+    inward = dot(edge.outward, inner)
+    if inward > edge.room:
+        return NONE, height, inward
+    low = dot(normal, inner)
+    return PART, max(height, low + (level - low) * (edge.room - inward) / (out - inward)), 0.0
+
+
+@part
+def is_between(normal, edge):
+    """Whether a normal is none of the neighbour's at an edge towards which it leans."""
+    return dot(normal, edge.outward) <= NEAR or (edge.falls and dot(normal, edge.through) <= NEAR)
+
+
+@plugin.kernel
+def beyond_edge(normal, direction, edge):
+    """The normal of the neighbour that falls away, if a direction leans towards it; else that of the triangle."""
+    if not edge.falls or dot(direction, edge.outward) <= NEAR:
+        return normal
+    out, down = dot(edge.through, edge.outward), dot(edge.through, normal)
+    return add_scaled(scale(edge.outward, -down), normal, out)
+
+
+@part
+def contact_of_triangle(a, b, d, support, rounding):
+    """(whether the shape is over the triangle's own part; depth, normal, point)."""
+    normal, round_b = cross3(sub(a.b, a.a), sub(a.c, a.a)), rounding(b)
+    size = math.sqrt(length(normal))
+    normal = divided(normal, length(normal))
+    zone = BESIDE * size
+    nearest = support(b, negative(normal))
+    level = dot(normal, add(sub(d, a.a), nearest))
+    point = add(d, nearest)
+    gap, centre = level - round_b, dot(normal, sub(d, a.a))
+    if gap > size:  # the plane parts them
+        return False, zone - gap, normal, point
+    one = edge_of(a.a, a.b, a.beyond_ab, normal, 5.0 * zone)
+    two = edge_of(a.b, a.c, a.beyond_bc, normal, 5.0 * zone)
+    three = edge_of(a.c, a.a, a.beyond_ca, normal, 5.0 * zone)
+    _, depth, straight, place = convex_convex(a, b, d, corner_towards, support, sharp, rounding)
+    between = is_between(straight, one) and is_between(straight, two) and is_between(straight, three)
+    between = between and dot(straight, normal) > -NEAR
+    kind, height, far, side, outer = WHOLE, level, 0.0, normal, normal
+    for k in range(3):
+        edge = one if k == 0 else two if k == 1 else three
+        kind_now, height, beyond = part_above(b, sub(d, edge.at), normal, edge, (kind, height, nearest), support)
+        kind = NONE if kind == NONE else kind_now
+        leaning = beyond_edge(normal, straight, edge)
+        outer = outer if leaning == normal else leaning
+        if beyond > far:
+            far, side = beyond, edge.outward
+    # The plane may have what is not above the triangle itself.
+    wrong = -depth - (height - round_b) > (0.1 * zone if depth < 0.0 else zone)
+    if between and (kind != WHOLE or wrong):
+        if dot(straight, sub(d, place)) < -BEHIND * size - a.thickness:
+            return False, -math.inf, normal, point
+        return True, depth, straight, place
+    if kind == NONE or wrong:
+        if depth > 0.0 and outer != normal and dot(outer, sub(d, place)) > 0.0:
+            return True, depth, outer, place
+        if gap > 2.0 * zone:
+            return False, zone - gap, normal, point
+        if -depth > zone:
+            return False, depth, straight, point
+        return False, -max(far, zone), side, point
+    if centre < -BEHIND * size - a.thickness:
+        return False, -math.inf, normal, point
+    depth = round_b - height
+    return True, depth, normal, add_scaled(point, normal, -dot(normal, sub(point, a.a)) - 0.5 * depth)
+
+
+def is_beside(a, b, d, slop, support, rounding):
+    """Whether the neighbours have the contact, if there is one."""
+    return not contact_of_triangle(a, b, d, support, rounding)[0]
+
+
+@plugin.pair(TerrainTriangleCollider, Convex, corner=is_beside)
+def triangle_convex(a, b, d, support, rounding):
+    """Not inlined: it is long and has several callers."""
+    owns, depth, normal, point = contact_of_triangle(a, b, d, support, rounding)
+    return owns and depth >= 0.0, depth, normal, point
+
+
+@plugin.pair(TerrainTriangleCollider, TerrainTriangleCollider)
+def two_triangles(a, b, d):
+    """Never a contact: neither moves."""
+    return False, -math.inf, d, d

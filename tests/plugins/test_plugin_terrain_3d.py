@@ -1,0 +1,203 @@
+"""Terrain in 3D: fields of heights and meshes of triangles under what rolls, slides and falls on them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from worlds import position, velocity
+
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import Settings, World
+from carom.plugins import Physics, capsule, terrain
+from carom.plugins.capsule import CapsuleCollider
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
+from carom.plugins.terrain import create_height_field, create_triangle_mesh
+
+pytestmark = pytest.mark.slow  # its shapes take long to compile
+
+G = 10.0
+MODES = ("discrete", "continuous", "event_driven")
+each_mode = pytest.mark.parametrize("mode", MODES)
+SIDE = 25  # points of the hills along each axis
+
+
+def make_world(gravity=(0.0, -G, 0.0), **settings):
+    plugins = Rotation(), terrain.plugin, capsule.plugin
+    return World(Physics(dimensions=3, gravity=gravity), *plugins, settings=Settings(**settings))
+
+
+def throw(world, place, velocity, shape, spin=None):
+    parts = [Transform(place), RigidBody(linear_velocity=velocity), shape]
+    return world.create_entity(*parts, *(() if spin is None else (Spin(spin),)))
+
+
+def hills(seed):
+    """Heights on a grid with steps of 1 m, with a high rim."""
+    i, j = np.meshgrid(np.arange(SIDE), np.arange(SIDE), indexing="ij")
+    heights = 1.2 * np.sin(i / 2.0) * np.cos(j / 2.5) + np.random.default_rng(seed).uniform(-0.15, 0.15, i.shape)
+    heights[[0, -1]] = heights[:, [0, -1]] = 25.0
+    return heights
+
+
+def height_at(heights, places):
+    """Of the two triangles of each cell."""
+    i, j = np.clip(places[:, ::2].astype(int).T, 0, SIDE - 2)
+    u, v = places[:, 0] - i, places[:, 2] - j
+    one = heights[i, j] + u * (heights[i + 1, j] - heights[i, j]) + v * (heights[i, j + 1] - heights[i, j])
+    far = heights[i + 1, j + 1]
+    two = far + (1 - u) * (heights[i, j + 1] - far) + (1 - v) * (heights[i + 1, j] - far)
+    return np.where(u + v <= 1, one, two)
+
+
+@each_mode
+def test_what_slides_over_a_floor_of_triangles_keeps_height_speed_and_angle(mode):
+    """At 20 m/s, across a hundred inner edges, without friction."""
+    world = make_world(collision=mode)
+    create_height_field(world, np.zeros((60, 12)), 1.0, friction=0.0)
+    shapes = (
+        (0.5, SphereCollider(0.5, friction=0.0), None),
+        (0.5, SphereCollider(0.5, friction=0.0), 0.0),
+        (0.4, AABBCollider((0.5, 0.4, 0.3), friction=0.0), None),
+        (0.3, BoxCollider((0.5, 0.3, 0.4), friction=0.0), 0.0),
+    )
+    bodies = [
+        throw(world, (1.3 + 4.0 * k, high, 5.2), (20.0, 0.0, 1.0), shape, spin)
+        for k, (high, shape, spin) in enumerate(shapes)
+    ]
+    for _ in range(120):
+        world.step()
+    for k, (entity, (high, _, _)) in enumerate(zip(bodies, shapes, strict=True)):
+        assert position(world, entity) == pytest.approx((41.3 + 4.0 * k, high, 7.2), abs=1e-4)
+        assert velocity(world, entity) == pytest.approx((20.0, 0.0, 1.0), abs=1e-4)
+    assert abs(world.component_for_entity(bodies[3], Transform).rotation[0]) == pytest.approx(1.0, abs=1e-9)
+    world.close()
+
+
+@each_mode
+@pytest.mark.parametrize("seed", [0, 1])
+def test_nobody_passes_the_hills(mode, seed):
+    heights, random, world = hills(seed), np.random.default_rng(seed), make_world(collision=mode)
+    create_height_field(world, heights, 1.0, friction=0.6)
+    for k in range(60):
+        shape = (
+            SphereCollider(random.uniform(0.15, 0.5), friction=0.6),
+            BoxCollider(random.uniform(0.15, 0.5, 3), friction=0.6),
+            CapsuleCollider(0.2, 0.3, friction=0.6),
+            AABBCollider(0.3, friction=0.6),
+        )[k % 4]
+        spin = None if k % 4 == 3 else random.uniform(-2.0, 2.0, 3)
+        throw(world, random.uniform((2, 3, 2), (22, 8, 22)), random.uniform(-6, 6, 3), shape, spin)
+    for _ in range(480):
+        world.step()
+        places = world.bodies.dynamic.position
+        assert (places[:, 1] > height_at(heights, places)).all()
+    world.close()
+
+
+@each_mode
+def test_a_ball_rolls_down_a_slope_of_triangles_as_down_a_plane(mode):
+    """By 5/7 g sin a, across inner edges at all angles; without a spin by g sin a."""
+    slope = math.atan(0.5)
+    world = make_world(collision=mode)
+    i, j = np.meshgrid(np.arange(61.0), np.arange(21.0), indexing="ij")
+    create_height_field(world, -0.5 * i + 0.0 * j, 1.0, friction=0.8)
+    up = 0.4 * np.array((math.sin(slope), math.cos(slope), 0.0))
+    ball = throw(world, np.array((3.2, -1.6, 8.3)) + up, (0, 0, 0), SphereCollider(0.4, friction=0.8), 0.0)
+    for _ in range(180):
+        world.step()
+    speed = np.linalg.norm(velocity(world, ball))
+    assert speed == pytest.approx(5.0 / 7.0 * G * math.sin(slope) * 3.0, rel=2e-3)
+    assert velocity(world, ball)[2] == pytest.approx(0.0, abs=1e-4)
+    x, y, _ = position(world, ball)
+    assert (0.5 * x + y) * math.cos(slope) == pytest.approx(0.4, abs=2e-3)
+    world.close()
+
+
+@each_mode
+def test_boxes_lie_still_on_slopes(mode):
+    slope = math.atan(0.3)
+    world = make_world(collision=mode)
+    i, j = np.meshgrid(np.arange(13.0), np.arange(13.0), indexing="ij")
+    create_height_field(world, 0.3 * i + 0.0 * j, 1.0, friction=0.8)
+    up = 0.4 * np.array((-math.sin(slope), math.cos(slope), 0.0))
+    turn = (math.cos(slope / 2.0), 0.0, 0.0, math.sin(slope / 2.0))
+    parts = RigidBody(), Spin(), BoxCollider((0.8, 0.4, 0.6), friction=0.8)
+    box = world.create_entity(Transform(np.array((6.2, 1.86, 6.3)) + up, turn), *parts)
+    before = position(world, box).copy()
+    for _ in range(300):
+        world.step()
+    assert position(world, box) == pytest.approx(before, abs=2e-3)
+    assert velocity(world, box) == pytest.approx((0, 0, 0), abs=1e-4)
+    world.close()
+
+
+@each_mode
+def test_a_mesh_of_a_bowl_holds_balls(mode):
+    """An octahedron whose fronts look inwards, with equal vertices given more than once."""
+    corners = 4.0 * np.array(((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)), float)
+    faces = [
+        (x, y, z) if (sx * sy * sz < 0) else (x, z, y)
+        for x, sx in ((0, 1), (1, -1)) for y, sy in ((2, 1), (3, -1)) for z, sz in ((4, 1), (5, -1))
+    ]  # fmt: skip
+    vertices = corners[np.array(faces)].reshape(-1, 3)
+    world = make_world(collision=mode)
+    create_triangle_mesh(world, vertices, np.arange(24).reshape(8, 3), friction=0.3)
+    random = np.random.default_rng(2)
+    for _ in range(12):
+        ball = SphereCollider(0.2, restitution=0.5, friction=0.3)
+        throw(world, random.uniform(-1.0, 1.0, 3), random.uniform(-9, 9, 3), ball)
+    for _ in range(300):
+        world.step()
+        assert (np.abs(world.bodies.dynamic.position).sum(axis=1) < 4.0).all()
+    world.close()
+
+
+def test_rays_see_fronts_only():
+    world = make_world()
+    ground = create_height_field(world, [[0.0, 0.0], [0.0, 0.0]], 2.0)
+    assert [hit.entity for hit in world.ray_cast((0.4, 3.0, 0.4), (0, -1, 0))] == [ground[0]]
+    hit = world.ray_cast((1.7, 3.0, 1.6), (0, -1, 0))[0]
+    assert hit.entity == ground[1]
+    assert hit.distance == pytest.approx(3.0)
+    assert hit.normal == pytest.approx((0, 1, 0))
+    world.close()
+
+
+@pytest.mark.parametrize(
+    ("vertices", "triangles", "message"),
+    [
+        (
+            np.zeros((4, 2)),
+            [(0, 1, 2)],
+            r"vertices must be 3 or more of 3 numbers each, got an array of shape \(4, 2\)",
+        ),
+        ([(0, 0, 0), (1, 0, math.nan), (0, 0, 1)], [(0, 1, 2)], r"vertex 1 is \(1.0, 0.0, nan\)"),
+        ([(0, 0, 0), (1, 0, 0), (0, 0, 1)], [(0, 1)], "triangles must be 1 or more of 3 whole numbers each"),
+        ([(0, 0, 0), (1, 0, 0), (0, 0, 1)], [(0, 1, 3)], r"there are 3 vertices, triangle 0 is \(0, 1, 3\)"),
+        ([(0, 0, 0), (1, 0, 0), (2, 0, 0)], [(0, 1, 2)], "triangle 0 has no area"),
+        ([(0, 0, 0), (1, 0, 0), (0, 0, 1), (1, 0, 1)], [(0, 1, 2), (0, 1, 3)], "triangles 0 and 1 have the same edge"),
+    ],
+)
+def test_bad_meshes_are_refused(vertices, triangles, message):
+    world = make_world()
+    with pytest.raises(ValueError, match=f"create_triangle_mesh: .*{message}"):
+        create_triangle_mesh(world, vertices, triangles)
+    assert not len(world.bodies)
+    world.close()
+
+
+def test_bad_heights_are_refused():
+    world = make_world()
+    with pytest.raises(ValueError, match=r"create_height_field: heights .* at least 2 x 2, got \[\[1.0\]\]"):
+        create_height_field(world, [[1.0]], 1.0)
+    with pytest.raises(ValueError, match=r"heights\[1, 0\] is nan"):
+        create_height_field(world, [[1.0, 2.0], [math.nan, 0.0]], 1.0)
+    with pytest.raises(ValueError, match=r"create_height_field.cell must be .*0"):
+        create_height_field(world, np.zeros((2, 2)), 0.0)
+    world.close()
+    world = World(Physics(dimensions=2), terrain.plugin)
+    with pytest.raises(ValueError, match="create_triangle_mesh: a mesh is for 3D worlds, this world is 2D"):
+        create_height_field(world, np.zeros((2, 2)), 1.0)
+    world.close()
