@@ -180,9 +180,9 @@ def contact_of_triangle(a, b, d, support, rounding):
             return True, depth, outer, place
         if gap > 2.0 * zone:
             return False, zone - gap, normal, point
-        if -depth > zone:
-            return False, depth, straight, point
-        return False, -max(far, zone), side, point
+        if -depth > zone or (depth <= 0.0 and far < zone):
+            return False, min(depth, -0.1 * zone), straight, point
+        return False, -max(far, zone), side if far > 0.0 else straight, point
     if centre < -BEHIND * size - a.thickness:
         return False, -math.inf, normal, point
     depth = round_b - height

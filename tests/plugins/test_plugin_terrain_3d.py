@@ -96,6 +96,23 @@ def test_nobody_passes_the_hills(mode, seed):
     world.close()
 
 
+@pytest.mark.parametrize("mode", MODES[1:])
+def test_nothing_fast_passes_in_swept_worlds(mode):
+    """Balls of 2 cm that cover a hundred times their size in a step; none of them meets another."""
+    heights, random, world = hills(3), np.random.default_rng(5), make_world(collision=mode)
+    create_height_field(world, heights, 1.0, mask=3)
+    for _ in range(80):
+        way = random.uniform((-40, -300, -40), (40, -50, 40))
+        throw(world, random.uniform((3, 8, 3), (21, 12, 21)), way, SphereCollider(0.02, layer=2, mask=1))
+    for _ in range(60):
+        world.step()
+        places = world.bodies.dynamic.position
+        inside = ((places[:, ::2] > 1.0) & (places[:, ::2] < SIDE - 2.0)).all(axis=1)  # others may fly over the rim
+        assert (places[:, 1] > height_at(heights, places))[inside].all()
+    assert inside.sum() > 10
+    world.close()
+
+
 @each_mode
 def test_a_ball_rolls_down_a_slope_of_triangles_as_down_a_plane(mode):
     """By 5/7 g sin a, across inner edges at all angles; without a spin by g sin a."""
