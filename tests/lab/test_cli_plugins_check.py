@@ -261,7 +261,8 @@ def test_the_built_in_shapes_pass_the_check(carom):
     assert sum(" ok" in line for line in result.stdout.splitlines()) >= 10
 
 
-@pytest.mark.parametrize("name", OFFERED)
+# Pieces of terrain leave to their neighbours what a shape of their own would have: docs/plugins/terrain.md.
+@pytest.mark.parametrize("name", sorted({*OFFERED} - {"terrain"}))
 def test_what_ships_passes_the_check(carom, name):
     result = carom("plugins", "check", OFFERED[name].partition(":")[0])
     assert result.exit_code == 0, result.stdout
