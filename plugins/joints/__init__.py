@@ -9,10 +9,12 @@ import numpy as np
 from ...framework import NoPhysicsError, Plugin, World
 from ...systems.contacts.solving.joints import POINT, TURN
 from ...systems.contacts.solving.records import JOINTS
-from .joint import WORLD, Changes, Joint, Place
+from .joint import WORLD, Changes, Joint, Place, Row
 from .kinds import KINDS, Ball, Cone, Distance, Hinge, Motor, MousePull, Slider, Weld
 
-# What a row keeps from step to step.
+SET = -1  # the version of a handle that has been written to, and of a new one
+# What rows are known by, and what they keep from step to step.
+KEY = ("joint", "kind", "rule")
 KEPT = ("load", "pull", "normal", "total", "thrust")
 
 
@@ -54,11 +56,13 @@ class Joints(Plugin):
         self.world, physics = world, world.physics
         self._physics: Any = physics
         self._record: Any = physics.record(JOINTS)
-        self._log = world._contents().log
+        self._contents = world._contents()
         self._seen: Any = None  # what the rows depend on
         self._joints: dict[int, Joint] = {}  # by entity, which ascend
         self._spans: dict[int, tuple[int, int]] = {}  # their rows
-        self._wanted: dict[tuple[int, int], tuple[Any, ...]] = {}  # what rows are to begin with
+        self._connected: dict[int, bool] = {}  # which of them may touch
+        self._wanted: dict[Any, Any] | None = None  # what rows are to begin with, and the joints that were set,
+        self._set: set[int] = set()  # after going back
         self._breaking = False
         world.events.define("joint_lost", "joint_broken")
         self._physics.extensions.followers.append(self._follow)
@@ -75,17 +79,9 @@ class Joints(Plugin):
 
     def state(self, entity: int) -> JointState:
         """Of the joint of that entity; KeyError if it has none that a step has taken."""
-        record, physics, (start, stop) = self._record, self._physics, self._spans[entity]
-        joint = self._joints[entity]
-        impulse, torque, value, speed = np.zeros(physics.dimensions), np.zeros(physics.dimensions), 0.0, 0.0
-        for j in range(start, stop):
-            kind = record.kind[j]
-            if kind == POINT:
-                impulse += record.thrust[j]
-            elif kind >= TURN:
-                torque += record.total[j] * record.normal[j]
-            else:
-                impulse += record.total[j] * record.normal[j]
+        joint, (start, stop), flat = self._joints[entity], self._spans[entity], self._physics.dimensions == 2
+        impulses, torques = self._given(start, stop)
+        impulse, torque, value, speed = impulses.sum(axis=0), torques.sum(axis=0), 0.0, 0.0
         a, b = (self._moving(entity) for entity in (joint.a, joint.b))
         point_a, point_b = a[0].point(joint.at_a), b[0].point(joint.at_b)
         speed_a, speed_b = _speed_at(a, point_a), _speed_at(b, point_b)
@@ -98,37 +94,49 @@ class Joints(Plugin):
             speed = float(along @ (speed_b - _speed_at(a, point_b)))
         elif isinstance(joint, (Hinge, Weld, Motor, Cone)):
             value, speed = _turned(joint, a, b)
-        return JointState(impulse, float(torque[0]) if physics.dimensions == 2 else torque, value, speed)
+        return JointState(impulse, float(torque[0]) if flat else torque, value, speed)
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """``entity (n,)``, ``impulse (n, d)`` and ``torque (n,)``, in 3D (n, 3), of all joints, as in :meth:`state`."""
+        starts = [start for start, _ in self._spans.values()]
+        impulses, torques = self._given(0, self._record.count)
+        if starts:
+            impulses, torques = np.add.reduceat(impulses, starts), np.add.reduceat(torques, starts)
+        torque = torques[:, 0] if self._physics.dimensions == 2 else torques
+        return {"entity": np.array(list(self._spans), np.int64), "impulse": impulses, "torque": torque}
+
+    def _given(self, start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
+        """The impulses and the torques of some rows, (k, d) each."""
+        record, kind = self._record, self._record.kind[start:stop, None]
+        along = record.total[start:stop, None] * record.normal[start:stop]
+        impulse = np.where(kind == POINT, record.thrust[start:stop], np.where(kind < TURN, along, 0.0))
+        return impulse, np.where(kind >= TURN, along, 0.0)
 
     # -- snapshots --------------------------------------------------------------------------------
 
     def saved(self, world: Any) -> Any:
-        """What the rows have done in the last step, with the entities of the joints."""
+        """What the rows have done in the last step, with the entities of the joints; and which were set since."""
         record, count = self._record, self._record.count
-        entity = np.repeat(list(self._spans), [stop - start for start, stop in self._spans.values()]).astype(np.int64)
-        return {"entity": entity[:count], **{name: getattr(record, name)[:count].copy() for name in KEPT}}
+        rows = {name: getattr(record, name)[:count].copy() for name in (*KEY, *KEPT)}
+        known = self._joints
+        new = [entity for entity, joint in self._present().items() if joint._version == SET or entity not in known]
+        return {**rows, "set": new}
 
     def take_back(self, world: Any, saved: Any) -> None:
         """Rows begin with that."""
-        self._wanted = {}
-        entities = np.asarray(saved["entity"])
-        for k, entity in enumerate(entities.tolist()):
-            first = int(np.searchsorted(entities, entity))
-            self._wanted[entity, k - first] = tuple(np.asarray(saved[name])[k] for name in KEPT)
+        self._wanted = _by_row(saved)
         self._joints, self._spans, self._seen = {}, {}, None
+        self._set = set(map(int, saved["set"]))
 
     # -- before a step ----------------------------------------------------------------------------
 
     def _follow(self, world: World) -> None:
         """Which joints there are, and their fields, if anything has changed."""
-        contents = world._contents()
-        if self._now() == self._seen:
+        now = self._now()
+        if now == self._seen or (self._seen is not None and now[:2] == self._seen[:2] and self._update()):
+            self._seen = now
             return
-        found: dict[int, Joint] = {}
-        for kind in KINDS:
-            for entity in contents.members.get(kind, ()):
-                found[entity] = contents.components_of(entity)[kind]
-        found = {entity: found[entity] for entity in sorted(found)}
+        found = self._present()
         lost = [entity for entity, joint in found.items() if joint.attached and not self._has_bodies(joint)]
         for entity, joint in found.items():
             if not joint.attached:
@@ -138,15 +146,23 @@ class Joints(Plugin):
         self._end(ended, "joint_lost")
         self._seen = self._now()
 
+    def _present(self) -> dict[int, Joint]:
+        """All joints of the world, in the order of their entities."""
+        contents, found = self._contents, {}
+        for kind in KINDS:
+            for entity in contents.members.get(kind, ()):
+                found[entity] = contents.components_of(entity)[kind]
+        return {entity: found[entity] for entity in sorted(found)}
+
     def _now(self) -> tuple[int, int, int]:
         """Another value whenever entities or bodies have come or gone, or a field was set."""
-        return self._log.rounds, self._physics.table.version, Changes.count
+        return self._contents.log.rounds, self._physics.table.version, Changes.count
 
     def _has_bodies(self, joint: Joint) -> bool:
         return all(entity == WORLD or self._row(entity) >= 0 for entity in (joint.a, joint.b))
 
     def _row(self, entity: int) -> int:
-        return int(self._physics.table.rows_of(np.array([entity], np.int64))[0])
+        return int(self._physics.table.row_of(entity))
 
     def _attach(self, entity: int, joint: Joint) -> None:
         """Take hold of the bodies where they are; ValueError for what no world can have."""
@@ -178,44 +194,73 @@ class Joints(Plugin):
         w = np.zeros(1 if d == 2 else 3) if spin is None else np.reshape(spin[row], -1)
         return place, table.column("linear_velocity")[row].copy(), float(w[0]) if d == 2 else w
 
+    def _update(self) -> bool:
+        """Fields were set, and no more: the rows of these joints as they are now. False if they are other rows."""
+        changed = [(entity, joint) for entity, joint in self._joints.items() if joint._version == SET]
+        record, d = self._record, self._physics.dimensions
+        rows = {entity: joint.rows(d) if joint.attached else [] for entity, joint in changed}
+        for entity, joint in changed:
+            span = slice(*self._spans[entity])
+            before = list(zip(record.kind[span].tolist(), record.rule[span].tolist(), strict=True))
+            same = before == [(row.kind, row.rule) for row in rows[entity]]
+            if not same or joint.collide_connected != self._connected[entity]:
+                return False
+        for entity, joint in changed:
+            for j, row in enumerate(rows[entity], self._spans[entity][0]):
+                self._put(j, joint, row)
+        self._finish_changes([joint for _, joint in changed])
+        return True
+
     def _write(self, joints: dict[int, Joint]) -> None:
         """The rows of these joints, which begin with what they had."""
         record, d = self._record, self._physics.dimensions
-        wanted = self._wanted or self._kept()
-        rows = [(entity, k, row) for entity, joint in joints.items() for k, row in enumerate(joint.rows(d))]
+        went_back, count = self._wanted is not None, record.count
+        wanted = self._wanted
+        if wanted is None:
+            wanted = _by_row({name: getattr(record, name)[:count].copy() for name in (*KEY, *KEPT)})
+        rows = [(entity, row) for entity, joint in joints.items() for row in joint.rows(d)]
         record.reserve(max(len(rows), 1), *(name for name in record.columns() if not name.startswith("apart_")))
-        zero = np.zeros(d)
-        for j, (entity, k, row) in enumerate(rows):
-            joint = joints[entity]
-            record.joint[j], record.kind[j], record.rule[j] = entity, row.kind, row.rule
-            record.entity_a[j], record.entity_b[j] = joint.a, joint.b
-            record.anchor_a[j], record.anchor_b[j] = row.ends or (joint.at_a, joint.at_b)
-            record.axis[j] = (1.0, *zero[1:]) if row.axis is None else row.axis
-            for name in ("low", "high", "target", "most", "frequency", "damping_ratio"):
-                getattr(record, name)[j] = getattr(row, name)
-            load, pull, normal, total, thrust = wanted.get((entity, k), (0.0, zero, (1.0, *zero[1:]), 0.0, zero))
-            record.load[j], record.pull[j], record.normal[j] = load, pull, normal
-            record.total[j], record.thrust[j] = total, thrust
-        record.old_load[:], record.old_pull[:] = record.load, record.pull
-        before, self._joints, self._wanted = self._joints, joints, {}
-        counts = (
-            np.bincount([list(joints).index(entity) for entity, _, _ in rows], minlength=len(joints)) if rows else []
-        )
-        stops = np.cumsum(counts).astype(int).tolist() if rows else []
-        self._spans = {entity: (stop - int(n), stop) for entity, stop, n in zip(joints, stops, counts, strict=True)}
+        before, self._joints, self._spans, self._wanted = self._joints, joints, {}, None
+        for j, (entity, row) in enumerate(rows):
+            record.joint[j] = entity
+            record.load[j] = record.pull[j] = record.total[j] = record.thrust[j] = 0.0
+            record.normal[j] = np.eye(d)[0]
+            self._put(j, joints[entity], row)
+            self._spans[entity] = self._spans.get(entity, (j, j))[0], j + 1
         record.count, record.active, record.rows_version = len(rows), 0, -1
-        self._breaking = any(joint.breaking_force is not None for joint in joints.values())
+        now = _by_row({name: getattr(record, name)[: len(rows)] for name in KEY})
+        for j, key in enumerate(now):
+            for name, value in zip(KEPT, wanted.get(key, ()), strict=False):
+                getattr(record, name)[j] = value
+        record.old_load[:], record.old_pull[:] = record.load, record.pull
+        self._connected = {entity: joint.collide_connected for entity, joint in joints.items()}
         self._keep_apart(joints)
-        changed = {entity for entity in {*before, *joints} if before.get(entity) is not joints.get(entity)}
-        self._wake([before.get(entity) or joints[entity] for entity in changed])
+        gone = [joint for entity, joint in before.items() if joints.get(entity) is not joint]
+        changed = [joint for joint in joints.values() if joint._version == SET]
+        if went_back:
+            changed = [joint for entity, joint in joints.items() if entity in self._set]
+        self._finish_changes([*gone, *changed])
+        for joint in joints.values():
+            joint._version = -d
 
-    def _kept(self) -> dict[tuple[int, int], tuple[Any, ...]]:
-        """What the rows have had, by joint and place in it."""
-        record, kept = self._record, {}
-        for entity, (start, stop) in self._spans.items():
-            for j in range(start, stop):
-                kept[entity, j - start] = tuple(np.copy(getattr(record, name)[j]) for name in KEPT)
-        return kept
+    def _put(self, j: int, joint: Joint, row: Row) -> None:
+        """A row of a joint as it is now."""
+        record = self._record
+        record.kind[j], record.rule[j] = row.kind, row.rule
+        record.entity_a[j], record.entity_b[j] = joint.a, joint.b
+        record.anchor_a[j], record.anchor_b[j] = row.ends or (joint.at_a, joint.at_b)
+        record.axis[j] = np.eye(self._physics.dimensions)[0] if row.axis is None else row.axis
+        for name in ("low", "high", "target", "most", "frequency", "damping_ratio"):
+            getattr(record, name)[j] = getattr(row, name)
+
+    def _finish_changes(self, joints: list[Joint]) -> None:
+        """What sleeps on bodies whose joints have changed wakes."""
+        self._breaking = any(joint.breaking_force is not None for joint in self._joints.values())
+        bodies = {body for joint in joints for body in (joint.a, joint.b) if body != WORLD and self._row(body) >= 0}
+        for body in sorted(bodies):
+            self._physics.wake(body)
+        for joint in joints:
+            joint._version = -self._physics.dimensions
 
     def _keep_apart(self, joints: dict[int, Joint]) -> None:
         pairs = sorted({
@@ -228,31 +273,35 @@ class Joints(Plugin):
         if pairs:
             record.apart_a[: len(pairs)], record.apart_b[: len(pairs)] = np.array(pairs, np.int64).T
 
-    def _wake(self, joints: list[Joint]) -> None:
-        """What sleeps on bodies whose joints have changed wakes."""
-        bodies = {body for joint in joints for body in (joint.a, joint.b) if body != WORLD and self._row(body) >= 0}
-        for body in sorted(bodies):
-            self._physics.wake(body)
-
     # -- after a step -----------------------------------------------------------------------------
 
     def _finish(self, world: World) -> None:
         """Joints that have borne too much are gone."""
         if not self._breaking:
             return
-        dt, broken = world.settings.dt, []
-        for entity, joint in self._joints.items():
-            most = joint.breaking_force
-            if most is not None and np.linalg.norm(self.state(entity).impulse) > most * dt:
-                broken.append((entity, joint))
+        columns, dt = self.columns(), world.settings.dt
+        force = np.linalg.norm(columns["impulse"], axis=1) / dt
+        pairs = zip(self._joints.items(), force.tolist(), strict=True)
+        broken = [(entity, joint) for (entity, joint), size in pairs if size > (joint.breaking_force or np.inf)]
         self._end(broken, "joint_broken")
 
     def _end(self, joints: list[tuple[int, Joint]], event: str) -> None:
         """Delete these joints, and tell."""
         if joints and self.world is not None:
-            self.world._contents().delete([entity for entity, _ in joints])
+            self._contents.delete([entity for entity, _ in joints])
             for entity, joint in joints:
                 self.world.events.dispatch(event, entity, joint)
+
+
+def _by_row(columns: dict[str, Any]) -> dict[tuple[int, ...], tuple[Any, ...]]:
+    """What rows keep, by (joint, kind, rule, how many such rows the joint has before it), in their order."""
+    rows: dict[tuple[int, ...], tuple[Any, ...]] = {}
+    seen: dict[tuple[int, ...], int] = {}
+    kept = [np.asarray(columns[name]) for name in KEPT if name in columns]
+    for j, key in enumerate(zip(*(np.asarray(columns[name]).tolist() for name in KEY), strict=True)):
+        seen[key] = seen.get(key, -1) + 1
+        rows[*key, seen[key]] = tuple(column[j] for column in kept)
+    return rows
 
 
 def _turned(joint: Joint, a: tuple[Place, Any, Any], b: tuple[Place, Any, Any]) -> tuple[float, float]:

@@ -42,6 +42,7 @@ JOINT_DAMPING_RATIO = 2.0
 # The number of substeps of an island.
 MOST_SAG = 0.005  # extents: no contact sags more under the island's heaviest body,
 MOST_GIVE = 0.02  # of its length: no joint gives more under that body
+BEND = 4.0  # times the square of the welds of an island: beams of them bend so much more than one
 OWN_SAG = 0.002  # nor a contact under one body alone: grains, whose contacts are hard
 STRUCK = 0.01  # extents per step: what closes slower strikes nothing
 STRIKE = 4.0  # substeps for each extent per step that a light body is closed on, times the ratio of masses

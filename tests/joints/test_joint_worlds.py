@@ -240,3 +240,96 @@ def test_bridge_bears_what_lies_on_it():
         impulse += joints.state(hinges[0]).impulse[1] - joints.state(hinges[-1]).impulse[1]
         assert gaps(world, hinges).max() < 0.03
     assert impulse == pytest.approx((20 + 10) * G * 10, rel=0.02)  # it still swings a little
+
+
+def hanging(world):
+    """A disc on a rope above a ball that holds it, asleep; and its rope."""
+    body = disc(world, (0.0, 0.0), 0.3)
+    world.create_entity(Transform((0, -10.3)), SphereCollider(10.0))
+    rope = world.create_entity(Distance(None, body, anchor_a=(0.0, 2.0), length=(0.0, 2.1)))
+    run(world, 200)
+    assert world.component_for_entity(body, RigidBody).asleep
+    return body, rope
+
+
+def test_a_field_that_is_set_wakes_the_bodies():
+    world, _ = joint_world(sleeping=True)
+    body, rope = hanging(world)
+    world.component_for_entity(rope, Distance).most = 1.5
+    run(world, 120)
+    assert at(world, body).y == pytest.approx(0.5, abs=0.01)
+
+
+def test_going_back_wakes_only_what_was_to_wake():
+    world, _ = joint_world(sleeping=True)
+    body, rope = hanging(world)
+    snapshot = world.snapshot()
+    run(world, 3)
+    later = world.state_hash()
+    world.restore(snapshot)
+    run(world, 3)
+    assert world.state_hash() == later
+    assert world.component_for_entity(body, RigidBody).asleep
+    world.component_for_entity(rope, Distance).most = 1.5
+    snapshot = world.snapshot()
+    run(world, 3)
+    later = world.state_hash()
+    world.restore(snapshot)
+    run(world, 3)
+    assert world.state_hash() == later
+    assert not world.component_for_entity(body, RigidBody).asleep
+
+
+def test_forces_stay_with_their_rows_when_a_joint_gets_more():
+    world, joints = joint_world()
+    arm = plank(world, (1, 0), (1.0, 0.1))
+    hinge = Hinge(None, arm, anchor=(0, 0), motor_speed=0.0, max_torque=50.0)
+    entity = world.create_entity(hinge)
+    run(world, 60)
+    before = joints.state(entity).torque
+    hinge.lower, hinge.upper = -1.0, 1.0
+    world.step()
+    assert joints.state(entity).torque == pytest.approx(before, rel=1e-6)
+    assert joints.columns()["torque"] == pytest.approx([before], rel=1e-6)
+    np.testing.assert_allclose(joints.columns()["impulse"], [joints.state(entity).impulse])
+    assert joints.columns()["entity"].tolist() == [entity]
+
+
+def test_fields_set_in_each_step_are_as_if_given_at_once():
+    hashes = []
+    for again in (False, True):
+        world, _ = joint_world()
+        bodies, hinges = chain(world, 6, (0.8, 0.6), (0.45, 0.1))
+        for hinge in hinges:
+            world.component_for_entity(hinge, Hinge).motor_speed = 1.0
+        for _ in range(30):
+            if again:
+                world.component_for_entity(hinges[3], Hinge).motor_speed = 2.0
+                world.component_for_entity(hinges[3], Hinge).motor_speed = 1.0
+            world.step()
+        hashes.append(world.state_hash())
+        assert len(bodies) == 6
+    assert hashes[0] == hashes[1]
+
+
+def test_body_that_is_taken_out_pulls_at_nothing():
+    world, joints = joint_world(on_fault="ignore")
+    bodies = [disc(world, (0, -1 - k)) for k in range(4)]
+    for before, body in itertools.pairwise((None, *bodies)):
+        world.create_entity(Distance(before, body))
+    run(world, 10)
+    world.bodies.position[world.bodies.row_of(bodies[2])] = math.nan
+    run(world, 60)
+    np.testing.assert_allclose(at(world, bodies[1]).position, (0.0, -2.0), atol=0.01)
+    assert at(world, bodies[3]).y < -4.0 - 0.4 * G
+    assert len(joints) == 4
+
+
+def test_kinematic_body_carries_what_hangs_on_it():
+    world, joints = joint_world()
+    trolley = world.create_entity(Transform((0, 0)), RigidBody(kind="kinematic", linear_velocity=(1.0, 0.0)))
+    load = disc(world, (0, -1))
+    rod = world.create_entity(Distance(trolley, load))
+    run(world, 600)
+    assert at(world, load).x == pytest.approx(10.0, abs=1.0)
+    assert joints.state(rod).value == pytest.approx(1.0, abs=1e-3)

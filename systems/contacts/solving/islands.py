@@ -18,6 +18,7 @@ from ...bits import lowest_bit
 from ...islands import root_of
 from ...shapes.tolerances import smaller_extent
 from ..constants import (
+    BEND,
     FURTHER_PASSES,
     FURTHER_WORK,
     LEAST_FURTHER_PASSES,
@@ -31,7 +32,7 @@ from ..constants import (
     STRUCK,
     SUBSTEP_WORK,
 )  # fmt: skip
-from .joints import HOLD, LIMIT, LINE
+from .joints import HOLD, LIMIT, LINE, TURN
 
 COLOURS = 62  # bits of a mask; rows of a body beyond them share the last one
 
@@ -107,6 +108,7 @@ def weigh_joint(state, j):
     solver.jointed[t] = True
     w_a, w_b = inverse_mass[a] if a >= 0 else 0.0, inverse_mass[b] if b >= 0 else 0.0
     solver.borne[t] = min(solver.borne[t], w_a if w_a > 0.0 else w_b, w_b if w_b > 0.0 else w_a)
+    solver.welds[t] += joints.kind[j] == TURN and joints.rule[j] == HOLD
     size = max(length(joints.anchor_a[j]) if w_a > 0.0 else 0.0, length(joints.anchor_b[j]) if w_b > 0.0 else 0.0)
     if joints.kind[j] == LINE:
         size = joints.low[j] if joints.rule[j] == HOLD else joints.high[j]
@@ -134,7 +136,7 @@ def number_islands(state):
             solver.lightest[t], solver.most_change[t], solver.mass_of[t], solver.force_of[t] = math.inf, 0.0, 0.0, 0.0
             solver.stiff[t] = solver.own[t] = solver.strike[t] = solver.taken[t] = 0.0
             solver.size_of[t], solver.leader[t] = 0, i
-            solver.jointed[t], solver.give[t], solver.borne[t] = False, 0.0, math.inf
+            solver.jointed[t], solver.give[t], solver.borne[t], solver.welds[t] = False, 0.0, math.inf, 0
         solver.number[q] = t
         change = sub(velocity[i], start[i])
         if warm_started[i]:
@@ -179,7 +181,7 @@ def choose_substeps(solver, t, usual, dt):
     the substeps; by factors of two, so that it seldom changes. Joints may have to bear the heaviest body of joints.
     """
     sag, least = SAG * solver.most_change[t] * dt, usual
-    pulled = sag * solver.give[t] / (solver.borne[t] * MOST_GIVE)
+    pulled = sag * solver.give[t] * max(1.0, BEND * solver.welds[t] ** 2) / (solver.borne[t] * MOST_GIVE)
     while float(least * least) < pulled and 2 * least <= LEAST_WORK_SUBSTEPS:
         least *= 2
     solver.stiffness_of[t] = least

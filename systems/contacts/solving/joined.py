@@ -21,9 +21,10 @@ def may_move(state, i):
 
 
 @inlined
-def sleeps(state, i):
-    """Whether row i is a dynamic body that sleeps."""
-    return 0 <= i < state.dynamic and (i < state.first or state.bodies.still[i] > 0)
+def left_out(state, i):
+    """Whether row i is a dynamic body that sleeps, or one that takes no part as it had a value that cannot be."""
+    asleep = 0 <= i < state.dynamic and (i < state.first or state.bodies.still[i] > 0)
+    return asleep or (i >= 0 and state.bodies.quarantined[i])
 
 
 @part
@@ -41,7 +42,7 @@ def find_active(state):
         joints.old_load[j], joints.old_pull[j] = joints.load[j], joints.pull[j]
         joints.total[j], joints.thrust[j] = 0.0, zero_of(state)
         gone = (a < 0 and joints.entity_a[j] > 0) or (b < 0 and joints.entity_b[j] > 0)
-        if not (gone or sleeps(state, a) or sleeps(state, b)) and (may_move(state, a) or may_move(state, b)):
+        if not (gone or left_out(state, a) or left_out(state, b)) and (may_move(state, a) or may_move(state, b)):
             joints.order[found] = j
             found += 1
     joints.active, joints.kept_in = found, state.step_number + 1

@@ -8,7 +8,7 @@ from ....framework.jit.records.schema import Schema, flag, flags, floats, intege
 JOINTS = Schema(
     "Joints",
     count=integer(),
-    joint=ints("int32"),  # the joint of a row, by number
+    joint=ints(),  # the entity of a row's joint
     kind=ints("int8"),  # POINT, LINE, SLIDE, TURN, ALIGN, CONE
     rule=ints("int8"),  # HOLD, LIMIT, DRIVE, SPRING, SERVO
     entity_a=ints(),  # 0: the world
@@ -171,6 +171,7 @@ SOLVER = Schema(
     jointed=flags(),
     give=floats(),  # 1 / (kg m): largest inverse mass of a joint over its length
     borne=floats(),  # inverse mass of the heaviest body of joints
+    welds=ints("int32"),
     stiffness_of=ints("int32"),  # its joints are as stiff as with so many substeps
     # ranges: the ordinary islands, then each special one
     ranges=integer(),
