@@ -322,10 +322,14 @@ def add_joints(solver):
 
 
 @part
-def keep_joints(solver):
-    """The forces of the last substep, for the next step."""
+def keep_joints(solver, dt):
+    """The forces of the last substep, for the next step, no larger than their means: what is more was a blow."""
     joints = solver.joints
     by = 1.0 / joints.step
     for e in range(joints.begin, joints.end):
         j = joints.order[e]
-        joints.load[j], joints.pull[j] = joints.impulse[j] * by, scale(joints.push[j], by)
+        last, mean = joints.impulse[j] * by, abs(joints.total[j]) / dt
+        joints.load[j] = min(mean, max(-mean, last))
+        pull, most = scale(joints.push[j], by), length(joints.thrust[j]) / dt
+        size = length(pull)
+        joints.pull[j] = scale(pull, most / size) if size > most else pull

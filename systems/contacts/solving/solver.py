@@ -339,7 +339,7 @@ def solve_range(solver, substeps, kind, dt, span):
             break
     scale_impulses(solver, float(substeps), span)
     if len(span[4]) > 1:
-        keep_joints(solver)
+        keep_joints(solver, dt)
 
 
 @part
