@@ -21,6 +21,7 @@ SPEED = 30.0  # rad/s of the wheels
 TORQUE = 60.0  # N m
 SPRING, RATIO = 4.0, 0.7  # Hz of the suspension, and its damping ratio
 TRAVEL = 0.25  # m
+ROAD, CAR = 1, 2  # layers: parts of the car do not meet
 SETTINGS = Settings()
 
 
@@ -39,14 +40,17 @@ def build(settings: Settings | None = None, seed: int = 0, *, speed: float = SPE
         slope, thick = math.atan2(high - low, PIECE), 1.0
         middle = (k + 0.5) * PIECE + thick * math.sin(slope), 0.5 * (low + high) - thick * math.cos(slope)
         half = 0.5 * math.hypot(PIECE, high - low) + 0.1, thick
-        world.create_entity(Transform(middle, slope), BoxCollider(half, friction=0.9))
-    axle = WHEEL
+        world.create_entity(Transform(middle, slope), BoxCollider(half, friction=0.9, layer=ROAD))
+    axle, own = WHEEL, {"layer": CAR, "mask": ROAD}
     chassis = world.create_entity(
-        Transform((START, axle + 0.5)), RigidBody(mass=20.0), BoxCollider((1.8, 0.25), friction=0.3), Spin()
+        Transform((START, axle + 0.5)), RigidBody(mass=20.0), BoxCollider((1.8, 0.25), friction=0.3, **own), Spin()
     )
     for side in (-1, 1):
         wheel = world.create_entity(
-            Transform((START + side * BASE, axle)), RigidBody(mass=2.0), SphereCollider(WHEEL, friction=0.9), Spin()
+            Transform((START + side * BASE, axle)),
+            RigidBody(mass=2.0),
+            SphereCollider(WHEEL, friction=0.9, **own),
+            Spin(),
         )
         hub = world.create_entity(Transform((START + side * BASE, axle)), RigidBody(mass=1.0), Spin(inertia=0.05))
         spring = {"frequency": SPRING, "damping_ratio": RATIO, "rest": -0.1}

@@ -90,6 +90,6 @@ SCENE = Scene(
     description="ragdolls of ten parts fall down stairs",
     build=build,
     seconds=10.0,
-    view=((-3.0, -7.0), (18.0, 8.0)),
+    view=((-3.0, -7.0), (18.0, 12.0)),
     settings=SETTINGS,
 )

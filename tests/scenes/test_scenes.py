@@ -19,7 +19,7 @@ from carom.scenes.random_numbers import uniform
 
 WITHOUT_CHANCE = {  # any seed gives the same world
     "few", "jump", "pyramid", "stack", "lift", "cradle", "galperin", "shots",
-    "spring", "orbit", "bouncing", "oblique", "drops", "billiards_spin", "dominoes", "tumbler",
+    "spring", "orbit", "bouncing", "oblique", "drops", "billiards_spin", "dominoes", "tumbler", "car", "crane",
 }  # fmt: skip
 
 

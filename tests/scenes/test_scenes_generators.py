@@ -139,7 +139,7 @@ def gaps(world):
 SMALL = {name: {"n": 400} for name in (*GENERATORS, "maze", "platforms")} | {"pyramid": {"rows": 12}}
 
 
-NO_PAIRS = "freefall", "spring", "orbit", "conveyor", "player"
+NO_PAIRS = "freefall", "spring", "orbit", "conveyor", "player", "crane"
 
 
 @pytest.mark.parametrize("seed", [0, 1])
