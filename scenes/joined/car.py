@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from ...components import RigidBody, SphereCollider, Transform
 from ...components.spin import Spin
@@ -41,7 +42,8 @@ def build(settings: Settings | None = None, seed: int = 0, *, speed: float = SPE
         middle = (k + 0.5) * PIECE + thick * math.sin(slope), 0.5 * (low + high) - thick * math.cos(slope)
         half = 0.5 * math.hypot(PIECE, high - low) + 0.1, thick
         world.create_entity(Transform(middle, slope), BoxCollider(half, friction=0.9, layer=ROAD))
-    axle, own = WHEEL, {"layer": CAR, "mask": ROAD}
+    axle = WHEEL
+    own: dict[str, Any] = {"layer": CAR, "mask": ROAD}
     chassis = world.create_entity(
         Transform((START, axle + 0.5)), RigidBody(mass=20.0), BoxCollider((1.8, 0.25), friction=0.3, **own), Spin()
     )
