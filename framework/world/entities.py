@@ -13,6 +13,7 @@ import numpy as np
 from ..data import esper_bridge
 from ..data.component import Component, Many
 from ..errors import NoPhysicsError
+from ..plugins.registry import Registry
 from .services import PhysicsServices
 
 C = TypeVar("C")
@@ -24,6 +25,7 @@ class EntityVerbs:
     _context: Callable[[], AbstractContextManager[None]]  # the world's esper context, made the current one for a while
     _contents: Callable[[], esper_bridge.Contents]  # what is in it, to read without making it the current one
     physics: PhysicsServices | None
+    registry: Registry
 
     @property
     def dimensions(self) -> int | None:
@@ -59,6 +61,8 @@ class EntityVerbs:
         types = [one.component for one in many]
         if len(set(types)) < len(types):
             raise ValueError(f"create_entities: one component of each type, got {', '.join(t.__name__ for t in types)}")
+        for component in types:
+            self.registry.require(component)
         dimensions = self.dimensions
         if dimensions is None:
             raise NoPhysicsError("no physics in this world: World(Physics(...))")
@@ -177,6 +181,7 @@ class EntityVerbs:
         dimensions = self.dimensions
         for component in components:
             if isinstance(component, Component):
+                self.registry.require(type(component), entity)
                 if dimensions is not None:
                     component.fit(dimensions, entity)
             elif isinstance(component, type):

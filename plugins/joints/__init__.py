@@ -79,6 +79,8 @@ class Joints(Plugin):
 
     def state(self, entity: int) -> JointState:
         """Of the joint of that entity; KeyError if it has none that a step has taken."""
+        if entity not in self._joints:
+            raise KeyError(f"entity {entity!r} has no joint that a step has taken")
         joint, (start, stop), flat = self._joints[entity], self._spans[entity], self._physics.dimensions == 2
         impulses, torques = self._given(start, stop)
         impulse, torque, value, speed = impulses.sum(axis=0), torques.sum(axis=0), 0.0, 0.0

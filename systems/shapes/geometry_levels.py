@@ -7,6 +7,7 @@ that it never hides a contact; that is checked here when the colliders are adopt
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,10 @@ def in_order(registry: Registry, colliders: Iterable[type[Component]]) -> list[t
             room, _, shipped = collider.__module__.partition("carom.plugins.")
             cure = "register it with @plugin.shape(cost=...) and give the plugin to the world"
             if shipped and not room:
-                cure = f"World(Physics(...), {shipped.partition('.')[0]}.plugin), with carom.plugins"
+                name = shipped.partition(".")[0]
+                whole = hasattr(import_module(f"carom.plugins.{name}"), "plugin")
+                cure = f"World(Physics(...), {f'{name}.plugin' if whole else f'{name.capitalize()}()'}), "
+                cure += "with carom.plugins" if whole else f"from carom.plugins.{name}"
             raise UnhandledPairError(
                 f"{collider.__name__} is a collider that no plugin of this world has registered: {cure}"
             )
@@ -76,12 +80,7 @@ class LevelCheck:
                     raise ValueError(
                         f"entity {entity} has {component.__name__}, which no {other.__name__} can have: {cure}"
                     )
-            if component.plugin and component.plugin not in (plugin.name for plugin in self._registry.plugins):
-                name = component.plugin.capitalize()
-                raise ValueError(
-                    f"entity {entity}: {component.__name__} does nothing without its plugin: "
-                    f"World(Physics(...), {name}()), from carom.plugins.{component.plugin}"
-                )
+            self._registry.require(component, entity)
             if issubclass(component, Collider):
                 self._check_dimensions(component, entity)
 

@@ -60,6 +60,11 @@ def test_joints_belong_to_one_world_with_physics():
     _kept = World(Physics(dimensions=2), joints)
     with pytest.raises(ValueError, match="belong to world"):
         World(Physics(dimensions=2), joints)
+    with pytest.raises(KeyError, match="entity 7 has no joint"):
+        joints.state(7)
+    bare = World(Physics(dimensions=2))
+    with pytest.raises(ValueError, match=r"Hinge does nothing without its plugin: World\(Physics\(...\), Joints\(\)\)"):
+        bare.create_entity(Hinge(None, 1, anchor=(0, 0)))
 
 
 def test_fields_that_do_not_fit_leave_the_joint_as_it_is():
