@@ -11,6 +11,7 @@ from ...framework import World
 from ...plugins.capsule import CapsuleCollider
 from ...plugins.convex_polygon import ConvexPolygonCollider
 from ...plugins.rotation import BoxCollider
+from ...plugins.terrain.segment import ChainSegmentCollider
 
 Floats = NDArray[np.float64]
 
@@ -42,7 +43,14 @@ def _polygon(polygon: Any) -> Outline:
     return Outline(corners, rounding, float(widths.min()) + 2 * rounding)
 
 
-OUTLINES = {BoxCollider: _box, CapsuleCollider: _capsule, ConvexPolygonCollider: _polygon}
+def _segment(segment: Any) -> Outline:
+    ends = np.array([segment.start, segment.end])
+    return Outline(ends, 0.0, float(np.linalg.norm(ends[1] - ends[0])))
+
+
+OUTLINES = {
+    BoxCollider: _box, CapsuleCollider: _capsule, ConvexPolygonCollider: _polygon, ChainSegmentCollider: _segment,
+}  # fmt: skip
 
 
 def outlines_of(world: World, collider: Any, entities: NDArray[np.int64]) -> tuple[list[Floats], Floats, Floats]:

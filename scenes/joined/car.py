@@ -8,9 +8,10 @@ from typing import Any
 from ...components import RigidBody, SphereCollider, Transform
 from ...components.spin import Spin
 from ...framework import Settings, World
-from ...plugins import Physics
+from ...plugins import Physics, terrain
 from ...plugins.joints import Hinge, Joints, Motor, Slider
 from ...plugins.rotation import BoxCollider, Rotation
+from ...plugins.terrain import create_chain
 from ..protocol import Scene
 from ..sizes import real
 
@@ -35,13 +36,10 @@ def height(x: float) -> float:
 def build(settings: Settings | None = None, seed: int = 0, *, speed: float = SPEED) -> World:
     """A motor turns the rear wheel against the car, up to ``speed``; ``seed`` changes nothing."""
     speed = real(speed, "speed")
-    world = World(Physics(dimensions=2, gravity=(0.0, -9.81)), Rotation(), Joints(), settings=settings or SETTINGS)
-    for k in range(-20, int(LENGTH / PIECE)):
-        low, high = height(k * PIECE), height((k + 1) * PIECE)
-        slope, thick = math.atan2(high - low, PIECE), 1.0
-        middle = (k + 0.5) * PIECE + thick * math.sin(slope), 0.5 * (low + high) - thick * math.cos(slope)
-        half = 0.5 * math.hypot(PIECE, high - low) + 0.1, thick
-        world.create_entity(Transform(middle, slope), BoxCollider(half, friction=0.9, layer=ROAD))
+    physics = Physics(dimensions=2, gravity=(0.0, -9.81))
+    world = World(physics, Rotation(), Joints(), terrain.plugin, settings=settings or SETTINGS)
+    road = [(k * PIECE, height(k * PIECE)) for k in range(-20, int(LENGTH / PIECE) + 1)]
+    create_chain(world, road, friction=0.9, layer=ROAD)
     axle = WHEEL
     own: dict[str, Any] = {"layer": CAR, "mask": ROAD}
     chassis = world.create_entity(
@@ -67,7 +65,7 @@ SCENE = Scene(
     name="car",
     description="a car with sprung wheels and a motor drives over hills",
     build=build,
-    seconds=12.0,
+    seconds=9.0,
     view=((-10.0, -4.0), (100.0, 12.0)),
     settings=SETTINGS,
 )
