@@ -305,6 +305,7 @@ IMPACTS = Schema(
     linked=flag(),  # ``heads`` and ``links`` are those of the pairs
     swept_version=integer(),  # of the rows, when the impacts of static bodies were set to none
     may_sink=flag(),  # through something thin, at the speed of contacts at rest
+    pending=integer(),  # the event that waits for room or code, off the queue; -1: none
     touchdown_pair=integer(),  # the last one of whose bodies landings were searched
     touchdown_time=number(),  # the time of its impact while they are searched, else 0
     now=number(),

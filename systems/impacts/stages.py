@@ -13,7 +13,7 @@ from ..narrow_phase.stages import find_hasty
 from .find import queue_next_impact
 from .heap import heap_pop, holds
 from .impulses import CROSSING, IMPACT, STOPPED, bounce, hand_over, lands, stop
-from .together import EQUAL, put_back
+from .together import EQUAL
 from .worklist import lacks_room, list_contacts, list_landings, list_neighbours, list_pair, list_pairs_of
 
 BLOCK = 256  # bodies that are looked at before one that bounces is enough
@@ -64,6 +64,7 @@ def begin_impacts(state, dt):
     if impacts.sweeps:
         begin_sweeps(state)
     impacts.waiting = impacts.listed = 0
+    impacts.pending = -1
     impacts.linked, impacts.touchdown_pair, impacts.touchdown_time = False, -1, 0.0
     impacts.until = state.neighbours_known_until if impacts.sweeps else math.inf
     if impacts.active:
@@ -132,7 +133,6 @@ def take_event(state, event, dt):
         return OK
     if kind == IMPACT and impacts.waiting > 0 and impacts.event_time[impacts.heap[0]] - impacts.now <= EQUAL * dt:
         if state.links[TAKE_TOGETHER] == 0:
-            put_back(impacts, event)
             return NEED_IMPACTS
         taken = call_take_together(state.links[TAKE_TOGETHER], state, event, dt)
         if taken >= 0:
@@ -206,10 +206,12 @@ def resolve_impacts(state, dt):
             state.needed = impacts.waiting + impacts.listed
             return NEED_EVENTS
         search_worklist(state, dt, far)
-        event = next_event(state)
+        event = impacts.pending if impacts.pending >= 0 else next_event(state)
+        impacts.pending = -1
         if event >= 0:
             code = take_event(state, event, dt)
-            if code != OK:
+            if code != OK:  # back in the queue it would come after another of the same pair and time
+                impacts.pending = event
                 return code
         elif impacts.sweeps and impacts.until < dt:
             impacts.rounds += 1

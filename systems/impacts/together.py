@@ -84,7 +84,6 @@ def resolve_simultaneous(state, event, dt):
     room = min(len(impacts.member), len(impacts.log_pair) - impacts.logged)
     if most > room or state.count > len(impacts.first_member):
         impacts.together, state.needed = most, 0
-        put_back(impacts, event)
         return NEED_EVENTS
     members, following = 0, event
     while following >= 0:
