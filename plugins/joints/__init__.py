@@ -12,9 +12,8 @@ from ...systems.contacts.solving.records import JOINTS
 from .joint import WORLD, Changes, Joint, Place, Row
 from .kinds import KINDS, Ball, Cone, Distance, Hinge, Motor, MousePull, Slider, Weld
 
-SET = -1  # the version of a handle that has been written to, and of a new one
 # What rows are known by, and what they keep from step to step.
-KEY = ("joint", "kind", "rule")
+KEY = ("joint", "kind", "rule", "entity_a", "entity_b")
 KEPT = ("load", "pull", "normal", "total", "thrust")
 
 
@@ -61,8 +60,7 @@ class Joints(Plugin):
         self._joints: dict[int, Joint] = {}  # by entity, which ascend
         self._spans: dict[int, tuple[int, int]] = {}  # their rows
         self._connected: dict[int, bool] = {}  # which of them may touch
-        self._wanted: dict[Any, Any] | None = None  # what rows are to begin with, and the joints that were set,
-        self._set: set[int] = set()  # after going back
+        self._wanted: dict[str, Any] | None = None  # what rows are to begin with after going back
         self._breaking = False
         world.events.define("joint_lost", "joint_broken")
         self._physics.extensions.followers.append(self._follow)
@@ -117,18 +115,14 @@ class Joints(Plugin):
     # -- snapshots --------------------------------------------------------------------------------
 
     def saved(self, world: Any) -> Any:
-        """What the rows have done in the last step, with the entities of the joints; and which were set since."""
+        """What the rows have done in the last step, with the entities of the joints and of their bodies."""
         record, count = self._record, self._record.count
-        rows = {name: getattr(record, name)[:count].copy() for name in (*KEY, *KEPT)}
-        known = self._joints
-        new = [entity for entity, joint in self._present().items() if joint._version == SET or entity not in known]
-        return {**rows, "set": new}
+        return self._wanted or {name: getattr(record, name)[:count].copy() for name in (*KEY, *KEPT)}
 
     def take_back(self, world: Any, saved: Any) -> None:
         """Rows begin with that."""
-        self._wanted = _by_row(saved)
+        self._wanted = saved
         self._joints, self._spans, self._seen = {}, {}, None
-        self._set = set(map(int, saved["set"]))
 
     # -- before a step ----------------------------------------------------------------------------
 
@@ -141,6 +135,7 @@ class Joints(Plugin):
         found = self._present()
         lost = [entity for entity, joint in found.items() if joint.attached and not self._has_bodies(joint)]
         for entity, joint in found.items():
+            joint.fit(self._physics.dimensions, entity)
             if not joint.attached:
                 self._attach(entity, joint)
         ended = [(entity, found.pop(entity)) for entity in lost]
@@ -174,8 +169,6 @@ class Joints(Plugin):
                 raise ValueError(f"{name} joins entity {body}, which is no body of world {physics._world.name!r}")
         if physics.dimensions not in joint.dimensions:
             raise ValueError(f"{name} is no joint of worlds of {physics.dimensions} dimensions")
-        for field in (field for field in joint.columns.values() if field.item == "vector"):
-            field.check_dimensions(joint._values.get(field.name, 0.0), physics.dimensions, entity)
         moving = physics.table.stops[0]
         if not any(body != WORLD and self._row(body) < moving for body in (joint.a, joint.b)):
             raise ValueError(f"{name} joins no dynamic body")
@@ -198,10 +191,12 @@ class Joints(Plugin):
 
     def _update(self) -> bool:
         """Fields were set, and no more: the rows of these joints as they are now. False if they are other rows."""
-        changed = [(entity, joint) for entity, joint in self._joints.items() if joint._version == SET]
+        changed = [(entity, joint) for entity, joint in self._joints.items() if joint.changed]
         record, d = self._record, self._physics.dimensions
-        rows = {entity: joint.rows(d) if joint.attached else [] for entity, joint in changed}
+        rows = {}
         for entity, joint in changed:
+            joint.fit(d, entity)
+            rows[entity] = joint.rows(d) if joint.attached else []
             span = slice(*self._spans[entity])
             before = list(zip(record.kind[span].tolist(), record.rule[span].tolist(), strict=True))
             same = before == [(row.kind, row.rule) for row in rows[entity]]
@@ -210,19 +205,15 @@ class Joints(Plugin):
         for entity, joint in changed:
             for j, row in enumerate(rows[entity], self._spans[entity][0]):
                 self._put(j, joint, row)
-        self._finish_changes([joint for _, joint in changed])
+        self._finish_changes(set())
         return True
 
     def _write(self, joints: dict[int, Joint]) -> None:
         """The rows of these joints, which begin with what they had."""
-        record, d = self._record, self._physics.dimensions
-        went_back, count = self._wanted is not None, record.count
-        wanted = self._wanted
-        if wanted is None:
-            wanted = _by_row({name: getattr(record, name)[:count].copy() for name in (*KEY, *KEPT)})
+        record, d, wanted = self._record, self._physics.dimensions, _by_row(self.saved(self.world))
         rows = [(entity, row) for entity, joint in joints.items() for row in joint.rows(d)]
         record.reserve(max(len(rows), 1), *(name for name in record.columns() if not name.startswith("apart_")))
-        before, self._joints, self._spans, self._wanted = self._joints, joints, {}, None
+        self._joints, self._spans, self._wanted = joints, {}, None
         for j, (entity, row) in enumerate(rows):
             record.joint[j] = entity
             record.load[j] = record.pull[j] = record.total[j] = record.thrust[j] = 0.0
@@ -237,13 +228,7 @@ class Joints(Plugin):
         record.old_load[:], record.old_pull[:] = record.load, record.pull
         self._connected = {entity: joint.collide_connected for entity, joint in joints.items()}
         self._keep_apart(joints)
-        gone = [joint for entity, joint in before.items() if joints.get(entity) is not joint]
-        changed = [joint for joint in joints.values() if joint._version == SET]
-        if went_back:
-            changed = [joint for entity, joint in joints.items() if entity in self._set]
-        self._finish_changes([*gone, *changed])
-        for joint in joints.values():
-            joint._version = -d
+        self._finish_changes({body for key in wanted.keys() ^ now.keys() for body in key[3:5]})
 
     def _put(self, j: int, joint: Joint, row: Row) -> None:
         """A row of a joint as it is now."""
@@ -255,14 +240,16 @@ class Joints(Plugin):
         for name in ("low", "high", "target", "most", "frequency", "damping_ratio"):
             getattr(record, name)[j] = getattr(row, name)
 
-    def _finish_changes(self, joints: list[Joint]) -> None:
-        """What sleeps on bodies whose joints have changed wakes."""
+    def _finish_changes(self, bodies: set[int]) -> None:
+        """These bodies have had other rows; they wake if they sleep, and so do those whose joints have changed."""
         self._breaking = any(joint.breaking_force is not None for joint in self._joints.values())
-        bodies = {body for joint in joints for body in (joint.a, joint.b) if body != WORLD and self._row(body) >= 0}
-        for body in sorted(bodies):
-            self._physics.wake(body)
-        for joint in joints:
-            joint._version = -self._physics.dimensions
+        for joint in self._joints.values():
+            if joint.changed:
+                bodies |= {joint.a, joint.b}
+                joint.keep(changed=False)
+        for body in sorted(bodies - {WORLD}):
+            if self._row(body) >= 0:
+                self._physics.wake(body)
 
     def _keep_apart(self, joints: dict[int, Joint]) -> None:
         pairs = sorted({
@@ -296,7 +283,7 @@ class Joints(Plugin):
 
 
 def _by_row(columns: dict[str, Any]) -> dict[tuple[int, ...], tuple[Any, ...]]:
-    """What rows keep, by (joint, kind, rule, how many such rows the joint has before it), in their order."""
+    """What rows keep, by what they are known by and how many such rows are before them, in their order."""
     rows: dict[tuple[int, ...], tuple[Any, ...]] = {}
     seen: dict[tuple[int, ...], int] = {}
     kept = [np.asarray(columns[name]) for name in KEPT if name in columns]

@@ -76,6 +76,7 @@ class Joint(Component, abstract=True):
     collide_connected: bool = special_column(default=False, dtype=bool, kw_only=True)
     breaking_force: float | None = special_column(default=None, optional=True, positive=True, kw_only=True)
     attached: bool = special_column(default=False, init=False, dtype=bool)
+    changed: bool = special_column(default=True, init=False, dtype=bool)  # since the last step: its bodies wake
     at_a: Vector = special_column(default=0.0, init=False, item="vector")  # the anchors, along the axes of each body
     at_b: Vector = special_column(default=0.0, init=False, item="vector")
     start: float = special_column(default=0.0, init=False)  # m or rad: the value of the row that has one
@@ -109,6 +110,7 @@ class Joint(Component, abstract=True):
                     raise
                 if name in self.fixed:
                     self._values["attached"] = False
+            self._values["changed"] = True
             Changes.count += 1
             return
         super().__setattr__(name, value)
@@ -116,7 +118,7 @@ class Joint(Component, abstract=True):
     def _ends(self, name: str, value: Any) -> tuple[Any, Any]:
         try:
             low, high = value
-        except TypeError:
+        except (TypeError, ValueError):
             raise ValueError(f"{type(self).__name__}.{name} must be two numbers (least, most), got {value!r}") from None
         return low, high
 

@@ -194,11 +194,13 @@ class Sleepers:
 
     def _note_links(self) -> None:
         state, bodies = self._state, self._state.bodies
-        pairs, dynamic = state.pairs, state.dynamic
+        pairs, joints, dynamic = state.pairs, state.solver.joints, state.dynamic
         near = pairs.near_contact[: pairs.count] & pairs.is_solid[: pairs.count]
-        a, b = pairs.a[: pairs.count][near], pairs.b[: pairs.count][near]
+        held = joints.order[: joints.active]
+        a = np.concatenate((pairs.a[: pairs.count][near], joints.row_a[held]))
+        b = np.concatenate((pairs.b[: pairs.count][near], joints.row_b[held]))
         fixed, body = np.maximum(a, b), np.minimum(a, b)
-        some = (fixed >= dynamic) & (body < dynamic)
+        some = (fixed >= dynamic) & (body >= 0) & (body < dynamic)
         fixed, body = fixed[some], body[some]
         due = bodies.still[body] == FALLING
         found = np.stack((bodies.entity[fixed[due]], bodies.island[body[due]]), axis=1)

@@ -26,6 +26,7 @@ from carom.plugins.rotation import Rotation, Spin
         (lambda: Hinge(1, 2, anchor=(0, 0), max_torque=-1.0), "at least 0"),
         (lambda: Hinge(1, 2, anchor=(0, 0), frequency=0.0), "positive"),
         (lambda: Distance(1, 2, length=(2.0, 1.0)), "least, most"),
+        (lambda: Distance(1, 2, length=(1.0, 2.0, 3.0)), "two numbers"),
         (lambda: Distance(1, 2, length=-1.0), "at least 0"),
         (lambda: Distance(1, 2, length=(0.0, 1.0), frequency=2.0), "one length"),
         (lambda: Weld(1, 2, anchor=(0, 0), breaking_force=0.0), "positive"),
@@ -79,6 +80,19 @@ def test_fields_that_do_not_fit_leave_the_joint_as_it_is():
     hinge.lower = -1.0
     run(world, 300)
     assert at(world, leaf).rotation == pytest.approx(-1.0, abs=2e-3)
+
+
+def test_ends_that_do_not_fit_the_world_are_refused_by_its_step():
+    world, joints = joint_world(gravity=(0, 0))
+    rope = world.create_entity(Distance(disc(world, (0, 0)), disc(world, (2, 0))))
+    world.step()
+    joint = world.component_for_entity(rope, Distance)
+    joint.anchor_b = 0.5
+    world.step()
+    assert joints.state(rope).value == pytest.approx(math.hypot(2.5, 0.5), abs=0.5)
+    joint.anchor_b = (0, 0, 1)
+    with pytest.raises(ValueError, match=f"entity {rope}: Distance.anchor_b must have 2 components"):
+        world.step()
 
 
 def test_joints_of_deleted_bodies_are_lost():
@@ -257,12 +271,23 @@ def hanging(world):
     return body, rope
 
 
-def test_a_field_that_is_set_wakes_the_bodies():
+@pytest.mark.parametrize("back", [False, True])
+def test_a_field_that_is_set_wakes_the_bodies(back):
     world, _ = joint_world(sleeping=True)
     body, rope = hanging(world)
+    if back:
+        world.restore(world.snapshot())
     world.component_for_entity(rope, Distance).most = 1.5
     run(world, 120)
     assert at(world, body).y == pytest.approx(0.5, abs=0.01)
+
+
+def test_a_new_joint_wakes_its_bodies():
+    world, _ = joint_world(sleeping=True)
+    body, _ = hanging(world)
+    world.create_entity(MousePull(body, grip=(0.0, 0.0), target=(0.0, 1.0)))
+    run(world, 120)
+    assert at(world, body).y == pytest.approx(1.0, abs=0.05)
 
 
 def test_going_back_wakes_only_what_was_to_wake():
@@ -338,3 +363,57 @@ def test_kinematic_body_carries_what_hangs_on_it():
     run(world, 600)
     assert at(world, load).x == pytest.approx(10.0, abs=1.0)
     assert joints.state(rod).value == pytest.approx(1.0, abs=1e-3)
+
+
+CHANGES = {
+    "field": lambda world, hook, rope: setattr(world.component_for_entity(rope, Distance), "length", (0.0, 3.0)),
+    "body": lambda world, hook, rope: setattr(world.component_for_entity(rope, Distance), "b", disc(world, (1.5, 4))),
+    "end": lambda world, hook, rope: world.delete_entity(rope),
+    "kinematic": lambda world, hook, rope: setattr(
+        world.component_for_entity(hook, RigidBody), "linear_velocity", (0.0, -1.0)
+    ),
+    "static": lambda world, hook, rope: setattr(world.component_for_entity(hook, Transform), "position", (0.0, 4.0)),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_what_hangs_asleep_wakes_when_its_joint_changes_and_not_before(change, tmp_path):
+    """Also in a world that goes back, or is loaded, between the change and the next step."""
+    world, _ = joint_world(sleeping=True)
+    kind = "kinematic" if change == "kinematic" else "static"
+    hook = world.create_entity(Transform((0, 5)), RigidBody(kind=kind), SphereCollider(0.1))
+    lamp = disc(world, (0, 3))
+    rope = world.create_entity(Distance(hook, lamp, length=(0.0, 2.0)))
+    run(world, 300)
+    body, start = world.component_for_entity(lamp, RigidBody), world.snapshot()
+    assert body.asleep
+    for _ in range(2):
+        world.restore(start)
+        run(world, 10)
+        assert body.asleep
+        CHANGES[change](world, hook, rope)
+        changed = world.snapshot()
+        run(world, 60)
+        assert at(world, lamp).y < 2.5
+        after = world.state_hash()
+        world.restore(changed)
+        world.save(tmp_path / "lamp.carom")
+        run(world, 60)
+        assert world.state_hash() == after
+        loaded = World.load(tmp_path / "lamp.carom", Physics(dimensions=2), Rotation(), Joints())
+        run(loaded, 60)
+        assert loaded.state_hash() == after
+
+
+def test_world_is_saved_with_its_forces_right_after_it_went_back(tmp_path):
+    world, _ = joint_world()
+    chain(world, 8, (0.8, 0.6), (0.45, 0.1))
+    run(world, 40)
+    start = world.snapshot()
+    run(world, 40)
+    later = world.state_hash()
+    world.restore(start)
+    world.save(tmp_path / "chain.carom")
+    loaded = World.load(tmp_path / "chain.carom", Physics(dimensions=2), Rotation(), Joints())
+    run(loaded, 40)
+    assert loaded.state_hash() == later
