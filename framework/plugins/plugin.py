@@ -282,6 +282,7 @@ class Plugin:
     def adds(self) -> dict[str, list[str]]:
         """What it brings, by kind, as names; for ``carom plugins``."""
         found = {
+            "components": [component.__name__ for component in self.components],
             "shapes": [component.__name__ for component in self.shapes],
             "pairs": [pair.names for pair in self.pairs.values()],
             "integrators": list(self.integrators),

@@ -54,6 +54,7 @@ def test_what_no_world_can_have_is_refused_by_its_step():
             world.step()
 
 
+@pytest.mark.plain
 def test_joints_belong_to_one_world_with_physics():
     joints = Joints()
     with pytest.raises(Exception, match="need physics"):
@@ -114,6 +115,7 @@ def test_joints_of_deleted_bodies_are_lost():
     assert at(world, bodies[0]).y < before - 0.4 * G
 
 
+@pytest.mark.plain
 def test_joint_breaks_at_its_force():
     world, joints = joint_world()
     for x, most in enumerate((1.2 * G, 0.9 * G)):
@@ -223,6 +225,7 @@ def test_joined_bodies_sleep_and_wake_together():
     assert at(world, bodies[2]).y > before[2]
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize("kind", [Ball, Distance])
 def test_pendulum_in_space_keeps_its_moment_about_the_vertical(kind):
     world = World(Physics(dimensions=3, gravity=(0, 0, -G)), Rotation(), Joints())
