@@ -272,9 +272,10 @@ def test_energy_never_rises_with_friction(e, mode):
     assert last < 0.9 * first
 
 
-def test_a_smooth_elastic_gas_of_boxes_in_space_keeps_energy_as_free_turns_do():
-    """These let it swing by dt^2: within 1 %, and 2e-3 in a step, over more than 300 impacts at their times."""
-    random = np.random.default_rng(5)
+@pytest.mark.parametrize("seed", [4, 6])
+def test_a_smooth_elastic_gas_of_boxes_in_space_keeps_energy_as_free_turns_do(seed):
+    """These let it swing by dt^2: within 0.5 %, and 2e-3 in a step, over more than 300 impacts at their times."""
+    random = np.random.default_rng(seed)
     with World(
         Physics(3, gravity=0), Rotation(), settings=Settings(collision="event_driven", max_impacts_per_step=64)
     ) as world:
@@ -301,8 +302,8 @@ def test_a_smooth_elastic_gas_of_boxes_in_space_keeps_energy_as_free_turns_do():
             world.step()
         assert world.stats().counters["impacts"] > 300
         assert np.abs(bodies.position).max() < 3.0
-    assert np.allclose(energies, energies[0], rtol=1e-2)
-    assert np.diff(energies).max() < 2e-3 * energies[0]
+    assert np.allclose(energies, energies[0], rtol=5e-3)
+    assert np.abs(np.diff(energies)).max() < 2e-3 * energies[0]
 
 
 # -- with gravity ---------------------------------------------------------------------------------
