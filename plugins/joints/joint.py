@@ -173,14 +173,35 @@ class Joint(Component, abstract=True):
         """Set what is hidden."""
         self._values.update(values)  # type: ignore[union-attr]
 
-    def moving(self, row: Row, limits: tuple[float, float], drive: tuple[float | None, float | None]) -> list[Row]:
-        """The rows that limit a value, whose 0 is at ``row.low``, drive it, or are its spring. drive: (speed, most)."""
-        rows, (speed, most) = [], drive
+
+class Driven(Joint, abstract=True):
+    """What has limits, a motor and a spring of its one free value."""
+
+    __slots__ = ()
+
+    lower: float | None = special_column(default=None, optional=True, kw_only=True)
+    upper: float | None = special_column(default=None, optional=True, kw_only=True)
+    motor_speed: float | None = special_column(default=None, optional=True, kw_only=True)
+    frequency: float | None = special_column(default=None, optional=True, positive=True, kw_only=True)
+    damping_ratio: float = special_column(default=0.0, minimum=0.0, kw_only=True)
+    rest: float = special_column(default=0.0, kw_only=True)
+
+    def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:
+        if limits is not None:
+            values["lower"], values["upper"] = self._ends("limits", limits)
+        super().__init__(*args, **values)
+
+    def check(self) -> None:
+        self.in_order("limits", self.lower, self.upper)
+
+    def moving(self, row: Row, most: float | None) -> list[Row]:
+        """The rows that limit the value, which is 0 at ``row.low``, drive it with that at most, or are its spring."""
+        rows, limits = [], self.in_order("limits", self.lower, self.upper)
         if limits != FREE:
             rows.append(row._replace(rule=LIMIT, low=row.low + limits[0], high=row.low + limits[1]))
-        if speed is not None:
-            rows.append(row._replace(rule=DRIVE, target=speed, most=math.inf if most is None else most))
-        if self.frequency is not None:  # type: ignore[attr-defined]
-            rest, ratio = self.rest, self.damping_ratio  # type: ignore[attr-defined]
-            rows.append(row._replace(rule=SPRING, low=row.low + rest, frequency=self.frequency, damping_ratio=ratio))  # type: ignore[attr-defined]
+        if self.motor_speed is not None:
+            rows.append(row._replace(rule=DRIVE, target=self.motor_speed, most=math.inf if most is None else most))
+        if self.frequency is not None:
+            low, ratio = row.low + self.rest, self.damping_ratio
+            rows.append(row._replace(rule=SPRING, low=low, frequency=self.frequency, damping_ratio=ratio))
         return rows

@@ -10,7 +10,7 @@ import numpy as np
 from ...framework.data.columns import special_column
 from ...framework.typing import Vector
 from ...systems.contacts.solving.joints import CONE, DRIVE, HOLD, LIMIT, LINE, POINT, SERVO, SLIDE, SPRING
-from .joint import FREE, WORLD, Joint, Place, Row, optional
+from .joint import FREE, WORLD, Driven, Joint, Place, Row, optional
 
 
 class Distance(Joint):
@@ -75,7 +75,7 @@ class Distance(Joint):
         return [Row(LINE, HOLD, low)] if low == high else [Row(LINE, LIMIT, max(low, 0.0), high)]
 
 
-class Hinge(Joint):
+class Hinge(Driven):
     """Two bodies that turn about a common point, in space about a common axis.
 
     a, b
@@ -99,30 +99,14 @@ class Hinge(Joint):
     b: int | None = special_column(dtype=int, minimum=0)
     anchor: Vector = special_column(item="vector")
     axis: Vector = special_column(default=0.0, item="vector", kw_only=True)
-    lower: float | None = optional()
-    upper: float | None = optional()
-    motor_speed: float | None = optional()
     max_torque: float | None = optional(minimum=0.0)
-    frequency: float | None = optional(positive=True)
-    damping_ratio: float = special_column(default=0.0, minimum=0.0, kw_only=True)
-    rest: float = special_column(default=0.0, kw_only=True)
-
-    def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:
-        if limits is not None:
-            values["lower"], values["upper"] = self._ends("limits", limits)
-        super().__init__(*args, **values)
-
-    def check(self) -> None:
-        self.in_order("limits", self.lower, self.upper)
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, self.anchor)
         self.hold_axis(a, b, self.axis)
 
     def rows(self, dimensions: int) -> list[Row]:
-        limits = self.in_order("limits", self.lower, self.upper)
-        moving = self.moving(self.turn(dimensions), limits, (self.motor_speed, self.max_torque))
-        return [Row(POINT, HOLD), *self.aligned(dimensions), *moving]
+        return [Row(POINT, HOLD), *self.aligned(dimensions), *self.moving(self.turn(dimensions), self.max_torque)]
 
 
 class Ball(Joint):
@@ -158,7 +142,7 @@ class Weld(Joint):
         return [Row(POINT, HOLD), *self.aligned(dimensions), self.turn(dimensions)]
 
 
-class Slider(Joint):
+class Slider(Driven):
     """b slides along an axis of a, and does not turn against it.
 
     direction
@@ -177,21 +161,10 @@ class Slider(Joint):
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
     direction: Vector = special_column(item="vector")
-    lower: float | None = optional()
-    upper: float | None = optional()
-    motor_speed: float | None = optional()
     max_force: float | None = optional(minimum=0.0)
-    frequency: float | None = optional(positive=True)
-    damping_ratio: float = special_column(default=0.0, minimum=0.0, kw_only=True)
-    rest: float = special_column(default=0.0, kw_only=True)
-
-    def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:
-        if limits is not None:
-            values["lower"], values["upper"] = self._ends("limits", limits)
-        super().__init__(*args, **values)
 
     def check(self) -> None:
-        self.in_order("limits", self.lower, self.upper)
+        super().check()
         if not np.any(self.direction):
             raise ValueError("Slider.direction must not be 0")
 
@@ -202,10 +175,10 @@ class Slider(Joint):
             self.keep(axis_a=a.axes.T @ (np.asarray(self.direction) / np.linalg.norm(self.direction)))
 
     def rows(self, dimensions: int) -> list[Row]:
-        limits, along = self.in_order("limits", self.lower, self.upper), np.asarray(self.axis_a)
+        along = np.asarray(self.axis_a)
         sides = [(-along[1], along[0])] if dimensions == 2 else [self.side_a, np.cross(along, self.side_a)]
         across = [Row(SLIDE, HOLD, axis=side) for side in sides]
-        moving = self.moving(Row(SLIDE, HOLD, axis=along), limits, (self.motor_speed, self.max_force))
+        moving = self.moving(Row(SLIDE, HOLD, axis=along), self.max_force)
         return [*across, *self.aligned(dimensions), self.turn(dimensions), *moving]
 
 
