@@ -101,6 +101,9 @@ class Hinge(Driven):
     axis: Vector = special_column(default=0.0, item="vector", kw_only=True)
     max_torque: float | None = optional(minimum=0.0)
 
+    def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:
+        super().__init__(*args, limits=limits, **values)  # stands here for checkers of types
+
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, self.anchor)
         self.hold_axis(a, b, self.axis)
@@ -162,6 +165,9 @@ class Slider(Driven):
     b: int | None = special_column(dtype=int, minimum=0)
     direction: Vector = special_column(item="vector")
     max_force: float | None = optional(minimum=0.0)
+
+    def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:
+        super().__init__(*args, limits=limits, **values)  # stands here for checkers of types
 
     def check(self) -> None:
         super().check()
