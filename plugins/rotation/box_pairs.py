@@ -7,7 +7,7 @@ import math
 
 from ...components import AABBCollider, SphereCollider
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, scale
-from ...systems.shapes.convex.pair import convex_convex, middle_of_overlap
+from ...systems.shapes.convex.pair import TILT, convex_convex, middle_of_overlap
 from ..standard_shapes import sphere_box
 from .box import BoxCollider, boxes
 
@@ -60,17 +60,30 @@ def in_world(box, vector):
 
 
 @boxes.kernel
-def farthest_face(a, b, d):
-    """In a plane: (distance, outward normal) of the face of a that all of b lies farthest beyond."""
-    most, outward = -math.inf, d
-    for k in range(len(d)):
-        at = dot(a.axes[k], d)
-        gap = abs(at) - item(a.half_extents, k)
-        for j in range(len(d)):
-            gap -= item(b.half_extents, j) * abs(dot(a.axes[k], b.axes[j]))
-        if gap > most:
-            most, outward = gap, scale(a.axes[k], 1.0 if at >= 0.0 else -1.0)
-    return most, outward
+def nearest_face(half, other, at, turn):
+    """In a plane: (gap, axis) of the face of a box that another one, ``at`` along its axes, lies farthest beyond."""
+    c, s = abs(turn[0]), abs(turn[1])
+    one = abs(item(at, 0)) - item(half, 0) - c * item(other, 0) - s * item(other, 1)
+    two = abs(item(at, 1)) - item(half, 1) - s * item(other, 0) - c * item(other, 1)
+    return (two, 1) if two > one else (one, 0)
+
+
+@boxes.kernel
+def nearest_edge(other, at, turn, axis, side):
+    """(low, high), from the middle of a box's face along it, of the edge of the other box that is nearest to the face,
+    or of the corner. side: 1 if that is the face in the direction of the axis, else -1."""
+    c, s = turn
+    out_0, out_1 = (c, -s) if axis == 0 else (s, c)  # the other's axes, across and along the face
+    on_0, on_1 = (s, c) if axis == 0 else (c, -s)
+    half_0, half_1 = item(other, 0), item(other, 1)
+    if abs(out_0) < abs(out_1):  # the edge runs along its first axis
+        out_0, out_1, on_0, on_1, half_0, half_1 = out_1, out_0, on_1, on_0, half_1, half_0
+    middle = item(at, 1 - axis) - side * math.copysign(half_0, out_0) * on_0
+    reach = half_1 * on_1
+    if abs(out_1) > TILT:
+        corner = middle - side * math.copysign(reach, out_1 * on_1)
+        return corner, corner
+    return middle - abs(reach), middle + abs(reach)
 
 
 @boxes.kernel
@@ -104,15 +117,26 @@ def two_boxes(a, b, d):
     """In a plane the way out is across a face of one of them; apart, a face or two corners are nearest."""
     if len(d) == 3:
         return convex_convex(a, b, d, support, support, sharp, sharp)
-    distance, normal = farthest_face(a, b, d)
-    other, inward = farthest_face(b, a, negative(d))
-    if other > distance:
-        distance, normal = other, negative(inward)
-    size = length(d) + length(a.half_extents) + length(b.half_extents)
-    if distance > CLOSE * size:
-        distance, normal = apart_in_plane(a, b, d, normal, distance)
-    point = middle_of_overlap((a, b, support, support, 1.0), d, normal)
-    return distance <= 0.0, -distance, normal, add_scaled(point, normal, 0.5 * distance)
+    turn, from_b = (dot(a.axes[0], b.axes[0]), dot(a.axes[1], b.axes[0])), False
+    axes, half, other, at = a.axes, a.half_extents, b.half_extents, along_axes(a, d)
+    distance, axis = nearest_face(half, other, at, turn)
+    at_b = along_axes(b, negative(d))
+    distance_b, axis_b = nearest_face(other, half, at_b, turn)
+    if distance_b > distance:
+        distance, axis, from_b = distance_b, axis_b, True
+        axes, half, other, at, turn = b.axes, b.half_extents, a.half_extents, at_b, (turn[0], -turn[1])
+    side, beside = 1.0 if item(at, axis) >= 0.0 else -1.0, item(half, 1 - axis)
+    low, high = nearest_edge(other, at, turn, axis, side)
+    outward = scale(axes[axis], side)
+    if (low > beside or high < -beside) and distance > CLOSE * (abs(item(at, 0)) + abs(item(at, 1)) + beside):
+        distance, normal = apart_in_plane(a, b, d, negative(outward) if from_b else outward, distance)
+        point = middle_of_overlap((a, b, support, support, 1.0), d, normal)
+        return distance <= 0.0, -distance, normal, add_scaled(point, normal, 0.5 * distance)
+    point = scale(outward, item(half, axis) + 0.5 * distance)
+    point = add_scaled(point, axes[1 - axis], 0.5 * (max(low, -beside) + min(high, beside)))
+    if from_b:
+        return distance <= 0.0, -distance, negative(outward), add(d, point)
+    return distance <= 0.0, -distance, outward, point
 
 
 boxes.pair(BoxCollider, BoxCollider)(two_boxes)
