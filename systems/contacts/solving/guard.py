@@ -14,7 +14,6 @@ from ....framework.vectors import add, add_scaled, dot, scale, sub
 from ...integration.turning import spin_energy
 from ..constants import (
     DEEP,
-    EXCESS,
     FADING,
     FURTHER_PASSES,
     GAIN_MOTION,
@@ -118,30 +117,20 @@ def excess_speed(solver, k, arms):
 
 
 @part
-def mark_struck(solver, dt, span):
-    """The islands of which some row is far from solved."""
-    first, last = islands_of(solver, span)
-    for t in range(first, last):
-        solver.struck[t] = False
-    for k in range(span[0], span[1]):
-        if excess_speed(solver, k, span[4]) * dt > EXCESS * solver.extent[k]:
-            solver.struck[island_of(solver, k)] = True
-
-
-@part
 def find_unsolved(solver, turn, any_struck, dt, span, islands):
     """The rows of struck islands that are not solved, and all of islands that gain, come first in ``listed``; returns
     how many. An island has as many passes as its own size allows: what is solved elsewhere changes none of its bits."""
-    unsolved, any_gain, count = solver.unsolved, False, 0
+    unsolved, struck, passes, extent = solver.unsolved, solver.struck, solver.passes, solver.extent
+    any_gain, most, count = False, 0, 0
     for t in range(islands[0], islands[1]):
         unsolved[t] = gains(solver, t)
         any_gain |= unsolved[t]
+        most = max(most, passes[t] if struck[t] else 0)
     for k in range(span[0], span[1] if any_gain or any_struck else span[0]):
-        excess = excess_speed(solver, k, span[4]) * dt / solver.extent[k] if any_struck else 0.0
-        if excess > SOLVED or any_gain:
+        excess, least = excess_speed(solver, k, span[4]) * dt, SOLVED * FURTHER_PASSES * extent[k]
+        if excess * most > least or any_gain:  # seldom
             t = island_of(solver, k)
-            wrong = solver.struck[t] and excess * solver.passes[t] > SOLVED * FURTHER_PASSES
-            if (wrong or unsolved[t]) and turn < solver.passes[t]:
+            if ((struck[t] and excess * passes[t] > least) or unsolved[t]) and turn < passes[t]:
                 solver.listed[count] = k
                 count += 1
     return count

@@ -37,7 +37,7 @@ from ..constants import (
     TOLD_GAIN,
     VERY_DEEP,
 )  # fmt: skip
-from .guard import excess_speed, finish_substep, mark_struck
+from .guard import excess_speed, finish_substep, island_of, islands_of
 from .hard import choose_hard, leave_open
 from .joints import add_joints, keep_joints, measure_joints, solve_joints, start_joints, warm_start_joints
 from .rows import (
@@ -63,10 +63,12 @@ def measure(solver, h, springs, dt, stiff, ends, span):
     """What each row asks of the speed along its normal, from where the bodies are now.
 
     opening: at most closing what is open within a substep, or, in the one that ``ends`` the step, within a usual one;
-    pushing: in the pass that pushes, overlap is to open as well, softly where ``soft`` says so. Returns whether the
-    speed of some row is far from what the relaxing passes are to make of it.
+    pushing: in the pass that pushes, overlap is to open as well, softly where ``soft`` says so. Islands are ``struck``
+    where the speed of some row is far from what the relaxing passes are to make of it; returns whether any is.
     """
-    ahead, any_struck = dt / solver.usual if ends else h, False
+    ahead, any_struck, islands = dt / solver.usual if ends else h, False, islands_of(solver, span)
+    for t in range(islands[0], islands[1]):
+        solver.struck[t] = False
     for k in range(span[0], span[1]):
         room = room_of(solver, k, span[4])
         opening = pushing = max(0.0, room) / ahead
@@ -83,7 +85,8 @@ def measure(solver, h, springs, dt, stiff, ends, span):
             soft = 0.0 if stiff or hard else softness
         solver.had_impulse[k] |= solver.impulse[k] > 0.0
         solver.opening[k], solver.pushing[k], solver.soft[k] = opening, pushing, soft
-        any_struck |= excess_speed(solver, k, span[4]) * dt > EXCESS * solver.extent[k]
+        if excess_speed(solver, k, span[4]) * dt > EXCESS * extent:
+            any_struck = solver.struck[island_of(solver, k)] = True
     if len(span[4]) > 1:
         measure_joints(solver)
     return any_struck
@@ -235,8 +238,6 @@ def solve_substep(solver, springs, most, dt, h, kind, ends, span):
         converge(solver, True, h, span)
     move(solver, h, span)
     any_struck = measure(solver, h, springs, dt, stiff, ends, span)
-    if any_struck:
-        mark_struck(solver, dt, span)
     if ends and solver.any_hard:
         leave_open(solver, h, span)
     if len(span[4]) > 1:  # once: more often, chains give way more
