@@ -249,6 +249,18 @@ class Entities(dict[int, dict[type[Any], Any]]):
                     handle._bind(store, None, entity - one.first, RowStore.version)
                 self._settle(entity, components)
 
+    def handle(self, entity: int, component: type[Component]) -> Component:
+        """That component of an entity, to be read now: what has no objects gets none by it."""
+        components = dict.get(self, entity)
+        if components is not None:
+            return components[component]
+        handle, one = component.__new__(component), self._arrival(entity)
+        if one is None:
+            handle._bind(self.table, entity)
+        else:
+            handle._bind(one.stores[component], None, entity - one.first, RowStore.version)
+        return handle
+
     # -- what changes -----------------------------------------------------------------------------
 
     def changes(self, entity: int, component: type[Any], ours: bool) -> None:

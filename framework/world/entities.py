@@ -181,9 +181,11 @@ class EntityVerbs:
         dimensions = self.dimensions
         for component in components:
             if isinstance(component, Component):
-                self.registry.require(type(component), entity)
+                plugin = self.registry.require(type(component), entity)
                 if dimensions is not None:
                     component.fit(dimensions, entity)
+                if plugin is not None:
+                    plugin.check_component(component, entity)
             elif isinstance(component, type):
                 raise TypeError(f"components are instances: {component.__name__}(...), got the class itself")
             elif isinstance(component, (list, tuple, Many)):

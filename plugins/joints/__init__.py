@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...components import RigidBody
 from ...framework import NoPhysicsError, Plugin, World
 from ...systems.contacts.solving.joints import POINT, TURN
 from ...systems.contacts.solving.records import JOINTS
@@ -133,12 +134,12 @@ class Joints(Plugin):
             self._seen = now
             return
         found = self._present()
-        lost = [entity for entity, joint in found.items() if joint.attached and not self._has_bodies(joint)]
+        lost = [entity for entity, joint in found.items() if self._is_lost(joint)]
+        ended = [(entity, found.pop(entity)) for entity in lost]
         for entity, joint in found.items():
             joint.fit(self._physics.dimensions, entity)
             if not joint.attached:
                 self._attach(entity, joint)
-        ended = [(entity, found.pop(entity)) for entity in lost]
         self._write(found)
         self._end(ended, "joint_lost")
         self._seen = self._now()
@@ -155,23 +156,40 @@ class Joints(Plugin):
         """Another value whenever entities or bodies have come or gone, or a field was set."""
         return self._contents.log.rounds, self._physics.table.version, Changes.count
 
-    def _has_bodies(self, joint: Joint) -> bool:
-        return all(entity == WORLD or self._row(entity) >= 0 for entity in (joint.a, joint.b))
+    def _is_lost(self, joint: Joint) -> bool:
+        """Whether one of its bodies is gone; of a joint that has not taken hold yet: whether it was deleted since."""
+        contents = self._contents
+        return any(
+            body != WORLD and self._row(body) < 0
+            and (joint.attached or (body not in contents.entities and body < contents.counter.next))
+            for body in (joint.a or WORLD, joint.b or WORLD)
+        )  # fmt: skip
 
     def _row(self, entity: int) -> int:
         return int(self._physics.table.row_of(entity))
 
-    def _attach(self, entity: int, joint: Joint) -> None:
-        """Take hold of the bodies where they are; ValueError for what no world can have."""
-        name, physics = f"entity {entity}: {type(joint).__name__}", self._physics
-        for body in (joint.a, joint.b):
-            if body != WORLD and self._row(body) < 0:
-                raise ValueError(f"{name} joins entity {body}, which is no body of world {physics._world.name!r}")
-        if physics.dimensions not in joint.dimensions:
-            raise ValueError(f"{name} is no joint of worlds of {physics.dimensions} dimensions")
-        moving = physics.table.stops[0]
-        if not any(body != WORLD and self._row(body) < moving for body in (joint.a, joint.b)):
+    def check_component(self, component: Any, entity: int | None) -> None:
+        """ValueError unless a joint has two bodies, or one and the world, one of which is dynamic."""
+        if not isinstance(component, Joint):
+            return
+        name, entities = f"{'' if entity is None else f'entity {entity}: '}{type(component).__name__}", []
+        for body in (component.a, component.b):
+            if body == WORLD:
+                continue
+            types = () if body in self._contents.dead else self._contents.entities.types_of(body)
+            if not any(getattr(kind, "makes_body", False) for kind in types):
+                why = "is no body" if types else "does not exist"
+                raise ValueError(f"{name} joins entity {body}, which {why} in world {self._physics._world.name!r}")
+            entities.append(self._contents.entities.handle(body, RigidBody) if RigidBody in types else None)
+        if not any(body is not None and body.kind == "dynamic" for body in entities):
             raise ValueError(f"{name} joins no dynamic body")
+
+    def _attach(self, entity: int, joint: Joint) -> None:
+        """Take hold of the bodies where they are."""
+        try:
+            self.check_component(joint, entity)
+        except ValueError as error:
+            raise ValueError(f"{error}: set its fields, or world.delete_entity({entity})") from None
         joint.attach(*(self._moving(body)[0] for body in (joint.a, joint.b)))
         joint.keep(attached=True)
 

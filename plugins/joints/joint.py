@@ -96,20 +96,25 @@ class Joint(Component, abstract=True):
             raise ValueError(f"{type(self).__name__} needs two bodies, got {self.a or None} twice")
         self.check()
 
+    @classmethod
+    def many(cls, *args: Any, **values: Any) -> Any:
+        raise TypeError(f"joints are created one by one: world.create_entity({cls.__name__}(...))")
+
     def __setattr__(self, name: str, value: Any) -> None:
         if name in self.columns and self._values is not None:
             if name in ("a", "b") and value is None:
                 value = WORLD
-            before = dict(self._values)
-            super().__setattr__(name, value)
-            if self.attached:
-                try:
-                    self.check()
-                except ValueError:
-                    self._values = before
-                    raise
-                if name in self.fixed:
-                    self._values["attached"] = False
+            before, version = dict(self._values), self._version
+            try:
+                super().__setattr__(name, value)
+                self.check()
+                if version < -1:  # of a world of so many dimensions
+                    self.fit(-version)
+            except ValueError:
+                self._values, self._version = before, version
+                raise
+            if name in self.fixed:
+                self._values["attached"] = False
             self._values["changed"] = True
             Changes.count += 1
             return
@@ -124,6 +129,14 @@ class Joint(Component, abstract=True):
 
     def check(self) -> None:
         """ValueError for fields that do not go together."""
+
+    def fit(self, dimensions: int, entity: int | None = None) -> None:
+        super().fit(dimensions, entity)
+        name = f"{'' if entity is None else f'entity {entity}: '}{type(self).__name__}"
+        if dimensions not in self.dimensions:
+            raise ValueError(f"{name} is no joint of worlds of {dimensions} dimensions")
+        if dimensions == 3 and "axis" in self.columns and not np.any(self.axis):
+            raise ValueError(f"{name} needs an axis in a world of 3 dimensions, got {np.asarray(self.axis).tolist()}")
 
     def in_order(self, name: str, low: float | None, high: float | None) -> tuple[float, float]:
         """Two limits, none where they are None; ValueError if the first is the larger."""
@@ -146,12 +159,9 @@ class Joint(Component, abstract=True):
 
     def hold_axis(self, a: Place, b: Place, axis: Any) -> None:
         """In space, an axis of both."""
-        axis = np.asarray(axis, float)
         if len(a.position) == 2:
             return
-        if axis.shape != (3,) or not axis.any():
-            raise ValueError(f"{type(self).__name__} needs an axis in a world of 3 dimensions, got {axis.tolist()}")
-        axis = axis / np.linalg.norm(axis)
+        axis = np.asarray(axis, float) / np.linalg.norm(axis)
         side = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
         side /= np.linalg.norm(side)
         self.keep(axis_a=a.axes.T @ axis, axis_b=b.axes.T @ axis, side_a=a.axes.T @ side, side_b=b.axes.T @ side)

@@ -10,7 +10,7 @@ import pytest
 from helpers_joints import G, at, chain, disc, gaps, joint_world, plank, run
 
 from carom import Phase, Physics, RigidBody, SphereCollider, StepError, System, Transform, World
-from carom.plugins.joints import Ball, Distance, Hinge, Joints, Motor, MousePull, Slider, Weld
+from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Motor, MousePull, Slider, Weld
 from carom.plugins.rotation import Rotation, Spin
 
 
@@ -40,18 +40,69 @@ def test_what_no_joint_can_be_is_refused_at_the_call(make, message):
         make()
 
 
-def test_what_no_world_can_have_is_refused_by_its_step():
-    for place, dimensions, message in (("gone", 2, "no body"), ("static", 2, "no dynamic body"), ("ball", 3, "axis")):
-        world = World(Physics(dimensions=dimensions), Joints())
-        body = world.create_entity(Transform((0,) * dimensions), RigidBody(), SphereCollider(0.5))
-        wall = world.create_entity(Transform((3,) * dimensions), SphereCollider(0.5))
-        if place == "gone":
-            world.delete_entity(wall, immediate=True)
-        if place == "static":
-            world.delete_entity(body, immediate=True)
-        world.create_entity(Hinge(None if place == "static" else body, wall, anchor=(0,) * dimensions))
-        with pytest.raises(ValueError, match=message):
+@pytest.mark.plain
+@pytest.mark.parametrize("add", [False, True])
+def test_what_no_world_can_have_is_refused_at_the_call(add):
+    world, _ = joint_world()
+    disc(world, (0, 0))
+    moving = world.create_entities(3, Transform.many((0, 0)), RigidBody.many(), SphereCollider.many(0.1))
+    wall = world.create_entity(Transform((3, 0)), SphereCollider(0.5))
+    lift = world.create_entity(Transform((3, 3)), RigidBody(kind="kinematic"))
+    gone, going, empty = disc(world, (5, 0)), disc(world, (6, 0)), world.create_entity(Transform((0, 0)))
+    world.delete_entity(gone, immediate=True)
+    world.delete_entity(going)
+    for joint, message in (
+        (Hinge(moving[0], gone, anchor=(0, 0)), f"entity {gone}, which does not exist"),
+        (Hinge(going, moving[0], anchor=(0, 0)), f"entity {going}, which does not exist"),
+        (Hinge(moving[0], empty, anchor=(0, 0)), f"entity {empty}, which is no body"),
+        (MousePull(99, grip=(0, 0), target=(0, 0)), "entity 99, which does not exist"),
+        (Hinge(None, wall, anchor=(0, 0)), "no dynamic body"),
+        (Weld(lift, wall, anchor=(0, 0)), "no dynamic body"),
+        (Cone(moving[1], moving[0], anchor=(0, 0), axis=(0, 1)), "2 dimensions"),
+        (Hinge(moving[1], moving[0], anchor=(0, 0, 1)), "must have 2 components"),
+    ):
+        with pytest.raises(ValueError, match=message) as error:
+            world.add_component(empty, joint) if add else world.create_entity(joint)
+        assert str(error.value).startswith(f"entity {empty}: ") == add
+    with pytest.raises(TypeError, match="one by one"):
+        Ball.many(moving[0], moving[1], anchor=(0, 0))
+    world.create_entity(Ball(moving[0], moving[1], anchor=(0, 0)))
+    world.step()
+
+
+@pytest.mark.plain
+def test_what_comes_to_be_wrong_is_told_by_the_step_and_can_be_cured():
+    world, joints = joint_world(gravity=(0, 0))
+    a, b, c = (disc(world, (k, 0)) for k in range(3))
+    joint = Ball(a, b, anchor=(0.5, 0))
+    entity = world.create_entity(joint)
+    joint.b = 99
+    for _ in range(2):
+        with pytest.raises(ValueError, match=rf"entity {entity}: .* 99, which does not exist.*delete_entity"):
             world.step()
+    joint.b = c
+    world.step()
+    assert joints.of(c) == [entity]
+    joint.b = 99
+    world.delete_entity(entity)
+    world.step()
+    assert len(joints) == 0
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("immediate", [False, True])
+def test_a_joint_is_lost_if_its_body_goes_before_it_takes_hold(immediate):
+    world, joints = joint_world()
+    a, b, c = (disc(world, (k, 0)) for k in range(3))
+    lost = []
+    world.on("joint_lost", lambda entity, joint: lost.append((entity, joint.b)))
+    entity = world.create_entity(Hinge(a, b, anchor=(0, 0)))
+    world.create_entity(Hinge(a, c, anchor=(0, 0)))
+    world.delete_entity(b, immediate=immediate)
+    world.step()
+    assert lost == [(entity, b)]
+    assert not world.entity_exists(entity)
+    assert len(joints) == 1
 
 
 @pytest.mark.plain
@@ -83,7 +134,7 @@ def test_fields_that_do_not_fit_leave_the_joint_as_it_is():
     assert at(world, leaf).rotation == pytest.approx(-1.0, abs=2e-3)
 
 
-def test_ends_that_do_not_fit_the_world_are_refused_by_its_step():
+def test_ends_that_do_not_fit_the_world_are_refused_at_the_call():
     world, joints = joint_world(gravity=(0, 0))
     rope = world.create_entity(Distance(disc(world, (0, 0)), disc(world, (2, 0))))
     world.step()
@@ -91,9 +142,10 @@ def test_ends_that_do_not_fit_the_world_are_refused_by_its_step():
     joint.anchor_b = 0.5
     world.step()
     assert joints.state(rope).value == pytest.approx(math.hypot(2.5, 0.5), abs=0.5)
-    joint.anchor_b = (0, 0, 1)
-    with pytest.raises(ValueError, match=f"entity {rope}: Distance.anchor_b must have 2 components"):
-        world.step()
+    with pytest.raises(ValueError, match=r"Distance\.anchor_b must have 2 components"):
+        joint.anchor_b = (0, 0, 1)
+    assert np.array_equal(joint.anchor_b, (0.5, 0.5))
+    world.step()
 
 
 def test_joints_of_deleted_bodies_are_lost():
