@@ -188,9 +188,9 @@ class Joints(Plugin):
         """Take hold of the bodies where they are."""
         try:
             self.check_component(joint, entity)
+            joint.attach(*(self._moving(body)[0] for body in (joint.a, joint.b)))
         except ValueError as error:
             raise ValueError(f"{error}: set its fields, or world.delete_entity({entity})") from None
-        joint.attach(*(self._moving(body)[0] for body in (joint.a, joint.b)))
         joint.keep(attached=True)
 
     def _moving(self, entity: int) -> tuple[Place, Any, Any]:

@@ -14,6 +14,9 @@ from ...systems.contacts.solving.joints import ALIGN, DRIVE, HOLD, LIMIT, SPRING
 
 WORLD = 0  # in place of a body
 FREE = -math.inf, math.inf
+MOST = 1e15  # m, rad, Hz and the like: further away numbers have no digits for what a step changes
+FARTHEST = 1e8  # m from a body: further away its mass is lost beside the inertia of the arm
+LEAST = 1e-100  # of an axis, whose square is taken
 
 
 class Row(NamedTuple):
@@ -132,10 +135,11 @@ class Joint(Component, abstract=True):
 
     def fit(self, dimensions: int, entity: int | None = None) -> None:
         super().fit(dimensions, entity)
+        self._entity = self._entity if entity is None else entity  # for messages
         name = f"{'' if entity is None else f'entity {entity}: '}{type(self).__name__}"
         if dimensions not in self.dimensions:
             raise ValueError(f"{name} is no joint of worlds of {dimensions} dimensions")
-        if dimensions == 3 and "axis" in self.columns and not np.any(self.axis):
+        if dimensions == 3 and "axis" in self.columns and not np.any(np.abs(self.axis) > LEAST):
             raise ValueError(f"{name} needs an axis in a world of 3 dimensions, got {np.asarray(self.axis).tolist()}")
 
     def in_order(self, name: str, low: float | None, high: float | None) -> tuple[float, float]:
@@ -155,7 +159,14 @@ class Joint(Component, abstract=True):
 
     def hold(self, a: Place, b: Place, anchor: Any) -> None:
         """Anchors at a point of the world."""
-        self.keep(at_a=a.local(anchor), at_b=b.local(anchor), start=b.angle - a.angle)
+        at_a, at_b = a.local(anchor), b.local(anchor)
+        for body, at in ((self.a, at_a), (self.b, at_b)):
+            if body != WORLD and np.abs(at).max() > FARTHEST:
+                raise ValueError(
+                    f"entity {self.entity}: {type(self).__name__} holds entity {body} at {at.tolist()} along its axes, "
+                    f"which must be at most {FARTHEST:g} m away"
+                )
+        self.keep(at_a=at_a, at_b=at_b, start=b.angle - a.angle)
 
     def hold_axis(self, a: Place, b: Place, axis: Any) -> None:
         """In space, an axis of both."""
@@ -189,12 +200,14 @@ class Driven(Joint, abstract=True):
 
     __slots__ = ()
 
-    lower: float | None = special_column(default=None, optional=True, kw_only=True)
-    upper: float | None = special_column(default=None, optional=True, kw_only=True)
-    motor_speed: float | None = special_column(default=None, optional=True, kw_only=True)
-    frequency: float | None = special_column(default=None, optional=True, positive=True, kw_only=True)
+    lower: float | None = special_column(default=None, optional=True, largest=MOST, kw_only=True)
+    upper: float | None = special_column(default=None, optional=True, largest=MOST, kw_only=True)
+    motor_speed: float | None = special_column(default=None, optional=True, largest=MOST, kw_only=True)
+    frequency: float | None = special_column(
+        default=None, optional=True, positive=True, largest=MOST, kw_only=True
+    )
     damping_ratio: float = special_column(default=0.0, minimum=0.0, kw_only=True)
-    rest: float = special_column(default=0.0, kw_only=True)
+    rest: float = special_column(default=0.0, kw_only=True, largest=MOST)
 
     def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:
         if limits is not None:

@@ -10,7 +10,7 @@ import numpy as np
 from ...framework.data.columns import special_column
 from ...framework.typing import Vector
 from ...systems.contacts.solving.joints import CONE, DRIVE, HOLD, LIMIT, LINE, POINT, SERVO, SLIDE, SPRING
-from .joint import FREE, WORLD, Driven, Joint, Place, Row, optional
+from .joint import FREE, LEAST, MOST, WORLD, Driven, Joint, Place, Row, optional
 
 
 class Distance(Joint):
@@ -31,11 +31,11 @@ class Distance(Joint):
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(default=WORLD, dtype=int, minimum=0)
-    anchor_a: Vector = special_column(default=0.0, item="vector")
-    anchor_b: Vector = special_column(default=0.0, item="vector")
-    least: float | None = optional(minimum=0.0)
-    most: float | None = optional(minimum=0.0)
-    frequency: float | None = optional(positive=True)
+    anchor_a: Vector = special_column(default=0.0, item="vector", largest=MOST)
+    anchor_b: Vector = special_column(default=0.0, item="vector", largest=MOST)
+    least: float | None = optional(minimum=0.0, largest=MOST)
+    most: float | None = optional(minimum=0.0, largest=MOST)
+    frequency: float | None = optional(positive=True, largest=MOST)
     damping_ratio: float = special_column(default=0.0, minimum=0.0, kw_only=True)
 
     def __init__(self, *args: Any, length: Any = None, **values: Any) -> None:
@@ -97,8 +97,8 @@ class Hinge(Driven):
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
-    anchor: Vector = special_column(item="vector")
-    axis: Vector = special_column(default=0.0, item="vector", kw_only=True)
+    anchor: Vector = special_column(item="vector", largest=MOST)
+    axis: Vector = special_column(default=0.0, item="vector", largest=MOST, kw_only=True)
     max_torque: float | None = optional(minimum=0.0)
 
     def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:
@@ -119,7 +119,7 @@ class Ball(Joint):
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
-    anchor: Vector = special_column(item="vector")
+    anchor: Vector = special_column(item="vector", largest=MOST)
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, self.anchor)
@@ -135,7 +135,7 @@ class Weld(Joint):
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
-    anchor: Vector = special_column(item="vector")
+    anchor: Vector = special_column(item="vector", largest=MOST)
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, self.anchor)
@@ -163,7 +163,7 @@ class Slider(Driven):
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
-    direction: Vector = special_column(item="vector")
+    direction: Vector = special_column(item="vector", largest=MOST)
     max_force: float | None = optional(minimum=0.0)
 
     def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:
@@ -171,8 +171,8 @@ class Slider(Driven):
 
     def check(self) -> None:
         super().check()
-        if not np.any(self.direction):
-            raise ValueError("Slider.direction must not be 0")
+        if not np.any(np.abs(self.direction) > LEAST):
+            raise ValueError(f"Slider.direction must not be 0, got {np.asarray(self.direction).tolist()}")
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, b.position if self.b != WORLD else a.position)
@@ -206,10 +206,10 @@ class Motor(Joint):
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(default=WORLD, dtype=int, minimum=0)
-    speed: float | None = optional()
-    angle: float | None = optional()
+    speed: float | None = optional(largest=MOST)
+    angle: float | None = optional(largest=MOST)
     max_torque: float | None = optional(minimum=0.0)
-    axis: Vector = special_column(default=0.0, item="vector", kw_only=True)
+    axis: Vector = special_column(default=0.0, item="vector", largest=MOST, kw_only=True)
 
     def check(self) -> None:
         if (self.speed is None) == (self.angle is None):
@@ -244,11 +244,11 @@ class Cone(Joint):
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
-    anchor: Vector = special_column(item="vector")
-    axis: Vector = special_column(item="vector")
+    anchor: Vector = special_column(item="vector", largest=MOST)
+    axis: Vector = special_column(item="vector", largest=MOST)
     swing: float = special_column(default=math.pi, minimum=0.0, kw_only=True)
-    lower: float | None = optional()
-    upper: float | None = optional()
+    lower: float | None = optional(largest=MOST)
+    upper: float | None = optional(largest=MOST)
 
     def __init__(self, *args: Any, twist: Any = None, **values: Any) -> None:
         if twist is not None:
@@ -285,10 +285,10 @@ class MousePull(Joint):
     fixed: ClassVar[tuple[str, ...]] = ("b", "grip")
 
     b: int | None = special_column(dtype=int, minimum=0)
-    grip: Vector = special_column(item="vector")
-    target: Vector = special_column(item="vector")
+    grip: Vector = special_column(item="vector", largest=MOST)
+    target: Vector = special_column(item="vector", largest=MOST)
     max_force: float | None = optional(minimum=0.0)
-    frequency: float = special_column(default=5.0, positive=True, kw_only=True)
+    frequency: float = special_column(default=5.0, largest=MOST, positive=True, kw_only=True)
     damping_ratio: float = special_column(default=1.0, minimum=0.0, kw_only=True)
     a: int | None = special_column(default=WORLD, init=False, dtype=int)
 

@@ -31,6 +31,7 @@ from carom.plugins.rotation import Rotation, Spin
         (lambda: Distance(1, 2, length=(0.0, 1.0), frequency=2.0), "one length"),
         (lambda: Weld(1, 2, anchor=(0, 0), breaking_force=0.0), "positive"),
         (lambda: Slider(1, 2, direction=(0, 0)), "not be 0"),
+        (lambda: Slider(1, 2, direction=(0, 1e-200)), "not be 0"),
         (lambda: Motor(1, 2), "speed or an angle"),
         (lambda: Motor(1, 2, speed=1.0, angle=1.0), "speed or an angle"),
     ],
@@ -38,6 +39,37 @@ from carom.plugins.rotation import Rotation, Spin
 def test_what_no_joint_can_be_is_refused_at_the_call(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("number", [1e16, 1e29, 1e160, 1e300])
+def test_numbers_that_no_step_can_take_are_refused_with_their_field(number):
+    for make, field in (
+        (lambda: Distance(1, 2, length=number), "Distance.least"),
+        (lambda: Distance(1, 2, length=(0.0, number)), "Distance.most"),
+        (lambda: Distance(1, 2, anchor_b=(0, number)), "Distance.anchor_b"),
+        (lambda: Hinge(1, 2, anchor=(0, number)), "Hinge.anchor"),
+        (lambda: Hinge(1, 2, anchor=(0, 0, 0), axis=(0, 0, number)), "Hinge.axis"),
+        (lambda: Hinge(1, 2, anchor=(0, 0), limits=(-number, 0.0)), "Hinge.lower"),
+        (lambda: Hinge(1, 2, anchor=(0, 0), frequency=number), "Hinge.frequency"),
+        (lambda: Slider(1, 2, direction=(0, number)), "Slider.direction"),
+        (lambda: Slider(1, 2, direction=(0, 1), rest=number), "Slider.rest"),
+        (lambda: Slider(1, 2, direction=(0, 1), motor_speed=number), "Slider.motor_speed"),
+        (lambda: Motor(1, 2, speed=number), "Motor.speed"),
+        (lambda: Motor(1, 2, angle=number), "Motor.angle"),
+        (lambda: MousePull(1, grip=(0, number), target=(0, 0)), "MousePull.grip"),
+        (lambda: Weld(1, 2, anchor=(number, 0)), "Weld.anchor"),
+    ):
+        with pytest.raises(ValueError, match=rf"{field} must be at most 1e\+15 along each axis, got"):
+            make()
+    world, _ = joint_world()
+    pull = MousePull(disc(world, (0, 0)), grip=(0, 0), target=(1, 0), max_force=number)
+    entity = world.create_entity(pull)
+    run(world, 10)
+    with pytest.raises(ValueError, match=rf"entity {entity}: MousePull\.target must be at most"):
+        pull.target = (0, number)
+    run(world, 10)
+    assert np.isfinite(world.bodies.position).all()
 
 
 @pytest.mark.plain
@@ -80,7 +112,10 @@ def test_what_comes_to_be_wrong_is_told_by_the_step_and_can_be_cured():
     for _ in range(2):
         with pytest.raises(ValueError, match=rf"entity {entity}: .* 99, which does not exist.*delete_entity"):
             world.step()
-    joint.b = c
+    joint.b, joint.anchor = c, (0.5, 1e9)
+    with pytest.raises(ValueError, match=rf"entity {entity}: Ball holds entity {a} at .* at most 1e\+08 m away"):
+        world.step()
+    joint.anchor = (0.5, 0)
     world.step()
     assert joints.of(c) == [entity]
     joint.b = 99
@@ -139,7 +174,7 @@ def test_ends_that_do_not_fit_the_world_are_refused_at_the_call():
     rope = world.create_entity(Distance(disc(world, (0, 0)), disc(world, (2, 0))))
     world.step()
     joint = world.component_for_entity(rope, Distance)
-    joint.anchor_b = 0.5
+    joint.anchor_b = (0.5, 0.5)
     world.step()
     assert joints.state(rope).value == pytest.approx(math.hypot(2.5, 0.5), abs=0.5)
     with pytest.raises(ValueError, match=r"Distance\.anchor_b must have 2 components"):
