@@ -12,6 +12,7 @@ from ...systems.contacts.solving.joints import POINT, TURN
 from ...systems.contacts.solving.records import JOINTS
 from .joint import WORLD, Changes, Joint, Place, Row
 from .kinds import KINDS, Ball, Cone, Distance, Hinge, Motor, MousePull, Slider, Weld
+from .measures import Holds, holds, measure
 
 # What rows are known by, and what they keep from step to step.
 KEY = ("joint", "kind", "rule", "entity_a", "entity_b")
@@ -61,6 +62,7 @@ class Joints(Plugin):
         self._joints: dict[int, Joint] = {}  # by entity, which ascend
         self._spans: dict[int, tuple[int, int]] = {}  # their rows
         self._connected: dict[int, bool] = {}  # which of them may touch
+        self._holds: list[Holds] | None = None  # what columns() measures, once they are asked for
         self._wanted: dict[str, Any] | None = None  # what rows are to begin with after going back
         self._breaking = False
         world.events.define("joint_lost", "joint_broken")
@@ -80,25 +82,24 @@ class Joints(Plugin):
         """Of the joint of that entity; KeyError if it has none that a step has taken."""
         if entity not in self._joints:
             raise KeyError(f"entity {entity!r} has no joint that a step has taken")
-        joint, (start, stop), flat = self._joints[entity], self._spans[entity], self._physics.dimensions == 2
+        start, stop = self._spans[entity]
         impulses, torques = self._given(start, stop)
-        impulse, torque, value, speed = impulses.sum(axis=0), torques.sum(axis=0), 0.0, 0.0
-        a, b = (self._moving(entity) for entity in (joint.a, joint.b))
-        point_a, point_b = a[0].point(joint.at_a), b[0].point(joint.at_b)
-        speed_a, speed_b = _speed_at(a, point_a), _speed_at(b, point_b)
-        if isinstance(joint, Distance):
-            value = float(np.linalg.norm(point_b - point_a))
-            speed = float((speed_b - speed_a) @ (point_b - point_a) / value) if value > 0.0 else 0.0
-        elif isinstance(joint, Slider):
-            along = a[0].axes @ joint.axis_a
-            value = float(along @ (point_b - point_a))
-            speed = float(along @ (speed_b - _speed_at(a, point_b)))
-        elif isinstance(joint, (Hinge, Weld, Motor, Cone)):
-            value, speed = _turned(joint, a, b)
-        return JointState(impulse, float(torque[0]) if flat else torque, value, speed)
+        torque = torques.sum(axis=0)
+        value, speed = measure(self._physics.table, holds([self._joints[entity]]), 1)
+        flat = self._physics.dimensions == 2
+        return JointState(impulses.sum(axis=0), float(torque[0]) if flat else torque, float(value[0]), float(speed[0]))
 
     def columns(self) -> dict[str, np.ndarray]:
-        """``entity (n,)``, ``impulse (n, d)`` and ``torque (n,)``, in 3D (n, 3), of all joints, as in :meth:`state`."""
+        """Of all joints what :meth:`state` has: ``entity (n,)``, ``impulse (n, d)``, ``torque (n,)``, in 3D (n, 3),
+        ``value (n,)`` and ``speed (n,)``."""
+        columns = self._done()
+        if self._holds is None:
+            self._holds = holds(self._joints.values())
+        value, speed = measure(self._physics.table, self._holds, len(self))
+        return columns | {"value": value, "speed": speed}
+
+    def _done(self) -> dict[str, np.ndarray]:
+        """What the joints have done in the last step."""
         starts = [start for start, _ in self._spans.values()]
         impulses, torques = self._given(0, self._record.count)
         if starts:
@@ -188,24 +189,22 @@ class Joints(Plugin):
         """Take hold of the bodies where they are."""
         try:
             self.check_component(joint, entity)
-            joint.attach(*(self._moving(body)[0] for body in (joint.a, joint.b)))
+            joint.attach(self._place(joint.a or WORLD), self._place(joint.b or WORLD))
         except ValueError as error:
             raise ValueError(f"{error}: set its fields, or world.delete_entity({entity})") from None
         joint.keep(attached=True)
 
-    def _moving(self, entity: int) -> tuple[Place, Any, Any]:
-        """(place, velocity, angular velocity) of a body or of the world."""
+    def _place(self, entity: int) -> Place:
+        """Where a body is, or the world."""
         d, table = self._physics.dimensions, self._physics.table
         if entity == WORLD:
-            return Place(np.zeros(d), np.eye(d), 0.0), np.zeros(d), 0.0 if d == 2 else np.zeros(3)
-        row, spin = self._row(entity), table.arrays.get("spin.angular_velocity")
+            return Place(np.zeros(d), np.eye(d), 0.0)
+        row = self._row(entity)
         rotation = table.column("rotation")[row]
         angle = float(rotation) if d == 2 else 0.0
         c, s = np.cos(angle), np.sin(angle)
         axes = np.array(((c, -s), (s, c))) if d == 2 else _matrix(rotation)
-        place = Place(table.column("position")[row].copy(), axes, angle)
-        w = np.zeros(1 if d == 2 else 3) if spin is None else np.reshape(spin[row], -1)
-        return place, table.column("linear_velocity")[row].copy(), float(w[0]) if d == 2 else w
+        return Place(table.column("position")[row].copy(), axes, angle)
 
     def _update(self) -> bool:
         """Fields were set, and no more: the rows of these joints as they are now. False if they are other rows."""
@@ -260,6 +259,7 @@ class Joints(Plugin):
 
     def _finish_changes(self, bodies: set[int]) -> None:
         """These bodies have had other rows; they wake if they sleep, and so do those whose joints have changed."""
+        self._holds = None
         self._breaking = any(joint.breaking_force is not None for joint in self._joints.values())
         for joint in self._joints.values():
             if joint.changed:
@@ -286,7 +286,7 @@ class Joints(Plugin):
         """Joints that have borne too much are gone."""
         if not self._breaking:
             return
-        columns, dt = self.columns(), world.settings.dt
+        columns, dt = self._done(), world.settings.dt
         force = np.linalg.norm(columns["impulse"], axis=1) / dt
         pairs = zip(self._joints.items(), force.tolist(), strict=True)
         broken = [(entity, joint) for (entity, joint), size in pairs if size > (joint.breaking_force or np.inf)]
@@ -309,22 +309,6 @@ def _by_row(columns: dict[str, Any]) -> dict[tuple[int, ...], tuple[Any, ...]]:
         seen[key] = seen.get(key, -1) + 1
         rows[*key, seen[key]] = tuple(column[j] for column in kept)
     return rows
-
-
-def _turned(joint: Joint, a: tuple[Place, Any, Any], b: tuple[Place, Any, Any]) -> tuple[float, float]:
-    """(angle of b against a about the axis of a joint, its change per second)."""
-    if len(a[0].position) == 2:
-        return b[0].angle - a[0].angle - joint.start, b[2] - a[2]
-    axis, side_a, side_b = a[0].axes @ joint.axis_a, a[0].axes @ joint.side_a, b[0].axes @ joint.side_b
-    angle = np.arctan2(axis @ np.cross(side_a, side_b), side_a @ side_b)
-    return float(angle), float(axis @ (b[2] - a[2]))
-
-
-def _speed_at(moving: tuple[Place, Any, Any], point: Any) -> Any:
-    """The velocity of a body's point."""
-    place, velocity, spin = moving
-    arm = point - place.position
-    return velocity + (np.cross(spin, arm) if len(arm) == 3 else spin * np.array((-arm[1], arm[0])))
 
 
 def _matrix(q: Any) -> np.ndarray:

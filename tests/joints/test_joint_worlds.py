@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from helpers_joints import G, at, chain, disc, gaps, joint_world, plank, run
 
-from carom import Phase, Physics, RigidBody, SphereCollider, StepError, System, Transform, World
+from carom import Phase, Physics, RigidBody, Settings, SphereCollider, StepError, System, Transform, World
 from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Motor, MousePull, Slider, Weld
 from carom.plugins.rotation import Rotation, Spin
 
@@ -507,3 +508,43 @@ def test_world_is_saved_with_its_forces_right_after_it_went_back(tmp_path):
     loaded = World.load(tmp_path / "chain.carom", Physics(dimensions=2), Rotation(), Joints())
     run(loaded, 40)
     assert loaded.state_hash() == later
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("d", [2, 3])
+def test_columns_have_values_and_the_speeds_at_which_these_change(d):
+    """Of thrown bodies, some of which are held by the world; numbers are those of state()."""
+    joints = Joints()
+    world = World(Physics(dimensions=d), Rotation(), joints, settings=Settings(dt=1e-4))
+    generator = np.random.default_rng(3)
+
+    def body(x):
+        place = (x, 0) if d == 2 else (x, 0, 0)
+        turn = 0.3 if d == 2 else generator.normal(size=4)
+        w = generator.normal() if d == 2 else generator.normal(size=3)
+        spin = Spin(w, inertia=1.0 if d == 2 else np.ones(3))
+        return world.create_entity(Transform(place, turn), RigidBody(linear_velocity=generator.normal(size=d)), spin)
+
+    axis: Any = {} if d == 2 else {"axis": (0.6, 0.0, 0.8)}
+    x, side = (1.0, 0.0) if d == 2 else (1.0, 0.0, 0.0), np.eye(d)[0] + np.eye(d)[1]
+    made = []
+    for first in (body, lambda x: None):
+        made += [
+            Distance(first(0), body(1), anchor_b=x, length=(0.0, 9.0)), Hinge(first(0), body(1), anchor=x, **axis),
+            Slider(first(0), body(1), direction=side), Weld(first(0), body(1), anchor=x),
+            Ball(first(0), body(1), anchor=x), Motor(first(0) or body(2), body(1), speed=1.0, max_torque=0.1, **axis),
+        ]  # fmt: skip
+    if d == 3:
+        made.append(Cone(body(0), body(1), anchor=x, swing=3.0, **axis))
+    entities = [world.create_entity(joint) for joint in made]
+    run(world, 20)
+    before = joints.columns()
+    world.step()
+    after = joints.columns()
+    assert after["entity"].tolist() == entities
+    for key in ("value", "speed"):
+        np.testing.assert_array_equal(after[key], [getattr(joints.state(entity), key) for entity in entities])
+    exact = np.array([isinstance(joint, Distance | Hinge | Slider) for joint in made])  # others let their axis go
+    change = (after["value"] - before["value"]) / 1e-4
+    np.testing.assert_allclose(change[exact], after["speed"][exact], rtol=1e-3, atol=1e-3)
+    assert (abs(after["speed"][exact]) > 0.01).all()

@@ -1,0 +1,115 @@
+"""What joints measure: where b is against a, and how fast that changes; of all joints at once."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .joint import Joint
+from .kinds import Cone, Distance, Hinge, Motor, Slider, Weld
+
+
+class Holds(NamedTuple):
+    """Where joints of one kind hold their bodies, along the axes of these."""
+
+    measure: Any  # (holds, moving a, moving b) -> ((n,) values, (n,) changes per second)
+    joints: np.ndarray  # (n,) which of all joints
+    a: np.ndarray  # (n,) entities
+    b: np.ndarray
+    at_a: np.ndarray  # (n, d)
+    at_b: np.ndarray
+    axis: np.ndarray  # of a
+    side_a: np.ndarray
+    side_b: np.ndarray
+    start: np.ndarray  # (n,)
+
+
+class Moving(NamedTuple):
+    """Where n bodies are, and how they move; the world stands at the origin."""
+
+    position: np.ndarray  # (n, d)
+    rotation: np.ndarray  # (n,) or (n, 4)
+    velocity: np.ndarray  # (n, d)
+    spin: np.ndarray  # (n,) or (n, 3)
+
+    def turned(self, vectors: np.ndarray) -> np.ndarray:
+        """Vectors along the axes of the bodies, in the world."""
+        if self.rotation.ndim == 1:
+            c, s = np.cos(self.rotation), np.sin(self.rotation)
+            x, y = vectors.T
+            return np.stack((c * x - s * y, s * x + c * y), axis=1)
+        real, axis = self.rotation[:, :1], self.rotation[:, 1:]
+        half = _cross(axis, vectors)
+        return vectors + 2.0 * (real * half + _cross(axis, half))
+
+    def speed_at(self, points: np.ndarray) -> np.ndarray:
+        """The velocities of the bodies' points that are there."""
+        arm = points - self.position
+        if self.spin.ndim == 1:
+            return self.velocity + self.spin[:, None] * np.stack((-arm[:, 1], arm[:, 0]), axis=1)
+        return self.velocity + _cross(self.spin, arm)
+
+
+def moving(table: Any, entities: np.ndarray) -> Moving:
+    """Of these bodies now."""
+    rows, d = table.rows_of(entities), table.dimensions
+    world, spin = rows < 0, table.arrays.get("spin.angular_velocity")
+    still = np.zeros((len(rows), 3) if d == 3 else len(rows))
+    position, rotation, velocity = (table.column(key)[rows] for key in ("position", "rotation", "linear_velocity"))
+    spin = still if spin is None else spin[rows]
+    for column in (position, rotation, velocity, spin):
+        column[world] = 0.0
+    if d == 3:
+        rotation[world, 0] = 1.0
+    return Moving(position, rotation, velocity, spin)
+
+
+def _length(of: Holds, a: Moving, b: Moving) -> tuple[np.ndarray, np.ndarray]:
+    point_a, point_b = a.position + a.turned(of.at_a), b.position + b.turned(of.at_b)
+    way = point_b - point_a
+    length = np.sqrt(_dot(way, way))
+    stretching = _dot(way, b.speed_at(point_b) - a.speed_at(point_a))
+    return length, stretching / np.where(length > 0.0, length, 1.0)
+
+
+def _way(of: Holds, a: Moving, b: Moving) -> tuple[np.ndarray, np.ndarray]:
+    point_a, point_b, axis = a.position + a.turned(of.at_a), b.position + b.turned(of.at_b), a.turned(of.axis)
+    return _dot(axis, point_b - point_a), _dot(axis, b.speed_at(point_b) - a.speed_at(point_b))
+
+
+def _angle(of: Holds, a: Moving, b: Moving) -> tuple[np.ndarray, np.ndarray]:
+    if a.spin.ndim == 1:
+        return b.rotation - a.rotation - of.start, b.spin - a.spin
+    axis, side_a, side_b = a.turned(of.axis), a.turned(of.side_a), b.turned(of.side_b)
+    return np.arctan2(_dot(axis, _cross(side_a, side_b)), _dot(side_a, side_b)), _dot(axis, b.spin - a.spin)
+
+
+MEASURES = {Distance: _length, Slider: _way, Hinge: _angle, Weld: _angle, Motor: _angle, Cone: _angle}
+
+
+def holds(joints: Collection[Joint]) -> list[Holds]:
+    """Of these joints as they are now."""
+    names, kinds = ("a", "b", "at_a", "at_b", "axis_a", "side_a", "side_b", "start"), {}
+    for index, joint in enumerate(joints):
+        function = MEASURES.get(type(joint))
+        if function is not None:
+            kinds.setdefault(function, []).append((index, *(getattr(joint, name) for name in names)))
+    return [Holds(function, *map(np.array, zip(*rows, strict=True))) for function, rows in kinds.items()]
+
+
+def measure(table: Any, found: list[Holds], count: int) -> tuple[np.ndarray, np.ndarray]:
+    """(count,) values, in m or rad, 0 of what has none, and their changes per second."""
+    value, speed = np.zeros(count), np.zeros(count)
+    for of in found:
+        value[of.joints], speed[of.joints] = of.measure(of, moving(table, of.a), moving(table, of.b))
+    return value, speed
+
+
+def _dot(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    return (u * v).sum(axis=1)
+
+
+def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    return u[:, [1, 2, 0]] * v[:, [2, 0, 1]] - u[:, [2, 0, 1]] * v[:, [1, 2, 0]]
