@@ -3,7 +3,7 @@
 The kinetic energy is a sum of three terms, M_k^2 / (2 I_k), and under each alone the body turns about axis k at a
 constant rate: exact, explicit, and the angular momentum stays what it is. One after the other, 1 2 3 2 1 with half
 steps but for the third, they are of order 2 and symplectic (S. Reich, "Momentum conserving symplectic integrators",
-1994).
+1994). The energy swings by that order, until ``turn_to_energy`` puts it right at the end.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import math
 from ...framework.compilation import part
 
 SWEEPS = 16  # of Jacobi rotations: each squares what is off the diagonal
+SPHERICAL = 1e-24  # square of the sine between momentum and angular velocity: less is none
 DIAGONAL = 1e-15  # of the trace: what is off the diagonal by less is rounding
 
 
@@ -58,14 +59,45 @@ def turned_about(q, m, k, angle):
 
 
 @part
+def energy_of(m, inverse):
+    """Twice the kinetic energy."""
+    return m[0] * m[0] * inverse[0] + m[1] * m[1] * inverse[1] + m[2] * m[2] * inverse[2]
+
+
+@part
+def turn_to_energy(q, m, inverse, gained):
+    """(rotation, momentum in its frame) of a body that has gained so much of :func:`energy_of` by splitting: the
+    momentum is turned in the body towards its angular velocity, and the body back, so that it stays where it is."""
+    square = m[0] * m[0] + m[1] * m[1] + m[2] * m[2]
+    if gained == 0.0 or not square > 0.0:
+        return q, m
+    mean = energy_of(m, inverse) / square  # of the inverse moments, along the momentum
+    x, y, z = m[0] * (inverse[0] - mean), m[1] * (inverse[1] - mean), m[2] * (inverse[2] - mean)
+    steep = x * x + y * y + z * z
+    if not steep > SPHERICAL * mean * mean * square:
+        return q, m
+    along, lacks = energy_of((x, y, z), inverse) / steep, -gained / square
+    steep = math.sqrt(steep / square)
+    left = steep * steep + (along - mean - lacks) * lacks
+    tangent = lacks / (steep + math.sqrt(left)) if left >= 0.0 else steep / (mean + lacks - along)  # of the angle
+    cosine = 1.0 / math.sqrt(1.0 + tangent * tangent)
+    share, half = tangent * cosine / steep, math.sqrt(0.5 + 0.5 * cosine)
+    back = -share / (2.0 * half * square)
+    axis = back * (m[1] * z - m[2] * y), back * (m[2] * x - m[0] * z), back * (m[0] * y - m[1] * x)
+    turned = product(q, (half, axis[0], axis[1], axis[2]))
+    return turned, (m[0] * cosine + x * share, m[1] * cosine + y * share, m[2] * cosine + z * share)
+
+
+@part
 def turn_freely(q, m, inverse, h):
-    """(rotation, momentum in its frame) after h seconds. q: unit quaternion of the principal axes; m: angular momentum
-    along them; inverse: 1 / principal moments."""
+    """(rotation, momentum in its frame, what splitting has added to :func:`energy_of`) after h seconds. q: unit
+    quaternion of the principal axes; m: angular momentum along them; inverse: 1 / principal moments."""
+    energy = energy_of(m, inverse)
     for place in range(5):
         k = place if place < 3 else 4 - place
         rate = m[0] * inverse[0] if k == 0 else (m[1] * inverse[1] if k == 1 else m[2] * inverse[2])
         q, m = turned_about(q, m, k, rate * (h if k == 2 else 0.5 * h))
-    return q, m
+    return q, m, energy_of(m, inverse) - energy
 
 
 @part

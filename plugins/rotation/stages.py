@@ -18,7 +18,7 @@ from ...framework.vectors import item, length, replace, scale
 from ...systems.forces.stages import is_zero
 from ...systems.integration.stages import CUBIC, LINE, phi1, phi2
 from ...systems.shapes.dispatch import second_moments
-from .free_rotation import diagonalised, product, rotate, turn_freely
+from .free_rotation import diagonalised, product, rotate, turn_freely, turn_to_energy
 
 TRIPLE = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))  # of the step: the outer two of Yoshida's three
 PARALLEL = 1e-9  # square of the sine between spin and angular momentum: less is none
@@ -97,10 +97,10 @@ def pushed(q, m, inverse, act, h):
 
 @part
 def turn_between_pushes(q, m, inverse, act, h):
-    """(q, m) after half of what pushes, the free turn, and the other half: of order 2."""
+    """(q, m, energy gained by splitting) after half of what pushes, the free turn, and the other half: of order 2."""
     m = pushed(q, m, inverse, act, 0.5 * h)
-    q, m = turn_freely(q, m, inverse, h)
-    return q, pushed(q, m, inverse, act, 0.5 * h)
+    q, m, gained = turn_freely(q, m, inverse, h)
+    return q, pushed(q, m, inverse, act, 0.5 * h), gained
 
 
 @part
@@ -147,18 +147,20 @@ def turn_in_space(state, spin, i, h):
     torque, most = (torque_on(spin, i, 0), torque_on(spin, i, 1), torque_on(spin, i, 2)), spin.max_angular_speed[i]
     act, q = (torque, spin.angular_damping[i]), product(rotation_in_space(state, i), own)
     along = rotate(q, limited(w, most), True)
-    m = along[0] * principal[0], along[1] * principal[1], along[2] * principal[2]
+    m, gained = (along[0] * principal[0], along[1] * principal[1], along[2] * principal[2]), 0.0
     if state.usual_path_degree == CUBIC:
         for place in range(3):
-            q, m = turn_between_pushes(q, m, inverse, act, h * (TRIPLE if place != 1 else 1.0 - 2.0 * TRIPLE))
+            q, m, more = turn_between_pushes(q, m, inverse, act, h * (TRIPLE if place != 1 else 1.0 - 2.0 * TRIPLE))
+            gained += more
     elif state.usual_path_degree > LINE:
-        q, m = turn_between_pushes(q, m, inverse, act, h)
+        q, m, gained = turn_between_pushes(q, m, inverse, act, h)
     elif state.moves_with_old_velocity:
-        q, m = turn_freely(q, m, inverse, h)
+        q, m, gained = turn_freely(q, m, inverse, h)
         m = pushed(q, m, inverse, act, h)
     else:
         m = pushed(q, m, inverse, act, h)
-        q, m = turn_freely(q, m, inverse, h)
+        q, m, gained = turn_freely(q, m, inverse, h)
+    q, m = turn_to_energy(q, m, inverse, gained)
     w = limited(rotate(q, (m[0] * inverse[0], m[1] * inverse[1], m[2] * inverse[2]), False), most)
     speed[i, 0], speed[i, 1], speed[i, 2] = w[0], w[1], w[2]
     set_rotation(state, i, product(q, (own[0], -own[1], -own[2], -own[3])))
@@ -342,7 +344,8 @@ def turn_on_in_space(state, spin, i, angle, dt):
         free = (product_of(d, w) * size - product_of(d, momentum) * both) / apart
     free = min(max(free, -dt), dt)
     about = (product_of(d, momentum) - free * both) / size  # what is left
-    q, m = turn_freely(q, m, inverse, free)
+    q, m, gained = turn_freely(q, m, inverse, free)
+    q, m = turn_to_energy(q, m, inverse, gained)
     set_rotation(state, i, product(q, (own[0], -own[1], -own[2], -own[3])))
     axis = replace(replace(replace(angle, 0, momentum[0]), 1, momentum[1]), len(angle) - 1, momentum[2])
     turn_about(state, i, scale(axis, about))

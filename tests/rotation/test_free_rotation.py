@@ -119,13 +119,13 @@ def test_the_free_top_is_that_of_jacobis_functions_at_the_order_of_the_method(me
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("method", ["semi_implicit_euler", "velocity_verlet", "yoshida4"])
-def test_momentum_and_the_quaternions_length_stay_and_energy_does_not_drift(method):
-    """100 s at 60 Hz: L to 1e-12 of itself, energy within dt^order, at the end as in between."""
+def test_momentum_energy_and_the_quaternions_length_stay(method):
+    """100 s at 60 Hz: to 1e-12 of themselves."""
     w, q, before, after = spin_top(method, 1 / 60, 100.0)
     assert np.linalg.norm(after - before) <= 1e-12 * np.linalg.norm(before)
     assert abs(np.linalg.norm(q) - 1) <= 1e-14
     energy, start = np.dot(MOMENTS, w * w), np.dot(MOMENTS, np.square(START))
-    assert abs(energy / start - 1) <= (1e-4 if FREE_ORDER[method] == 2 else 1e-8)
+    assert abs(energy / start - 1) <= 1e-12
 
 
 def test_the_middle_axis_flips_when_it_should():
@@ -165,7 +165,7 @@ def test_axes_that_are_not_the_bodys_own(seed):
         q = np.array(transform.rotation)
         w = turned((q[0], *-q[1:]), np.array(spin.angular_velocity))
     assert np.allclose(turned(q, tensor @ w), tensor @ w0, rtol=1e-11, atol=1e-11)
-    assert w @ tensor @ w == pytest.approx(w0 @ tensor @ w0, rel=1e-2)
+    assert w @ tensor @ w == pytest.approx(w0 @ tensor @ w0, rel=1e-12)
 
 
 def test_a_torque_changes_the_angular_momentum_by_itself_times_the_time():
