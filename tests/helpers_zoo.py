@@ -15,7 +15,8 @@ import numpy as np
 from carom.components import AABBCollider, Collider, RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Plugin, Settings, World, column
 from carom.framework.vectors import item, replace, scale
-from carom.plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
+from carom.plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, terrain, tile_grid
+from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Motor, MousePull, Slider, Weld
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 from carom.plugins.springs import Springs
 
@@ -126,6 +127,58 @@ def tumbling(d: int, mode: str) -> World:
         shape = capsule.CapsuleCollider(0.2, 0.3, friction=0.5) if k == 4 else shapes[k % 2]
         world.create_entity(Transform(at(d, 0.4 * k - 0.8, 1.1 + 0.62 * k), turned), body, spin, shape)
     world.create_entity(Transform(at(d, 0.5, 2.2)), RigidBody(), SphereCollider(0.2))
+    return world
+
+
+def joined(d: int, mode: str) -> World:
+    """Two bodies with each kind of joint, of each rule: held, limited, driven, sprung; beside them a floor."""
+    world = World(Physics(d, gravity=at(d, 0.5, -9.81)), Rotation(), Joints(), settings=Settings(collision=mode))
+    world.create_entity(Transform(at(d, 0.0, -0.9)), BoxCollider((40.0, 0.1, 9.0)[:d], friction=0.5))
+    axis, turned = at(d, 0.3, 1.0, 0.5), 0.4 if d == 2 else (1.0, 0.3, 0.1, 0.4)
+    about: dict[str, object] = {"axis": axis} if d == 3 else {}
+    joints = [
+        lambda a, b, x: Hinge(None, a, x, motor_speed=9.0, max_torque=2.0, limits=(-0.1, 0.2), **about),
+        lambda a, b, x: Hinge(a, b, x, frequency=2.0, damping_ratio=0.2, **about),
+        lambda a, b, x: Ball(a, b, x),
+        lambda a, b, x: Weld(a, b, x),
+        lambda a, b, x: Slider(a, b, axis, limits=(-0.01, 0.05), motor_speed=1.0, max_force=5.0),
+        lambda a, b, x: Slider(None, b, axis, frequency=3.0),
+        lambda a, b, x: Distance(a, b, anchor_a=at(d, 0.2)),
+        lambda a, b, x: Distance(a, length=(0.0, 0.1)),
+        lambda a, b, x: Distance(a, b, frequency=4.0, damping_ratio=0.5),
+        lambda a, b, x: Motor(a, b, speed=2.0, max_torque=1.0, **about),
+        lambda a, b, x: Motor(b, angle=0.5, **about),
+        lambda a, b, x: MousePull(a, x, at(d, 1.0, 2.0), max_force=50.0),
+        *([lambda a, b, x: Cone(a, b, x, axis, swing=0.05, twist=(-0.02, 0.02))] if d == 3 else []),
+    ]
+    for k, joint in enumerate(joints):
+        ends = [
+            world.create_entity(
+                Transform(at(d, 3.0 * k - 18.0 + x, y), turned), RigidBody(1.0 + x), Spin(),
+                BoxCollider((0.3, 0.2, 0.25)[:d], friction=0.5),
+            )
+            for x, y in ((0.0, 0.0), (0.8, -0.4))
+        ]  # fmt: skip
+        world.create_entity(joint(*ends, at(d, 3.0 * k - 17.5, 0.3, 0.1)))
+    return world
+
+
+def ground(d: int, mode: str) -> World:
+    """What rolls, slides, lands and is buried on hills."""
+    plugins = Rotation(), terrain.plugin, capsule.plugin
+    world = World(Physics(d, gravity=at(d, 0.0, -9.81)), *plugins, settings=Settings(collision=mode))
+    height = 0.4 * np.sin(1.7 * np.arange(12.0 if d == 2 else 6.0))
+    if d == 2:
+        terrain.create_chain(world, np.stack((np.arange(12.0), height), axis=1), thickness=0.1, friction=0.3)
+    else:
+        field = height[:, None] + 0.1 * np.arange(4.0)
+        terrain.create_height_field(world, field, 1.0, position=(0.0, 0.0, -1.5), thickness=0.1, friction=0.3)
+    for k in range(10 if d == 2 else 4):
+        shapes = SphereCollider(0.3), BoxCollider((0.3, 0.2, 0.25)[:d]), capsule.CapsuleCollider(0.15, 0.2)
+        place = at(d, 0.5 + k, height[k] + 0.1 * (k % 5), 0.1 * k - 0.4)
+        turned = 0.5 * k if d == 2 else (1.0, 0.2 * k, 0.3, 0.1)
+        body = RigidBody(linear_velocity=at(d, 2.0 - k % 3, -6.0), ccd=k % 4 == 0)
+        world.create_entity(Transform(place, turned), body, Spin(), shapes[k % 3])
     return world
 
 
@@ -298,7 +351,9 @@ def scenarios() -> Iterator[tuple[str, Callable[[], list[str]]]]:
         yield f"buried {d}D", lambda d=d: play(buried(d), 3)
         yield f"heavy on light {d}D", lambda d=d: play(heavy_on_light(d), 2)
         yield f"asked {d}D", lambda d=d: asked(d)
-        yield f"tumbling {d}D", lambda d=d: play(tumbling(d, MODES[d - 2]))
+        yield f"tumbling {d}D", lambda d=d: play(tumbling(d, MODES[d - 2]), 9)
+        yield f"joined {d}D", lambda d=d: play(joined(d, MODES[0]), 8)
+        yield f"ground {d}D", lambda d=d: play(ground(d, MODES[d - 2]), 5)
     for d, mode in zip((2, 3, 2), MODES, strict=True):
         yield f"sleepers {d}D {mode}", lambda d=d, mode=mode: sleepers(d, mode)
 

@@ -13,7 +13,6 @@ from scipy.optimize import nnls
 from worlds import both_dimensions
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework.jit.lazy import JIT
 from carom.lab import testing as kit
 
 pytestmark = pytest.mark.early
@@ -122,13 +121,12 @@ def test_many_fast_bodies_in_several_rounds(mode, d):
         assert world.stats().counters["rounds"] > 0
 
 
-@pytest.mark.plain
 @both_dimensions
 @pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
 def test_several_strike_one_at_the_same_time(mode, d):
     """Of any mass and restitution: each pair parts at e times its approach or faster, p >= 0, p (A p - wanted) = 0."""
     rng = np.random.default_rng(5)
-    for _ in range(8 if JIT else 2):
+    for _ in range(8):
         world = kit.make_world(d, collision=mode, max_impacts_per_step=CAP)
         struck, striking, wanted, ways = kit.ball(world, np.zeros(d), restitution=0.5), [], [], []
         masses, restitutions = rng.uniform(0.5, 2, 2 * d), rng.choice([0.5, 1.0], 2 * d)
@@ -181,12 +179,11 @@ def test_beyond_the_cap_nothing_is_lost(d, cap, pillar):
     assert capped > 0
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("cap", [1, 2])
 @each_sweep
 def test_what_loses_energy_sticks(mode, cap):
     """Plastic balls fly into a corner in a row: none passes its walls, and energy is not raised."""
-    for seed in range(4 if JIT else 1):
+    for seed in range(4):
         rng = np.random.default_rng(seed)
         world = mode_world(mode, 2, max_impacts_per_step=cap)
         kit.box(world, (1.0, 0.0), half=(0.05, 3.0), kind="static")

@@ -313,7 +313,6 @@ def test_joined_bodies_sleep_and_wake_together():
     assert at(world, bodies[2]).y > before[2]
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("kind", [Ball, Distance])
 def test_pendulum_in_space_keeps_its_moment_about_the_vertical(kind):
     world = World(Physics(dimensions=3, gravity=(0, 0, -G)), Rotation(), Joints())

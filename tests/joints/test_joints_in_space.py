@@ -67,7 +67,6 @@ def test_hinge_has_a_motor_and_limits():
     np.testing.assert_allclose(spin_of(world, body), 0.0, atol=1e-6)
 
 
-@pytest.mark.plain
 def test_motor_turns_to_an_angle_in_space():
     world, joints = space(0)
     body = world.create_entity(Transform((0, 0, 0), TURN), RigidBody(), Spin(inertia=np.full(3, 2.0)))
@@ -76,7 +75,6 @@ def test_motor_turns_to_an_angle_in_space():
     assert joints.state(motor).value == pytest.approx(1.0, abs=0.01)
 
 
-@pytest.mark.plain
 def test_welded_blocks_fly_as_one():
     world, _ = space(0)
     a, b = block(world, (0, 0, 0), rotation=TURN), block(world, (1, 0.3, 0))
@@ -95,7 +93,6 @@ def test_welded_blocks_fly_as_one():
     assert product == pytest.approx(math.cos(0.3), abs=0.01)  # half the angle between both
 
 
-@pytest.mark.plain
 def test_slider_in_space_stops_at_its_limit():
     world, joints = space()
     along = np.array((0.6, 0.0, -0.8))

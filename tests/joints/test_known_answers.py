@@ -114,7 +114,6 @@ def test_free_chain_keeps_its_momentum():
     assert world.kinetic_energy() < before
 
 
-@pytest.mark.plain
 def test_spring_has_its_period_and_decay():
     world, _ = joint_world(0)
     body = disc(world, (0, -1.3))
@@ -130,7 +129,6 @@ def test_spring_has_its_period_and_decay():
     assert 0.6 < decay < 0.85  # 2 pi 0.1 / sqrt(0.99) = .63 with many substeps
 
 
-@pytest.mark.plain
 def test_rope_never_pushes_and_holds():
     world, joints = joint_world()
     body = disc(world, (0, -0.2))
@@ -148,7 +146,6 @@ def test_rope_never_pushes_and_holds():
     assert at(world, body).y == pytest.approx(-0.5, abs=1e-3)
 
 
-@pytest.mark.plain
 def test_slider_obeys_the_incline_and_stops_at_its_limit():
     slope = -math.radians(30)
     along = np.array((math.cos(slope), math.sin(slope)))
@@ -165,7 +162,6 @@ def test_slider_obeys_the_incline_and_stops_at_its_limit():
     assert at(world, body).rotation == pytest.approx(slope, abs=1e-4)
 
 
-@pytest.mark.plain
 def test_motor_gives_its_torque_then_its_speed():
     world, joints = joint_world(0)
     wheel = disc(world, (0, 0), 1.0, inertia=2.0)
@@ -180,7 +176,6 @@ def test_motor_gives_its_torque_then_its_speed():
     assert spin_of(world, wheel) == pytest.approx(-3.0, rel=1e-12)
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize(("share", "holds"), [(1.02, True), (0.98, False)])
 def test_motor_holds_a_pose_if_its_torque_is_enough(share, holds):
     world, _ = joint_world()
@@ -191,7 +186,6 @@ def test_motor_holds_a_pose_if_its_torque_is_enough(share, holds):
     assert (abs(at(world, arm).rotation) < 0.01) == holds
 
 
-@pytest.mark.plain
 def test_hinge_stops_at_its_limits():
     world, joints = joint_world()
     leaf = plank(world, (0.5, 0))
@@ -202,7 +196,6 @@ def test_hinge_stops_at_its_limits():
     assert joints.state(hinge).torque == pytest.approx(0.5 * math.cos(0.7) * G / 60, rel=1e-3)
 
 
-@pytest.mark.plain
 def test_mouse_lifts_a_body_which_sags_by_its_weight():
     world, _ = joint_world()
     body = disc(world, (0, 0))

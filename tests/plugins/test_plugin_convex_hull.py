@@ -183,7 +183,6 @@ def test_queries_and_casts_meet_it_as_it_is_turned():
         assert way.distance == pytest.approx(4.5 - half, abs=1e-9)
 
 
-@pytest.mark.plain
 def test_files_and_prefabs_keep_it_and_another_hull_can_be_assigned(tmp_path):
     prefab = ConvexHullCollider(OCTAHEDRON, friction=0.5)
     with ground("discrete") as world:

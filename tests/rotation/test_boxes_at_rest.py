@@ -15,7 +15,6 @@ from carom.plugins.convex_polygon import ConvexPolygonCollider
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 MODES = ("discrete", "continuous", "event_driven")
-PLAIN_MODES = (pytest.param("discrete", marks=pytest.mark.plain), "continuous", "event_driven")
 G = 9.81
 
 
@@ -53,7 +52,7 @@ def test_a_box_tips_where_its_centre_stands_over_its_edge(mode):
             assert (y, angle) == pytest.approx((0.25, -math.pi / 2), abs=2e-3)
 
 
-@pytest.mark.parametrize("mode", PLAIN_MODES)
+@pytest.mark.parametrize("mode", MODES)
 def test_a_box_slides_where_friction_ends_and_does_not_turn(mode):
     """At tan a = mu, 1 % to either side; with g (sin a - mu cos a), but for the first steps, in which it settles
     and keeps some mm/s."""
@@ -70,7 +69,6 @@ def test_a_box_slides_where_friction_ends_and_does_not_turn(mode):
         assert (y, angle) == pytest.approx((0.5, 0.0), abs=1e-6)
 
 
-@pytest.mark.plain
 def test_a_box_that_stands_on_its_corner_falls_to_its_side_and_rests():
     with ground() as world:
         entity = box(world, (0, 0.7), (0.5, 0.5), rotation=0.7)
@@ -129,7 +127,6 @@ def test_boxes_that_fall_askew_come_to_rest():
         assert world.contacts.depth.max() < 0.02
 
 
-@pytest.mark.plain
 def test_the_manifold_has_the_corners_that_bear_it():
     """Two in a plane; their impulses are its weight, and that of what stands on one side is at that corner."""
     with ground() as world:
@@ -280,7 +277,7 @@ def test_a_cube_that_falls_askew_comes_to_lie_on_a_side():
             assert world.kinetic_energy() < 1e-9
 
 
-@pytest.mark.parametrize("mode", PLAIN_MODES)
+@pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
 def test_endless_ground_bears_a_box_that_falls_askew_as_long_ground_does(d, mode):
     with World(

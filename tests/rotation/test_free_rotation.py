@@ -128,6 +128,7 @@ def test_momentum_energy_and_the_quaternions_length_stay(method):
     assert abs(energy / start - 1) <= 1e-12
 
 
+@pytest.mark.compiled
 def test_the_middle_axis_flips_when_it_should():
     """Dzhanibekov: the times at which w2 passes 0 are those of the closed form, to .01 s in 50 s at 60 Hz."""
     w0, times, closed = (0.01, 1.0, 0.01), [], []

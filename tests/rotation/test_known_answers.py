@@ -93,7 +93,6 @@ def test_a_rough_rod_sticks_with_its_end_and_rebounds_by_stronges_law(e, mode):
 # -- a gyroscope ----------------------------------------------------------------------------------
 
 
-@pytest.mark.plain
 def test_a_heavy_gyroscope_precesses_at_the_rate_of_its_weight_over_its_spin():
     """With a level axle, held at one end: M g l / (I w), exactly, if it starts with that. A step takes the torque as it
     stands at its start: of order 1."""

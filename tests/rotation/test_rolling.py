@@ -13,7 +13,6 @@ from carom.plugins import Physics
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 MODES = ("discrete", "continuous", "event_driven")
-PLAIN_MODES = (pytest.param("discrete", marks=pytest.mark.plain), "continuous", "event_driven")
 SHARE = {2: 1 / 2, 3: 2 / 5}  # inertia of a disc and a ball, over m r^2
 G = 9.81
 
@@ -43,7 +42,7 @@ def motion(world, entity):
     return v, np.array((0, 0, w) if np.ndim(w) == 0 else w)
 
 
-@pytest.mark.parametrize("mode", PLAIN_MODES)
+@pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
 def test_contacts_leave_nothing_faster_than_its_limit(d, mode):
     """Balls and boxes that skid at 12 m/s and would roll with 20 rad/s: after impacts and at rest, in each step."""
@@ -60,7 +59,6 @@ def test_contacts_leave_nothing_faster_than_its_limit(d, mode):
     assert max(fastest) == pytest.approx(2, rel=1e-14)
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("d", [2, 3])
 def test_rolling_friction_stops_a_ball_and_holds_it_on_a_slope(d):
     """On level ground it slows by (b / r) g / (1 + I / m r^2); it stays where tan a < b / r, 1 % to either side."""
@@ -86,7 +84,7 @@ def test_rolling_friction_stops_a_ball_and_holds_it_on_a_slope(d):
 # -- on a slope -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("mode", PLAIN_MODES)
+@pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
 def test_on_a_slope_it_rolls_or_slips_as_newton_says(d, mode):
     """g sin a / (1 + I / m r^2) while tan a < mu (1 + m r^2 / I), else g (sin a - mu cos a): 1 % to either side. The
@@ -121,7 +119,7 @@ def test_the_angle_follows_the_way(d):
 
 
 @pytest.mark.parametrize("d", [2, 3])
-@pytest.mark.parametrize("spin", [0.0, pytest.param(30.0, marks=pytest.mark.plain), -30.0])
+@pytest.mark.parametrize("spin", [0.0, 30.0, -30.0])
 def test_a_ball_that_slides_comes_to_roll_with_the_momentum_about_the_ground(d, spin):
     """m r v + I w about a point of the ground stays: v = (v0 - k r w0) / (1 + k), k = I / m r^2."""
     with plane(d, friction=0.3) as world:
@@ -273,7 +271,7 @@ def test_a_bar_that_turns_throws_with_the_speed_of_its_points(d, mode):
         assert v[1] == pytest.approx(u + e * (u + 2.0), rel=0.02)
 
 
-@pytest.mark.parametrize("mode", PLAIN_MODES)
+@pytest.mark.parametrize("mode", MODES)
 def test_a_bar_that_turns_slowly_lifts_and_carries(mode):
     """A ball that cannot slip has the velocity of the point that it touches, below its centre; it stays on the bar.
 

@@ -231,6 +231,7 @@ def test_what_spins_stays_awake_and_what_has_stopped_sleeps():
         assert angle == pytest.approx(4.0)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("way", range(4))
 def test_what_the_game_does_to_the_spin_of_a_sleeper_wakes_it(way):
     """It rolls then as one that never slept: m r v + I w about the ground stays, k = 1/2."""
