@@ -122,6 +122,7 @@ SPINS = Section(
     rolling_radius=floats(default=0.0),  # m: of a round body; 0: its surface moves as its centre
     rolling_friction=floats(),  # m
     turn=vectors(),  # rad, in the step
+    reach=floats(),  # m: how far turning moves points of the last level that has been measured, per rad, at most
 )  # fmt: skip
 FAILS = "the start of the step, for one that fails"
 UNDO = Section("body", "going back", FAILS, kept_previous=vectors(), kept_velocity=vectors())

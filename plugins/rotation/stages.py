@@ -286,7 +286,7 @@ def product_of(u, v):
         "mass", "quarantined", "shapes", "levels", "offset", "rotation", "spin.inertia", "spin.angular_velocity",
         "spin.rolling_friction",
     ),
-    writes=("spin", "inverse_inertia", "inverse_products", "rolling_radius", "rolling_friction", "turn"),
+    writes=("spin", "inverse_inertia", "inverse_products", "rolling_radius", "rolling_friction", "turn", "reach"),
     needed="colliders or joints",
 )  # fmt: skip
 def share_spins(state, dt, spin):

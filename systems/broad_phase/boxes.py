@@ -6,9 +6,10 @@ import math
 
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, item, length, replace, scale
+from ...framework.vectors import add, item, replace, scale
 from ..ccd.search_bounds import GIVE, find_margins, place_at
 from ..codes import OK
+from ..integration.turning import size_of_turn
 from ..linking.parts import BOUND_SEARCHES, call_bound_searches
 from ..shapes.dispatch import half_extents, write_rotated
 from ..shapes.tolerances import reach_of
@@ -72,6 +73,8 @@ def find_extents(state, level, start, stop):
         smallest = smallest_of(half)
         extent = 2.0 * smallest if smallest < math.inf else 0.0  # what has no end is to others as a point
         bodies.half_extents[i], bodies.min_extent[i] = half, extent
+        if state.spinning:
+            bodies.reach[i] = reach_of(half, bodies.level_offsets[level, i])
         thinnest = extent if 0.0 < extent < thinnest else thinnest
     return thinnest
 
@@ -134,8 +137,9 @@ def hold_turns(state, start, stop):
     """Boxes hold what bodies sweep by turning: they are those of shapes as they are turned where the step ends."""
     bodies = state.bodies
     for i in range(start, stop):
-        if length(bodies.turn[i]) > 0.0 and bodies.rolling_radius[i] == 0.0:
-            way = min(length(bodies.turn[i]), 2.0) * reach_of(bodies, i)
+        angle = size_of_turn(bodies.turn[i])
+        if angle > 0.0 and bodies.rolling_radius[i] == 0.0:
+            way = min(angle, 2.0) * bodies.reach[i]
             lower, upper = bodies.lower[i], bodies.upper[i]
             for k in range(len(lower)):
                 lower, upper = replace(lower, k, item(lower, k) - way), replace(upper, k, item(upper, k) + way)

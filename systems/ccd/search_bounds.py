@@ -25,7 +25,7 @@ from ..integration.trajectory import (
 )
 from ..linking.parts import FIRST_TOUCH, call_first_touch
 from ..shapes.dispatch import restitution_of
-from ..shapes.tolerances import contact_margin, is_turning, reach_of, smaller_extent, turning_travel
+from ..shapes.tolerances import contact_margin, is_turning, smaller_extent, turning_travel, way_of_turning
 from .time_of_impact import APART, bounds_stay_disjoint
 
 DISCRETE, CONTINUOUS, EVENT_DRIVEN = range(3)
@@ -54,7 +54,7 @@ def turns_far(state, a, b):
     bodies = state.bodies
     if len(bodies.axes) == 0:
         return False
-    way_a, way_b = length(bodies.turn[a]) * reach_of(bodies, a), length(bodies.turn[b]) * reach_of(bodies, b)
+    way_a, way_b = way_of_turning(bodies, a, bodies.turn[a]), way_of_turning(bodies, b, bodies.turn[b])
     far = FAST * smaller_extent(bodies, a, b)
     if way_a + way_b <= far:
         return False

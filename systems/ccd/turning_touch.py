@@ -19,7 +19,7 @@ from ..integration.turning import arms_to, closing_by_spin, is_turned
 from ..shapes.convex.points import MOST_POINTS, contact_points
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch
 from ..shapes.poses import turn_shape
-from ..shapes.tolerances import reach_of, slop_of
+from ..shapes.tolerances import slop_of, way_of_turning
 
 LOOKS, EXACT_LOOKS = 250, 60
 NEAR = 1e-6  # of the extent: a smaller gap is a touch; of bodies at rest,
@@ -53,7 +53,7 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
     point below which a touch is one only if no faster one follows; -inf: any is one, at corners too)."""
     bodies, (spin_a, spin_b), (since, until), (slop, near, threshold) = state.bodies, spins, times, limits
     shape_a, shape_b = bodies.shape[a], bodies.shape[b]
-    turning = length(spin_a) * reach_of(bodies, a) + length(spin_b) * reach_of(bodies, b)
+    turning = way_of_turning(bodies, a, spin_a) + way_of_turning(bodies, b, spin_b)
     graze = max(GRAZE * slop, (turning * (until - since) + travel_of(path, until)) / (LOOKS - EXACT_LOOKS))
     bend = 2.0 * length(path[2]) + 6.0 * length(path[3]) * until
     corners = threshold < 0.0 or (is_turned(bodies, a) and is_turned(bodies, b))  # of others, too

@@ -7,6 +7,7 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..codes import NEED_COLUMNS, NEED_SOLVER, OK
 from ..integration.trajectory import along, path_of
+from ..integration.turning import size_of_turn
 from .constants import FREQUENCY, SAG, TIPPING_FREQUENCY, TIPPING_SAG
 from .points import points_of
 from .solving.islands import order_rows
@@ -78,7 +79,7 @@ def gather(state, dt):
         v, x, a = nothing, nothing, nothing
         if i < state.moving:
             v = bodies.start_velocity[i]
-            spins = state.spinning and length(bodies.spin[i]) > 0.0
+            spins = state.spinning and size_of_turn(bodies.spin[i]) > 0.0
             if inverse_mass[i] == 0.0 and (dot(v, v) > 0.0 or spins):
                 solver.mover[solver.movers] = q
                 solver.movers += 1

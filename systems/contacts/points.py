@@ -8,7 +8,7 @@ from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, length, row, scale, store, sub
 from ..ccd.search_bounds import FAST
 from ..ccd.turning_touch import first_touch_of_turn
-from ..integration.turning import cross_spin, is_turned, turn_of_arm
+from ..integration.turning import cross_spin, is_turned, size_of_turn, turn_of_arm
 from ..narrow_phase.manifolds import centre_offset_at_start, evaluate_pair, forget_manifold, has_manifold
 from ..shapes.convex.points import MOST_POINTS, contact_points
 from ..shapes.linking.convex_by_address import convex_at, rounding_by_address
@@ -50,7 +50,7 @@ def lay_arms(state, dt, r, gap):
     store(places, 0, point)
     gaps[0] = gap
     if rows > 1:
-        tilt = TILT + dt * (length(bodies.spin[a]) + length(bodies.spin[b]))
+        tilt = TILT + dt * (size_of_turn(bodies.spin[a]) + size_of_turn(bodies.spin[b]))
         margin = turning_margin(state, dt, a, b)
         count = contact_points(state, (a, b), d, (-gap, normal, point), (margin, tilt), places, gaps)
     round_a, round_b = rounding_of(state, a), rounding_of(state, b)
@@ -78,7 +78,7 @@ def slides_past(state, a, b, normal, arm_a, arm_b):
     bodies = state.bodies
     if len(normal) == 2:
         return False
-    reach = min(reach_of(bodies, a), reach_of(bodies, b))
+    reach = min(reach_of(bodies.half_extents[a], bodies.offset[a]), reach_of(bodies.half_extents[b], bodies.offset[b]))
     way = abs(dot(cross_spin(bodies.turn[a], arm_a), normal)) + reach * length(cross_spin(bodies.turn[a], normal))
     way += abs(dot(cross_spin(bodies.turn[b], arm_b), normal)) + reach * length(cross_spin(bodies.turn[b], normal))
     return way <= FAST * smaller_extent(bodies, a, b)

@@ -11,7 +11,7 @@ from ..ccd.search_bounds import FAST, is_swept, turns_far
 from ..ccd.turning_touch import first_touch_of_turn
 from ..codes import OK
 from ..impacts.impulses import STOPPED, is_beyond_cap, is_rattling
-from ..integration.turning import arms_to, closing_by_spin
+from ..integration.turning import arms_to, closing_by_spin, size_of_turn
 from ..narrow_phase.manifolds import (
     centre_offset,
     centre_offset_at_start,
@@ -94,7 +94,7 @@ def still_bounces(state, dt, c, depth, normal):
     slop, fixed, extent = slop_of(state, a, b), state.restitution_threshold, smaller_extent(bodies, a, b)
     threshold = fixed if fixed >= 0.0 else (contact_margin(state, dt, a, b) - slop) / dt
     speed = dot(sub(velocity[b], velocity[a]), normal)
-    if state.spinning and length(bodies.spin[a]) + length(bodies.spin[b]) > 0.0:
+    if state.spinning and size_of_turn(bodies.spin[a]) + size_of_turn(bodies.spin[b]) > 0.0:
         d = centre_offset(bodies, a, b)
         _, _, _, point = evaluate_pair(state, a, b, d)
         speed += closing_by_spin(bodies, a, b, arms_to(bodies, a, b, normal, point, d), normal)

@@ -105,9 +105,15 @@ def compliance(bodies, i, arm, along):
 
 
 @inlined
+def size_of_turn(turn):
+    """Of a turn or a spin: its angle or its rate."""
+    return abs(item(turn, 0)) if len(turn) == 2 else length(turn)
+
+
+@inlined
 def is_turned(bodies, i):
     """Whether contacts turn body i by pushing along their normals: it is not round."""
-    return length(bodies.inverse_inertia[i]) > 0.0 and bodies.rolling_radius[i] == 0.0
+    return size_of_turn(bodies.inverse_inertia[i]) > 0.0 and bodies.rolling_radius[i] == 0.0
 
 
 @inlined

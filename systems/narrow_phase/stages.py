@@ -5,6 +5,7 @@ from __future__ import annotations
 from ...framework.compilation import inlined, part
 from ...framework.vectors import dot, length, sub
 from ..codes import NEED_ORDER, NEED_PAIRS, OK, RUN_BROAD
+from ..integration.turning import size_of_turn
 from ..shapes.dispatch import evaluate_batch
 from .manifolds import is_near, mark_early
 
@@ -166,7 +167,7 @@ def find_fast_turns(state):
     moment of it."""
     bodies = state.bodies
     for i in range(state.first, state.moving if not state.sweeping else 0):
-        if bodies.rolling_radius[i] == 0.0 and length(bodies.turn[i]) > FOLLOWED:
+        if bodies.rolling_radius[i] == 0.0 and size_of_turn(bodies.turn[i]) > FOLLOWED:
             state.turns_too_far = i + 1
 
 

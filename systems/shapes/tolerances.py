@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ...framework.compilation import inlined
 from ...framework.vectors import length
+from ..integration.turning import size_of_turn
 
 SLOP = 0.005  # of the extent of the smaller body
 MARGIN_STEPS = 2.0
@@ -43,11 +44,16 @@ def contact_margin(state, dt, a, b):
 
 
 @inlined
-def reach_of(bodies, i):
-    """How far from its centre of mass turning moves points of body i, at most: none of a round one."""
-    if bodies.rolling_radius[i] > 0.0:
-        return 0.0
-    return min(length(bodies.half_extents[i]) + length(bodies.offset[i]), ENDLESS)
+def reach_of(half, at):
+    """How far from a body's centre of mass a box reaches around what is ``at`` from there, at most."""
+    return min(length(half) + length(at), ENDLESS)
+
+
+@inlined
+def way_of_turning(bodies, i, turn):
+    """How far turning so much moves points of body i, at most: none of a round one. As long for rates."""
+    angle = size_of_turn(turn)
+    return angle * bodies.reach[i] if angle > 0.0 and bodies.rolling_radius[i] == 0.0 else 0.0
 
 
 @inlined
@@ -56,7 +62,7 @@ def turning_travel(state, span, a, b):
     bodies, spin = state.bodies, state.bodies.spin
     if not state.spinning:
         return 0.0
-    return span * length(spin[a]) * reach_of(bodies, a) + span * length(spin[b]) * reach_of(bodies, b)
+    return span * (way_of_turning(bodies, a, spin[a]) + way_of_turning(bodies, b, spin[b]))
 
 
 @inlined
