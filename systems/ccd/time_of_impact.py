@@ -22,7 +22,7 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import absolute, add, add_scaled, dot, item, length, scale, sub
 from ..integration.trajectory import ROUNDING, along, bend_of, first_root, is_straight, rate_along
-from ..integration.turning import is_turned
+from ..integration.turning import is_turned, turn_of_arm
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, sweep
 from ..shapes.tolerances import is_turning, smaller_extent
 from .turning_touch import NEAR, closing_point, touch_of_turning
@@ -69,7 +69,10 @@ def first_touch(state, a, b, path, since, until, limits):
         found, (t, normal, point, at), _ = touch_of_turning(
             state, a, b, path, spins, (since, until), (limits[0], near, limits[2])
         )
-        return (TOUCHES if found else APART), t, normal, point, at
+        # Offsets of colliders stand as where the step ends: seen from there, so that arms are right.
+        shift_a = turn_of_arm(scale(spins[0], t - until), state.bodies.offset[a])
+        shift_b = turn_of_arm(scale(spins[1], t - until), state.bodies.offset[b])
+        return (TOUCHES if found else APART), t, normal, add(point, shift_a), sub(at, sub(shift_b, shift_a))
     if not both_convex(state, shape_a, shape_b):
         return march(state, a, b, path, since, until, limits)
     t, known, met, share = since, False, False, 0.0

@@ -51,6 +51,24 @@ def run(world, steps):
 
 @pytest.mark.plain
 @pytest.mark.parametrize("mode", MODES)
+def test_colliders_beside_their_body_bounce_without_loss(mode):
+    """They are struck where they are at the time of the impact, not where the step ends."""
+    random = np.random.default_rng(4)
+    with empty(collision=mode) as world:
+        for place in itertools.product((0.0, 2.5), (0.0, 2.5)):
+            velocity, spin = random.normal(0.0, 2.0, 2) - np.array(place) + 1.25, random.normal(0.0, 3.0)
+            box(world, place, (0.2, 0.8), velocity, spin, offset=(0.5, 0.3), restitution=1.0)
+        before, momentum, struck = world.kinetic_energy(), world.momentum(), 0
+        for _ in range(240):
+            world.step()
+            struck += len(world.contacts)
+        assert struck > 2
+        assert world.kinetic_energy() == pytest.approx(before, rel=1e-12)
+        assert world.momentum() == pytest.approx(momentum, rel=1e-12)
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("mode", MODES)
 def test_a_rod_that_is_struck_off_centre_turns(mode):
     """By an elastic ball at h: J = 2 v / (1/m + 1/M + h^2 / I). The other end stays at rest if h is l / 6, as that is
     the centre of percussion, and the rod is thin."""
