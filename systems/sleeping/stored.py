@@ -16,7 +16,7 @@ from ...framework.jit.records.record import Record
 Columns = dict[str, np.ndarray]
 
 CONTACTS = ("entity_a", "entity_b", "point", "normal", "depth", "impulse", "enabled", "rested")
-IMPULSES = ("entity_a", "entity_b", "normal", "impulse", "tangent", "push", "closing")
+IMPULSES = ("entity_a", "entity_b", "place", "normal", "impulse", "tangent", "push", "closing")
 
 
 def merged(one: Columns, other: Columns) -> tuple[Columns, np.ndarray]:

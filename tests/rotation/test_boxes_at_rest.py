@@ -290,3 +290,26 @@ def test_endless_ground_bears_a_box_that_falls_askew_as_long_ground_does(d, mode
             world.step()
         assert world.component_for_entity(entity, Transform).y == pytest.approx(0.5, abs=1e-4)
         assert np.abs(world.component_for_entity(entity, Spin).angular_velocity).max() < 1e-9
+
+
+@pytest.mark.plain
+def test_what_rests_does_not_notice_that_another_one_wakes():
+    """The impulses of its contacts stay at their points, where those of the other come back among them."""
+    ends = []
+    for wakes in (False, True):
+        with World(Physics(2, gravity=(0, -9.81)), Rotation(), settings=Settings(sleeping=True)) as world:
+            world.create_entity(Transform((0, -1)), BoxCollider((20, 1), friction=0.5))
+
+            sleeper, other = (
+                world.create_entity(Transform(place), RigidBody(), Spin(), BoxCollider((0.3, 0.2), friction=0.5))
+                for place in ((-5.0, 0.2), (5.0, 6.0))
+            )
+            for _ in range(72):  # it has landed, but does not sleep yet
+                world.step()
+            if wakes:
+                world.component_for_entity(sleeper, RigidBody).apply_impulse((-1.0, 0.0))
+            world.step()
+            assert world.component_for_entity(sleeper, RigidBody).asleep is not wakes
+            place, motion = (world.component_for_entity(other, one) for one in (Transform, RigidBody))
+            ends.append((place.position.tolist(), place.rotation, motion.linear_velocity.tolist()))
+    assert ends[0] == ends[1]
