@@ -16,6 +16,10 @@ GEOMETRY_MODES = ("precise", "bounds")
 FAULT_MODES = ("warn", "raise", "ignore")
 DISCRETE_CAP = 8  # impacts of a body in a step: where many overlap at its end, more cost much and change little
 SWEPT_CAP = 64  # a fast body may well cross a narrow gap so often
+# What other engines call a field: only for messages about a wrong name.
+OTHER_WORDS = {
+    "iterations": "substeps", "velocity_iterations": "substeps", "solver_iterations": "substeps", "timestep": "dt",
+}  # fmt: skip
 AUTOMATIC = "automatic"  # the broad phase that suits the scene
 
 
@@ -141,7 +145,8 @@ def _refuse_unknown(values: dict[str, Any]) -> None:
     known = [field.name for field in dataclasses.fields(Settings)]
     for name in values:
         if name not in known:
-            raise TypeError(f"Settings has no field {name!r}{did_you_mean(name, known)}; it has {', '.join(known)}")
+            near = did_you_mean(name, known, OTHER_WORDS)
+            raise TypeError(f"Settings has no field {name!r}{near}; it has {', '.join(known)}")
 
 
 _generated = Settings.__init__

@@ -316,7 +316,8 @@ IMPACTS = Schema(
     group_visits=integer(),  # impacts in all passes over groups of this step
     # what has happened in this step
     logged=integer(),
-    capped=integer(),
+    capped=integer(),  # impacts beyond the cap,
+    capped_row=integer(),  # and the body of the first of them
     looked=integer(),  # pairs searched for their next impact in this step
     rounds=integer(),  # of pairs for what is left of the step
     halted=integer(),  # bodies that were stopped because these were too many,

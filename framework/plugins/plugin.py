@@ -6,12 +6,14 @@ import functools
 import inspect
 import weakref
 from collections.abc import Callable, Iterable
+from types import ModuleType
 from typing import Any, ParamSpec, TypeVar
 
 from ..compilation import inlined, part, pasted
 from ..data.component import Component
 from ..errors import PluginError
 from ..jit.records.schema import Schema
+from ..settings import Settings
 from ..vectors import dot, scale
 from . import checks
 from .registry import Convex, Pair, PluginStage, Registry, Shape
@@ -355,4 +357,20 @@ def _no_rounding(shape):
     return 0.0
 
 
-__all__ = ["Convex", "Plugin"]
+def instead_of(thing: Any) -> str:
+    """What may be meant by what is no plugin; goes behind it in a message."""
+    if isinstance(thing, Settings):
+        return "; settings go by name: World(..., settings=...)"
+    names: list[str] = []
+    if isinstance(thing, type) and issubclass(thing, Plugin):
+        names = [f"{thing.__name__}()"]
+    elif isinstance(thing, ModuleType):
+        own, name = vars(thing), thing.__name__
+        classes = [value for value in own.values() if isinstance(value, type) and value.__module__ == name]
+        names = [f"{kind.__name__}()" for kind in classes if issubclass(kind, Plugin)]
+        names = names or [key for key, value in own.items() if isinstance(value, Plugin)]
+        names = [f"{name.rpartition('.')[2]}.{one}" for one in names]
+    return f" (did you mean {' or '.join(names)}?)" if names else ""
+
+
+__all__ = ["Convex", "Plugin", "instead_of"]

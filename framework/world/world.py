@@ -17,7 +17,7 @@ from ..data.component import Component
 from ..errors import CaromError, NoPhysicsError, PluginError
 from ..jit.records.record import Record
 from ..jit.records.schema import Schema
-from ..plugins.plugin import Plugin
+from ..plugins.plugin import Plugin, instead_of
 from ..plugins.registry import Registry
 from ..schedule.clock import Clock
 from ..schedule.phases import ForceSystem, Phase, System
@@ -65,7 +65,7 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
             raise TypeError(f"settings must be Settings, got {settings!r}")
         for plugin in plugins:
             if not isinstance(plugin, Plugin):
-                raise TypeError(f"World takes plugins, got {plugin!r}; settings go by name: World(..., settings=...)")
+                raise TypeError(f"World takes plugins, got {plugin!r}{instead_of(plugin)}")
         names = [plugin.name for plugin in plugins]
         for twice in (n for n in names if names.count(n) > 1):
             raise PluginError(f"a world takes one plugin named {twice!r}, got {names.count(twice)}")
@@ -167,7 +167,7 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
         self._open()
         self._pipeline.must_be_between_steps("a plugin can be added")
         if not isinstance(plugin, Plugin):
-            raise TypeError(f"add_plugin takes a plugin, got {plugin!r}")
+            raise TypeError(f"add_plugin takes a plugin, got {plugin!r}{instead_of(plugin)}")
         if any(plugin.name == other.name for other in self.plugins):
             raise PluginError(f"a plugin named {plugin.name!r} is in this world already")
         self.registry.add(plugin)

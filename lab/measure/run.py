@@ -17,6 +17,7 @@ from ...components import AABBCollider, SphereCollider
 from ...framework import World
 from ...framework.compilation import log
 from ...framework.schedule.profile_report import Stats, Totals
+from ...plugins.joints import Joints
 from ..engines.adapters import CaromEngine
 from .body_shapes import QUIET, dimensions_of
 from .observation import Observer
@@ -210,6 +211,8 @@ class Meter:
             reasons.append("systems of the game")
         if np.any(bodies.kinematic.linear_velocity):
             reasons.append("kinematic bodies that move")
+        if any(isinstance(plugin, Joints) and plugin.changes_energy for plugin in self.world.plugins):
+            reasons.append("joints that drive, spring or stop")
         if not self.engine.fixed:
             reasons.append("bodies that came or went")
         return reasons

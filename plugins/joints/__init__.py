@@ -8,7 +8,7 @@ import numpy as np
 
 from ...components import RigidBody
 from ...framework import NoPhysicsError, Plugin, World
-from ...systems.contacts.solving.joints import POINT, TURN
+from ...systems.contacts.solving.joints import HOLD, POINT, TURN
 from ...systems.contacts.solving.records import JOINTS
 from .joint import WORLD, Changes, Joint, Place, Row
 from .kinds import KINDS, Ball, Cone, Distance, Hinge, Motor, MousePull, Slider, Weld
@@ -77,6 +77,11 @@ class Joints(Plugin):
     def of(self, body: int) -> list[int]:
         """The joints at a body, by their entities."""
         return [entity for entity, joint in self._joints.items() if body in (joint.a, joint.b)]
+
+    @property
+    def changes_energy(self) -> bool:
+        """Whether any has a motor, a spring or a limit: energy comes and goes by intent."""
+        return bool((self._record.rule[: self._record.count] != HOLD).any())
 
     def state(self, entity: int) -> JointState:
         """Of the joint of that entity; KeyError if it has none that a step has taken."""

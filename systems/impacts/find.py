@@ -28,7 +28,17 @@ from ..narrow_phase.stages import rank_rows
 from ..shapes.dispatch import both_convex, evaluate, friction_of, is_corner_touch, restitution_of
 from ..shapes.tolerances import is_turning, slop_of, smaller_extent, turning_travel
 from .heap import heap_push
-from .impulses import CROSSING, HAND_OVER, IMPACT, NONE, STOPPED, is_beyond_cap, is_deflected, is_rattling
+from .impulses import (
+    CROSSING,
+    HAND_OVER,
+    IMPACT,
+    NONE,
+    STOPPED,
+    count_capped,
+    is_beyond_cap,
+    is_deflected,
+    is_rattling,
+)
 from .turning import respond
 
 QUICK = 1e-3  # of the step: inelastic impacts closer than this in time are treated as inelastic collapse
@@ -255,7 +265,8 @@ def queue_next_impact(state, c, since, dt):
                 return
     if kind not in (CROSSING, NONE) and is_beyond_cap(state, a, b):
         kind = kind_beyond_cap(state, a, b, path, t, speed, e, dt) if impacts.sweeps else NONE
-        impacts.capped += kind != HAND_OVER
+        if kind != HAND_OVER:
+            count_capped(state, a, b)
         e = 0.0 if kind == IMPACT else e
     if kind != NONE:
         queue_event(state, c, kind, path, touch, speed, e)

@@ -177,6 +177,15 @@ def lands(state, event):
 
 
 @part
+def count_capped(state, a, b):
+    """An impact of two bodies is beyond the cap of one of them."""
+    impacts, counts = state.impacts, state.bodies.impact_count
+    if impacts.capped == 0:
+        impacts.capped_row = a if counts[a] >= counts[b] else b
+    impacts.capped += 1
+
+
+@part
 def hand_over(state, event, dt):
     """Leave a touch to the solver. What lands loses its approach and slides along what cannot be moved, as does what is
     caught there; what else is beyond the cap stays where it is."""
@@ -187,7 +196,7 @@ def hand_over(state, event, dt):
     if landing:
         bounce(state, event, dt)
     else:
-        impacts.capped += 1
+        count_capped(state, a, b)
     if landing or (restitution_of(state, a, b) == 1.0 and is_rattling(state, a, b)):
         if bodies.inverse_mass[a] * bodies.inverse_mass[b] == 0.0:
             rate = mill_speed(state, event) if state.spinning else 0.0

@@ -106,6 +106,8 @@ def test_energy_that_is_not_conserved_says_why(carom):
     assert report["energy_changes"] == []
     report = report_of(carom("run", "billiards", "--steps", "300", "--json", "--no-pictures"))
     assert report["energy_changes"] == ["restitution below 1", "damping"]
+    report = report_of(carom("run", "car", "--steps", "30", "--json", "--no-pictures"))
+    assert "joints that drive, spring or stop" in report["energy_changes"]
 
 
 def test_energy_that_is_kept_has_no_reason_to_change(carom):

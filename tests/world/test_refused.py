@@ -19,14 +19,16 @@ from carom.framework import (
     PhysicsWarning,
     Plugin,
     PluginError,
+    Settings,
     StepError,
     System,
     UnhandledPairError,
     World,
     column,
 )
-from carom.plugins import Physics
+from carom.plugins import Physics, capsule, rotation
 from carom.plugins.capsule import CapsuleCollider
+from carom.plugins.rotation import Rotation
 from carom.plugins.springs import Springs
 from carom.plugins.tile_grid import TileGridCollider
 
@@ -74,6 +76,10 @@ def set_to_one(component, name):
 
 
 REFUSED = {
+    "plugin class": (lambda: World(Physics(dimensions=2), Rotation), TypeError, "did you mean Rotation()?"),
+    "plugin module": (lambda: World(Physics(dimensions=2), rotation), TypeError, "mean rotation.Rotation()?"),
+    "module of a plugin": (lambda: make_world(2).add_plugin(capsule), TypeError, "did you mean capsule.plugin?"),
+    "iterations": (lambda: Settings(iterations=10), TypeError, "did you mean 'substeps'"),
     "event": (lambda: make_world(2).on("contact_started", print), ValueError, "did you mean 'contact_begin'"),
     "own event": (lambda: make_world(2).on("level_up", print), ValueError, "world.events.define('level_up')"),
     "attribute": (misspelt_gravity, AttributeError, "did you mean 'gravity'"),
