@@ -34,10 +34,10 @@ def put_rows_back(record: Record, saved: dict[str, Any]) -> None:
 
 
 def put_joints_back(state: Record) -> None:
-    """The forces that joints had before the step, if it has begun with them."""
+    """The forces and values that joints had before the step, if it has begun with them."""
     joints = state.solver.joints
     if joints.kept_in == state.step_number + 1:
-        joints.load[:], joints.pull[:] = joints.old_load, joints.old_pull
+        joints.load[:], joints.pull[:], joints.value[:] = joints.old_load, joints.old_pull, joints.old_value
 
 
 def _stacked(record: Record) -> list[str]:

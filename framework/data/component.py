@@ -73,7 +73,7 @@ class Component:
             if not hasattr(cls, word):
                 setattr(cls, word, _OtherWord(word))
         cls.columns = fields
-        if "__slots__" not in vars(cls):
+        if "__slots__" not in vars(cls) and cls.__setattr__ is object.__setattr__:
             cls.__setattr__ = _set_field  # type: ignore[method-assign]
         cls._shaped = tuple(field for field in fields.values() if field.item != "scalar")
         cls._arguments = {name: field for name, field in fields.items() if field.constructor}

@@ -15,7 +15,8 @@ from ..errors import PluginError
 from ..jit.records.schema import Schema
 from ..settings import Settings
 from ..vectors import dot, scale
-from . import checks
+from . import checks, joints
+from .joints import OwnJoint
 from .registry import Convex, Pair, PluginStage, Registry, Shape
 
 Thing = TypeVar("Thing")
@@ -68,6 +69,7 @@ class Plugin:
         self.mixing_rules: dict[str, Any] = {}
         self.pair_filters: list[Callable[..., Any]] = []
         self.stages: dict[str, PluginStage] = {}
+        self.joints: dict[type[Component], OwnJoint] = {}
         self.systems: list[Callable[[], Any]] = []
         self.registries: weakref.WeakSet[Registry] = weakref.WeakSet()  # of the worlds it is in
 
@@ -155,6 +157,21 @@ class Plugin:
         return register
 
     # -- other things -----------------------------------------------------------------------------
+
+    def joint(self, component: ShapeClass) -> ShapeClass:
+        """Register a class derived from :class:`carom.plugins.joints.Joint`, whose rows its function gives.
+
+        ``constraint(joint, a, b)`` gets the fields of the joint, and of each body ``position`` and ``axes``; it returns
+        ``(value, along_a, turn_a, along_b, turn_b)``, vectors of d numbers, in 2D a turn is ``(turn, 0.0)``: the
+        value changes by ``along_a . v_a + turn_a . w_a + along_b . v_b + turn_b . w_b`` per second. Without a value,
+        ``None``, it is the sum of these changes. Several rows are a tuple of such. ``rows`` of the class says what is
+        done about the values: if nothing else is said, the first one stays as it was. ``dimensions = (2,)`` in the
+        class makes it a joint of 2D worlds only.
+        """
+        single, rows = joints.check_joint(self, component)
+        function = inlined(_function(component, "constraint"))
+        self._register(self.joints, component, OwnJoint(component, function, self.name, single, rows))
+        return component
 
     @_called_first("'name'")
     def integrator(self, name: str) -> Callable[[Thing], Thing]:
@@ -296,6 +313,7 @@ class Plugin:
             "mixing rules": list(self.mixing_rules),
             "pair filters": [function.__name__ for function in self.pair_filters],
             "stages": list(self.stages),
+            "joints": [component.__name__ for component in self.joints],
             "systems": [getattr(make, "__name__", repr(make)) for make in self.systems],
         }
         return {kind: names for kind, names in found.items() if names}

@@ -10,6 +10,7 @@ from ..data.component import Component
 from ..errors import PluginError
 from ..jit.records.schema import Schema
 from ..settings import AUTOMATIC, MIXING_RULES
+from .joints import OwnJoint
 
 
 class Convex:
@@ -150,6 +151,7 @@ class Registry:
     mixing_rules: dict[str, Any] = field(default_factory=dict)
     pair_filters: list[tuple[str, Any]] = field(default_factory=list)  # (plugin, function)
     stages: dict[str, PluginStage] = field(default_factory=dict)
+    joints: dict[type[Component], OwnJoint] = field(default_factory=dict)
     check_stages: Callable[[Iterable[PluginStage]], Any] = tuple  # PluginError for what no step can have
 
     def require(self, component: type[Component], entity: int | None = None) -> Any:
@@ -161,6 +163,12 @@ class Registry:
             raise ValueError(
                 f"{where}{component.__name__} does nothing without its plugin: "
                 f"World(Physics(...), {needed.capitalize()}()), from carom.plugins.{needed}"
+            )
+        if hasattr(component, "constraint") and component not in self.joints:
+            where = "" if entity is None else f"entity {entity}: "
+            raise ValueError(
+                f"{where}{component.__name__} does nothing without the plugin that has registered it with "
+                f"@plugin.joint: World(Physics(...), Joints(), plugin)"
             )
         return found
 
@@ -188,12 +196,13 @@ class Registry:
         broad_phases: dict[str, Any] = {}
         mixing_rules: dict[str, Any] = {}
         stages: dict[str, PluginStage] = {}
+        joints: dict[Any, Any] = {}
         owners: dict[Any, str] = {}
         for plugin in self.plugins:
             kinds = (
                 ("shape", shapes, plugin.shapes), ("integrator", integrators, plugin.integrators),
                 ("broad phase", broad_phases, plugin.broad_phases), ("mixing rule", mixing_rules, plugin.mixing_rules),
-                ("stage", stages, plugin.stages),
+                ("stage", stages, plugin.stages), ("joint", joints, plugin.joints),
             )  # fmt: skip
             for kind, known, fresh in kinds:
                 for key in fresh:
@@ -203,10 +212,11 @@ class Registry:
                             f"plugin {plugin.name}: {kind} {name} is registered already, by plugin {owners[kind, key]}"
                         )
                     owners[kind, key] = plugin.name
-                    twin = next((other for other in known if kind == "shape" and other.prefix == key.prefix), None)
+                    classes = (each for each in known if not isinstance(each, str))
+                    twin = next((each for each in classes if each.prefix == key.prefix), None)
                     if twin is not None:
                         raise PluginError(
-                            f"plugin {plugin.name}: shape {name} goes by the name of another class, of plugin "
+                            f"plugin {plugin.name}: {kind} {name} goes by the name of another class, of plugin "
                             f"{owners[kind, twin]}: columns are named after the class, so give it another name"
                         )
                     if key in (*MIXING_RULES, AUTOMATIC):
@@ -222,7 +232,7 @@ class Registry:
                 pairs[first, second] = pair
         self.check_stages(stages.values())
         self.shapes, self.pairs, self.integrators, self.stages = shapes, pairs, integrators, stages
-        self.broad_phases, self.mixing_rules = broad_phases, mixing_rules
+        self.broad_phases, self.mixing_rules, self.joints = broad_phases, mixing_rules, joints
         self.pair_filters = [(plugin.name, each) for plugin in self.plugins for each in plugin.pair_filters]
         self.version += 1
 

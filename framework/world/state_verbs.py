@@ -79,7 +79,8 @@ class StateVerbs:
             physics = world._services
             of_stages = [component for stage in world.registry.stages.values() for component in stage.components]
             of_plugins = [component for plugin in plugins for component in plugin.components]
-            known = (*physics.table.component_types, *world.registry.shapes, *of_stages, *of_plugins, *components)
+            own = (*world.registry.shapes, *world.registry.joints)
+            known = (*physics.table.component_types, *own, *of_stages, *of_plugins, *components)
             snapshot = file.snapshot(dict.fromkeys(known))
             file.whole(lambda: snapshots.restore_world(snapshot, world, physics))
             snapshots.restore_plugins(snapshot, world)

@@ -16,6 +16,7 @@ from ...framework.plugins.checks import check_mixed
 from ...framework.plugins.registry import Pair, Registry, Shape
 from ...plugins import Physics
 from ..cli.usage_errors import one_line
+from .joint_checks import check_joint
 from .kernels import RaisedError, SupportCode, compiler_message
 from .pair_checks import TOLERANCE, PairChecks
 from .samples import ORDINARY, Finding, Report, Rows, Subject, directions, poses, row_shown, rows
@@ -52,6 +53,10 @@ def check_plugin(plugin: Plugin, others: list[Plugin], progress: Callable[[str],
     _missing(report, plugin, registry)
     for name, rule in plugin.mixing_rules.items():
         _attempt(report.subject("mixing rule", name), progress, lambda subject, f=rule: _check_mixing(subject, f))
+    for component, joint in plugin.joints.items():
+        for dimensions in _dimensions(component):
+            _attempt(report.subject("joint", component.__name__, dimensions), progress,
+                     lambda subject, j=joint, d=dimensions: check_joint(subject, j, d))  # fmt: skip
     for name, made in plugin.broad_phases.items():
         for dimensions in (2, 3):
             _attempt(report.subject("broad phase", name, dimensions), progress,

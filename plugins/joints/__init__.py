@@ -7,16 +7,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...components import RigidBody
-from ...framework import NoPhysicsError, Plugin, World
-from ...systems.contacts.solving.joints import HOLD, POINT, TURN
+from ...framework import NoPhysicsError, Plugin, PluginError, World
+from ...framework.jit.lazy import errors
+from ...framework.plugins.joints import Placed, numbers_of, rows_of
+from ...systems.contacts.solving.joints import DRIVE, GIVEN, HOLD, LIMIT, POINT, SERVO, SPRING, TURN
+from ...systems.contacts.solving.linked_joint import linked_joint
 from ...systems.contacts.solving.records import JOINTS
-from .joint import WORLD, Changes, Joint, Place, Row
+from .arms import arm_of, moment
+from .joint import WORLD, Changes, Driven, Joint, Place, Row
 from .kinds import KINDS, Ball, Cone, Distance, Hinge, Motor, MousePull, Slider, Weld
-from .measures import Holds, holds, measure
+from .measures import Holds, holds, measure, moving
 
 # What rows are known by, and what they keep from step to step.
 KEY = ("joint", "kind", "rule", "entity_a", "entity_b")
 KEPT = ("load", "pull", "normal", "total", "thrust")
+OF_PLUGINS = ("value", "along_a", "turn_a", "turn_b")  # and rows of plugins' joints besides
 
 
 class JointState(NamedTuple):
@@ -27,8 +32,8 @@ class JointState(NamedTuple):
     torque
         N m s, on b, beside that of the impulse; in 3D (3,)
     value, speed
-        rad of a Hinge, a Weld, a Motor or the twist of a Cone, m of a Slider or a Distance, and the change per second;
-        else 0
+        rad of a Hinge, a Weld, a Motor or the twist of a Cone, m of a Slider or a Distance, what the first row of a
+        plugin's joint has, and the change per second; else 0
     """
 
     impulse: np.ndarray
@@ -90,7 +95,7 @@ class Joints(Plugin):
         start, stop = self._spans[entity]
         impulses, torques = self._given(start, stop)
         torque = torques.sum(axis=0)
-        value, speed = measure(self._physics.table, holds([self._joints[entity]]), 1)
+        value, speed = self._measure([entity], holds([self._joints[entity]]))
         flat = self._physics.dimensions == 2
         return JointState(impulses.sum(axis=0), float(torque[0]) if flat else torque, float(value[0]), float(speed[0]))
 
@@ -100,7 +105,7 @@ class Joints(Plugin):
         columns = self._done()
         if self._holds is None:
             self._holds = holds(self._joints.values())
-        value, speed = measure(self._physics.table, self._holds, len(self))
+        value, speed = self._measure(list(self._joints), self._holds)
         return columns | {"value": value, "speed": speed}
 
     def _done(self) -> dict[str, np.ndarray]:
@@ -115,16 +120,30 @@ class Joints(Plugin):
     def _given(self, start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
         """The impulses and the torques of some rows, (k, d) each."""
         record, kind = self._record, self._record.kind[start:stop, None]
-        along = record.total[start:stop, None] * record.normal[start:stop]
-        impulse = np.where(kind == POINT, record.thrust[start:stop], np.where(kind < TURN, along, 0.0))
-        return impulse, np.where(kind >= TURN, along, 0.0)
+        along, given = record.total[start:stop, None] * record.normal[start:stop], kind == GIVEN
+        impulse = np.where(kind == POINT, record.thrust[start:stop], np.where((kind < TURN) | given, along, 0.0))
+        turned = np.where(given, record.total[start:stop, None] * record.turn_b[start:stop], along)
+        return impulse, np.where(kind >= TURN, turned, 0.0)
+
+    def _measure(self, entities: list[int], found: list[Holds]) -> tuple[np.ndarray, np.ndarray]:
+        """The values of these joints and their changes per second; of those of plugins what their first rows say."""
+        table, record = self._physics.table, self._record
+        value, speed = measure(table, found, len(entities))
+        own = [k for k, entity in enumerate(entities) if type(self._joints[entity]) in self._own]
+        if own:
+            rows = [self._spans[entities[k]][0] for k in own]
+            value[own] = record.value[rows]
+            speed[own] = moving(table, record.entity_a[rows]).rate(record.along_a[rows], record.turn_a[rows])
+            speed[own] += moving(table, record.entity_b[rows]).rate(record.normal[rows], record.turn_b[rows])
+        return value, speed
 
     # -- snapshots --------------------------------------------------------------------------------
 
     def saved(self, world: Any) -> Any:
         """What the rows have done in the last step, with the entities of the joints and of their bodies."""
         record, count = self._record, self._record.count
-        return self._wanted or {name: getattr(record, name)[:count].copy() for name in (*KEY, *KEPT)}
+        own = OF_PLUGINS if (record.kind[:count] == GIVEN).any() else ()
+        return self._wanted or {name: getattr(record, name)[:count].copy() for name in (*KEY, *KEPT, *own)}
 
     def take_back(self, world: Any, saved: Any) -> None:
         """Rows begin with that."""
@@ -153,7 +172,7 @@ class Joints(Plugin):
     def _present(self) -> dict[int, Joint]:
         """All joints of the world, in the order of their entities."""
         contents, found = self._contents, {}
-        for kind in KINDS:
+        for kind in (*KINDS, *self._own):
             for entity in contents.members.get(kind, ()):
                 found[entity] = contents.components_of(entity)[kind]
         return {entity: found[entity] for entity in sorted(found)}
@@ -170,6 +189,11 @@ class Joints(Plugin):
             and (joint.attached or (body not in contents.entities and body < contents.counter.next))
             for body in (joint.a or WORLD, joint.b or WORLD)
         )  # fmt: skip
+
+    @property
+    def _own(self) -> dict[Any, Any]:
+        """The joints of plugins."""
+        return self.world.registry.joints if self.world is not None else {}
 
     def _row(self, entity: int) -> int:
         return int(self._physics.table.row_of(entity))
@@ -194,10 +218,26 @@ class Joints(Plugin):
         """Take hold of the bodies where they are."""
         try:
             self.check_component(joint, entity)
-            joint.attach(self._place(joint.a or WORLD), self._place(joint.b or WORLD))
+            places = self._place(joint.a or WORLD), self._place(joint.b or WORLD)
+            joint.attach(*places)
+            if type(joint) in self._own:
+                self._start(f"entity {entity}: {type(joint).__name__}", joint, places)
         except ValueError as error:
             raise ValueError(f"{error}: set its fields, or world.delete_entity({entity})") from None
         joint.keep(attached=True)
+
+    def _start(self, name: str, joint: Joint, places: tuple[Place, ...]) -> None:
+        """What the function of a plugin's joint says where this takes hold."""
+        a, b = (Placed(tuple(place.position), tuple(map(tuple, place.axes.T))) for place in places)
+        with np.errstate(all="ignore"):
+            rows = rows_of(type(joint), joint, a, b)
+        values = [row[0] or 0.0 for row in rows]
+        if not np.isfinite([*values, *(x for row in rows for vector in row[1:] for x in vector)]).all():
+            raise ValueError(f"{name}: where it takes hold its constraint returns what is not finite: {rows}")
+        joint.keep(start=float(values[0]))
+        parts = [row.part for row in joint.rows(self._physics.dimensions) if row.kind == GIVEN]
+        if parts and not 0 <= min(parts) <= max(parts) < len(values):
+            raise ValueError(f"{name}: its rows speak of part {max(parts)}, but its constraint returns {len(values)}")
 
     def _place(self, entity: int) -> Place:
         """Where a body is, or the world."""
@@ -234,20 +274,28 @@ class Joints(Plugin):
         """The rows of these joints, which begin with what they had."""
         record, d, wanted = self._record, self._physics.dimensions, _by_row(self.saved(self.world))
         rows = [(entity, row) for entity, joint in joints.items() for row in joint.rows(d)]
-        record.reserve(max(len(rows), 1), *(name for name in record.columns() if not name.startswith("apart_")))
+        other = ("apart_a", "apart_b", "numbers", "axes_a", "axes_b")
+        record.reserve(max(len(rows), 1), *record.columns().keys() - other)
+        own = [numbers_of(joints[entity], d) if row.kind == GIVEN else () for entity, row in rows]
+        ends = np.cumsum([0, *map(len, own)])
+        record.numbers_at[: len(rows)] = ends[:-1]
+        if ends[-1]:
+            record.reserve(d * len(rows), "axes_a", "axes_b")
+            record.reserve(int(ends[-1]), "numbers")
         self._joints, self._spans, self._wanted = joints, {}, None
         for j, (entity, row) in enumerate(rows):
             record.joint[j] = entity
-            record.load[j] = record.pull[j] = record.total[j] = record.thrust[j] = 0.0
+            for name in (*KEPT, *OF_PLUGINS):
+                getattr(record, name)[j] = 0.0
             record.normal[j] = np.eye(d)[0]
             self._put(j, joints[entity], row)
             self._spans[entity] = self._spans.get(entity, (j, j))[0], j + 1
         record.count, record.active, record.rows_version = len(rows), 0, -1
         now = _by_row({name: getattr(record, name)[: len(rows)] for name in KEY})
         for j, key in enumerate(now):
-            for name, value in zip(KEPT, wanted.get(key, ()), strict=False):
+            for name, value in zip((*KEPT, *OF_PLUGINS), wanted.get(key, ()), strict=False):
                 getattr(record, name)[j] = value
-        record.old_load[:], record.old_pull[:] = record.load, record.pull
+        record.old_load[:], record.old_pull[:], record.old_value[:] = record.load, record.pull, record.value
         self._connected = {entity: joint.collide_connected for entity, joint in joints.items()}
         self._keep_apart(joints)
         self._finish_changes({body for key in wanted.keys() ^ now.keys() for body in key[3:5]})
@@ -261,6 +309,21 @@ class Joints(Plugin):
         record.axis[j] = np.eye(self._physics.dimensions)[0] if row.axis is None else row.axis
         for name in ("low", "high", "target", "most", "frequency", "damping_ratio"):
             getattr(record, name)[j] = getattr(row, name)
+        if row.kind == GIVEN:
+            self._put_own(j, joint, row.part)
+
+    def _put_own(self, j: int, joint: Joint, part: int) -> None:
+        """What a row of a plugin's joint calls; a PluginError if its function cannot be compiled."""
+        record, own, start = self._record, self._own[type(joint)], self._record.numbers_at[j]
+        given = numbers_of(joint, self._physics.dimensions)
+        record.part[j], record.numbers[start : start + len(given)] = part, given
+        try:
+            record.function[j] = linked_joint(own, self._physics.dimensions).address
+        except errors.NumbaError as error:
+            raise PluginError(
+                f"plugin {own.plugin}: constraint of joint {type(joint).__name__} cannot be compiled; use numbers, "
+                f"tuples, math, carom.framework.vectors, and helpers marked @plugin.kernel: {error}"
+            ) from error
 
     def _finish_changes(self, bodies: set[int]) -> None:
         """These bodies have had other rows; they wake if they sleep, and so do those whose joints have changed."""
@@ -309,7 +372,7 @@ def _by_row(columns: dict[str, Any]) -> dict[tuple[int, ...], tuple[Any, ...]]:
     """What rows keep, by what they are known by and how many such rows are before them, in their order."""
     rows: dict[tuple[int, ...], tuple[Any, ...]] = {}
     seen: dict[tuple[int, ...], int] = {}
-    kept = [np.asarray(columns[name]) for name in KEPT if name in columns]
+    kept = [np.asarray(columns[name]) for name in (*KEPT, *OF_PLUGINS) if name in columns]
     for j, key in enumerate(zip(*(np.asarray(columns[name]).tolist() for name in KEY), strict=True)):
         seen[key] = seen.get(key, -1) + 1
         rows[*key, seen[key]] = tuple(column[j] for column in kept)
@@ -327,6 +390,6 @@ def _matrix(q: Any) -> np.ndarray:
 
 
 __all__ = [
-    "KINDS", "Ball", "Cone", "Distance", "Hinge", "Joint", "JointState", "Joints", "Motor", "MousePull", "Slider",
-    "Weld",
+    "DRIVE", "GIVEN", "HOLD", "KINDS", "LIMIT", "SERVO", "SPRING", "Ball", "Cone", "Distance", "Driven", "Hinge",
+    "Joint", "JointState", "Joints", "Motor", "MousePull", "Row", "Slider", "Weld", "arm_of", "moment",
 ]  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 from ...framework.data.columns import special_column
 from ...framework.data.component import Component
 from ...framework.typing import Vector
-from ...systems.contacts.solving.joints import ALIGN, DRIVE, HOLD, LIMIT, SPRING, TURN
+from ...systems.contacts.solving.joints import ALIGN, DRIVE, GIVEN, HOLD, LIMIT, SPRING, TURN
 
 WORLD = 0  # in place of a body
 FREE = -math.inf, math.inf
@@ -32,6 +32,7 @@ class Row(NamedTuple):
     damping_ratio: float = 0.0
     axis: Any = None  # along the axes of a, of what slides or turns
     ends: Any = None  # of angles in space: unit vectors along the axes of a and of b
+    part: int = 0  # of a GIVEN: which row of its function
 
 
 class Place(NamedTuple):
@@ -151,11 +152,10 @@ class Joint(Component, abstract=True):
 
     def attach(self, a: Place, b: Place) -> None:
         """The bodies stand where the joint takes hold of them."""
-        raise NotImplementedError
 
     def rows(self, dimensions: int) -> list[Row]:
-        """The rows that it is now."""
-        raise NotImplementedError
+        """The rows that it is now. A joint of a plugin keeps the value of its first row, unless it says otherwise."""
+        return [Row(GIVEN, HOLD, self.start)]
 
     def hold(self, a: Place, b: Place, anchor: Any) -> None:
         """Anchors at a point of the world."""

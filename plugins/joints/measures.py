@@ -51,6 +51,10 @@ class Moving(NamedTuple):
             return self.velocity + self.spin[:, None] * np.stack((-arm[:, 1], arm[:, 0]), axis=1)
         return self.velocity + _cross(self.spin, arm)
 
+    def rate(self, along: np.ndarray, turn: np.ndarray) -> np.ndarray:
+        """What the bodies move along some vectors and turn about others, per second."""
+        return _dot(along, self.velocity) + (turn[:, 0] * self.spin if self.spin.ndim == 1 else _dot(turn, self.spin))
+
 
 def moving(table: Any, entities: np.ndarray) -> Moving:
     """Of these bodies now."""

@@ -46,9 +46,12 @@ class ErrorAttribution:
 
     def describe(self, error: BaseException, query: type[Component] | None = None) -> None:
         """Add to an error which plugin's function it comes from."""
-        state = self._state
+        state, joints = self._state, self._state.solver.joints
         uncompiled = isinstance(error, errors.NumbaError) or state.row_a == NOTHING_TESTED
-        about = self._uncompiled(error) if uncompiled else self._describe(state.row_a, state.row_b, query)
+        if joints.asked:
+            about, joints.asked = self._joint(joints.asked), 0
+        else:
+            about = self._uncompiled(error) if uncompiled else self._describe(state.row_a, state.row_b, query)
         if about and about not in getattr(error, "__notes__", ()):  # numba raises the same object once more
             error.add_note(about)
 
@@ -108,6 +111,13 @@ class ErrorAttribution:
             one, two = (shapes[int(level[row])].component for row in (a, b))
             found[self._pair(one, two)] = None
         return f"{' or '.join(filter(None, found))}, entities {entity[a]} and {entity[b]}"
+
+    def _joint(self, entity: int) -> str:
+        """Plugin, class and entity of the joint whose function has raised an error."""
+        for each in self._registry.joints.values():
+            if self._registry.world.has_component(entity, each.component):
+                return f"plugin {each.plugin}: constraint of {each.component.__name__}, entity {entity}"
+        return ""
 
     def _describe_query(self, a: int, b: int, query: type[Component]) -> str:
         state, shapes = self._state, self._shapes()

@@ -266,3 +266,36 @@ def test_the_built_in_shapes_pass_the_check(carom):
 def test_what_ships_passes_the_check(carom, name):
     result = carom("plugins", "check", OFFERED[name].partition(":")[0])
     assert result.exit_code == 0, result.stdout
+
+
+ROPE = """
+from carom import Plugin, column
+from carom.framework.vectors import add, divided, length, scale, sub
+from carom.plugins.joints import Joint, arm_of, moment
+
+plugin = Plugin("ropes")
+
+@plugin.joint
+class Rope(Joint):
+    a = column(dtype=int)
+    b = column(dtype=int)
+    hook = column(item="vector")
+    at = column(0.3, item="vector", kw_only=True)
+
+    def constraint(joint, a, b):
+        arm = arm_of(b, joint.at)
+        way = sub(add(b.position, arm), joint.hook)
+        along, nothing = divided(way, length(way)), scale(way, 0.0)
+        return length(way), nothing, nothing, along, moment(arm, scale(along, FACTOR))
+"""
+
+
+@pytest.mark.parametrize(("factor", "code"), [("1.0", 0), ("2.0", 1)])
+def test_joints_are_compared_with_the_change_of_their_value(carom, tmp_path, factor, code):
+    (tmp_path / "ropes.py").write_text(ROPE.replace("FACTOR", factor))
+    result = carom("plugins", "check", "ropes.py")
+    assert result.exit_code == code, (result.stdout, result.stderr, result.exception)
+    assert sum(line.startswith("joint Rope") and "1,000" in line for line in result.stdout.splitlines()) == 2
+    if code:
+        assert "row 0: its value changes by" in result.stdout
+        assert "turns by moment(arm, push)" in result.stdout

@@ -9,7 +9,7 @@ from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add, add_scaled, item, replace, scale, sub
 from ...codes import NEED_COLUMNS, OK
 from ...integration.turning import cross_spin
-from .joints import POINT, SLIDE, TURN
+from .joints import GIVEN, POINT, SLIDE, TURN
 from .rows import turn_body
 from .warm_start import row_of
 
@@ -39,7 +39,7 @@ def find_active(state):
         joints.rows_version = state.version
     for j in range(joints.count):
         a, b = joints.row_a[j], joints.row_b[j]
-        joints.old_load[j], joints.old_pull[j] = joints.load[j], joints.pull[j]
+        joints.old_load[j], joints.old_pull[j], joints.old_value[j] = joints.load[j], joints.pull[j], joints.value[j]
         joints.total[j], joints.thrust[j] = 0.0, zero_of(state)
         gone = (a < 0 and joints.entity_a[j] > 0) or (b < 0 and joints.entity_b[j] > 0)
         if not (gone or left_out(state, a) or left_out(state, b)) and (may_move(state, a) or may_move(state, b)):
@@ -117,14 +117,29 @@ def push_joined(state, dt):
     velocity, inverse_mass = bodies.linear_velocity, bodies.inverse_mass
     for e in range(joints.active):
         j = joints.order[e]
-        if joints.kind[j] >= TURN:
+        given = joints.kind[j] == GIVEN
+        if joints.kind[j] >= TURN and not given:
             continue
         push = scale(joints.pull[j] if joints.kind[j] == POINT else scale(joints.normal[j], joints.load[j]), dt)
+        back = scale(joints.along_a[j], -joints.load[j] * dt) if given else push
         a, b = joints.row_a[j], joints.row_b[j]
         if a >= 0 and inverse_mass[a] > 0.0:
-            bodies.warm_started[a], velocity[a] = True, add_scaled(velocity[a], push, -inverse_mass[a])
+            bodies.warm_started[a], velocity[a] = True, add_scaled(velocity[a], back, -inverse_mass[a])
         if b >= 0 and inverse_mass[b] > 0.0:
             bodies.warm_started[b], velocity[b] = True, add_scaled(velocity[b], push, inverse_mass[b])
+
+
+@part
+def lay_given(state, j):
+    """Where the bodies of a row of a plugin are when the step starts, and their axes as it has turned them."""
+    joints, bodies, zero = state.solver.joints, state.bodies, zero_of(state)
+    a, b, d = joints.row_a[j], joints.row_b[j], len(zero)
+    joints.base_a[j] = bodies.previous_position[a] if a >= 0 else zero
+    joints.base_b[j] = bodies.previous_position[b] if b >= 0 else zero
+    for k in range(d):
+        axis = replace(zero, k, 1.0)
+        joints.axes_a[d * j + k] = turned(state, a, axis) if a >= 0 else axis
+        joints.axes_b[d * j + k] = turned(state, b, axis) if b >= 0 else axis
 
 
 @part
@@ -141,6 +156,9 @@ def lay_joints(state):
         a, b = joints.row_a[j], joints.row_b[j]
         joints.first[j] = bodies.place[a] if a >= 0 else ground
         joints.second[j] = bodies.place[b] if b >= 0 else ground
+        if joints.kind[j] == GIVEN:
+            lay_given(state, j)
+            continue
         start_a = bodies.previous_position[a] if a >= 0 else zero
         start_b = bodies.previous_position[b] if b >= 0 else zero
         joints.between[j] = sub(start_b, start_a)

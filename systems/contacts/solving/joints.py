@@ -2,10 +2,10 @@
 
 A joint is a few rows, which stand next to each other. POINT holds two anchors together, LINE the length between them,
 SLIDE how far b's anchor is along an axis of a. Others are angles: TURN about an axis; in space ALIGN, by how much an
-axis of b leads away from one of a in one direction, and CONE, by how much in all. A row HOLDs its value, keeps it
-within LIMITs, DRIVEs it at a speed, brings it there as a SERVO, or is a SPRING. What holds is as soft as a spring of a
-frequency that follows the rate of the substeps, and is solved without that in the passes that do not push; springs are
-solved in the pass that pushes alone.
+axis of b leads away from one of a in one direction, and CONE, by how much in all. GIVEN is what a plugin says, see
+given. A row HOLDs its value, keeps it within LIMITs, DRIVEs it at a speed, brings it there as a SERVO, or is a SPRING.
+What holds is as soft as a spring of a frequency that follows the rate of the substeps, and is solved without that in
+the passes that do not push; springs are solved in the pass that pushes alone.
 
 Joints come before the contacts of their range, in the pass that pushes and once in those that do not. Their bodies have
 the columns of bodies that spin, as contacts of such bodies have: see rows.JOINTED.
@@ -19,8 +19,9 @@ from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 from ...integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
 from ..constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY
+from .given import measure_given, push_given, speed_of_given
 
-POINT, LINE, SLIDE, TURN, ALIGN, CONE = range(6)
+POINT, LINE, SLIDE, TURN, ALIGN, CONE, GIVEN = range(7)
 HOLD, LIMIT, DRIVE, SPRING, SERVO = range(5)
 LEAST_SHARE = 1e-9  # of its mass that a spring without damping takes part with
 BRAKES = 0.9  # of the speed from which a servo could just stop in time
@@ -69,7 +70,7 @@ def start_joints(solver, h, period, usual):
     ``period``, whatever blows ask for: changes of it would give energy to what is stretched. What is stiffer than
     ``usual`` pushes errors out at the usual rate."""
     joints = solver.joints
-    joints.step = h
+    joints.step, joints.moved_for = h, 0.0
     count_springs(solver)
     for e in range(joints.begin, joints.end):
         j = joints.order[e]
@@ -198,6 +199,9 @@ def measure_joints(solver):
     for e in range(joints.begin, joints.end):
         j = order[e]
         kind, a, b = kinds[j], first[j], second[j]
+        if kind == GIVEN:
+            ask(joints, j, measure_given(solver, j))
+            continue
         if kind >= TURN:
             axis, angle = angle_of(solver, j)
             moved = dot(axis, change_of_spin(solver, a, axis)) + dot(axis, change_of_spin(solver, b, axis))
@@ -220,6 +224,7 @@ def measure_joints(solver):
         moved = solver.inverse_mass[a] + solver.inverse_mass[b]
         joints.mass[j] = 1.0 / (moved + compliance(solver, a, arm_a, normal) + compliance(solver, b, arm_b, normal))
         ask(joints, j, value)
+    joints.moved_for = joints.step
 
 
 @inlined
@@ -249,6 +254,9 @@ def give_row(solver, j, impulse):
     if joints.kind[j] < TURN:
         ends, arms = (joints.first[j], joints.second[j]), (joints.arm_a[j], joints.arm_b[j])
         push_apart(columns_of(solver), ends, arms, scale(joints.normal[j], impulse))
+        return
+    if joints.kind[j] == GIVEN:
+        push_given(solver, j, impulse)
         return
     a, b, twisted = joints.first[j], joints.second[j], scale(joints.normal[j], impulse)
     if solver.inverse_mass[a] > 0.0:
@@ -283,7 +291,9 @@ def speed_between(solver, j):
 def solve_row(solver, j, pushes):
     """The value of a row changes as it asks, as far as its impulses allow."""
     joints, old = solver.joints, solver.joints.impulse[j]
-    if joints.kind[j] >= TURN:
+    if joints.kind[j] == GIVEN:
+        speed = speed_of_given(solver, j)
+    elif joints.kind[j] >= TURN:
         speed = dot(joints.normal[j], sub(solver.spin[joints.second[j]], solver.spin[joints.first[j]]))
     else:
         speed = dot(joints.normal[j], speed_between(solver, j))

@@ -1,0 +1,158 @@
+"""Joints of plugins: what their function gets, and what it is checked for when it is registered."""
+
+from __future__ import annotations
+
+import collections
+import inspect
+import math
+import numbers
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..data.arrays.column import ArrayColumn
+from ..data.columns import REQUIRED
+from ..data.component import Component
+from ..errors import PluginError
+
+# What functions do not see of a joint.
+HIDDEN = ("a", "b", "collide_connected", "breaking_force", "attached", "changed")
+ARGUMENTS = ("joint", "a", "b")
+ROW = "(value, along_a, turn_a, along_b, turn_b)"
+
+# (position, axes) of two bodies to try functions with.
+PLACES: Any = (
+    ((0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))),
+    ((1.0, 0.5, -0.25), ((0.8, 0.6, 0.0), (-0.6, 0.8, 0.0), (0.0, 0.0, 1.0))),
+)
+
+
+@dataclass(frozen=True)
+class OwnJoint:
+    """A joint whose rows a function gives; (joint, a, b) -> (value, along a, turn of a, along b, turn of b), or a tuple
+    of such rows, compiled.
+
+    single
+        in 2D and in 3D: whether it returns one row
+    rows
+        likewise, for each row whether it tells its value; none in worlds in which it cannot be
+    """
+
+    component: type[Component]
+    function: Any
+    plugin: str
+    single: tuple[bool, bool]
+    rows: tuple[tuple[bool, ...], tuple[bool, ...]]
+
+
+class Placed(NamedTuple):
+    """Where a body is, for the function: ``position``, m, and ``axes``, those of the body in the world, d vectors."""
+
+    position: Any
+    axes: Any
+
+
+def seen_columns(component: type[Component]) -> list[Any]:
+    """The columns that the function sees."""
+    columns = component.columns.items()
+    return [column for name, column in columns if name not in HIDDEN and not isinstance(column, ArrayColumn)]
+
+
+@lru_cache(maxsize=1024)
+def fields_of(component: type[Component]) -> Any:
+    """The named tuple of the fields that the function gets."""
+    return collections.namedtuple(component.__name__, [column.name for column in seen_columns(component)])
+
+
+def numbers_of(joint: Component, dimensions: int) -> np.ndarray:
+    """These fields one after the other, NaN for None."""
+    found = []
+    for column in seen_columns(type(joint)):
+        value = np.asarray(column.checked(getattr(joint, column.name)), float)
+        found.append(np.broadcast_to(value, column.item_shape(dimensions)).ravel())
+    return np.concatenate(found)
+
+
+def parameters_of(joint: Component, dimensions: int) -> Any:
+    """These fields, for a call from Python."""
+    given, values, at = numbers_of(joint, dimensions), [], 0
+    for column in seen_columns(type(joint)):
+        shape = column.item_shape(dimensions)
+        part = tuple(given[at : at + math.prod(shape)])
+        values.append(part if shape else part[0])
+        at += len(part)
+    return fields_of(type(joint))(*values)
+
+
+def rows_of(component: Any, joint: Any, a: Placed, b: Placed) -> tuple[Any, ...]:
+    """What the function returns where these bodies are, as a tuple of rows."""
+    made = component.constraint(parameters_of(joint, len(a.position)), a, b)
+    return (made,) if _is_single(made) else made
+
+
+def _is_single(made: Any) -> bool:
+    """Whether that is one row, and no tuple of rows."""
+    return not (isinstance(made, tuple) and made and isinstance(made[0], tuple))
+
+
+def sample_of(component: Any, dimensions: int) -> Any:
+    """A joint with 0.5 in all fields that have to be given, which holds two bodies."""
+    if hasattr(component, "sample"):
+        joint = component.sample()
+    else:
+        demanded = {name: 1 if column.dtype is np.int64 else 0.5
+                    for name, column in component.columns.items() if column.default is REQUIRED}  # fmt: skip
+        joint = component(**{**demanded, "a": 1, "b": 2})
+    one, other = np.eye(dimensions)[:2]
+    joint.keep(at_a=0.25 * one, at_b=0.5 * other, axis_a=one, axis_b=one, side_a=other, side_b=other)
+    return joint
+
+
+def check_joint(plugin: Any, component: Any) -> tuple[Any, Any]:
+    """``single`` and ``rows`` of :class:`OwnJoint`; PluginError unless the class can be a joint. Tries its function."""
+    where = f"plugin {plugin.name}: joint {getattr(component, '__name__', component)!s}"
+    if not (isinstance(component, type) and issubclass(component, Component) and not component._abstract
+            and {"a", "b", "attached"} <= component.columns.keys()):  # fmt: skip
+        raise PluginError(
+            f"{where} cannot be a joint: derive a class from carom.plugins.joints.Joint, and give it columns a and b"
+        )
+    function = inspect.getattr_static(component, "constraint", None)
+    function = getattr(function, "__func__", function)
+    if not inspect.isfunction(function):
+        raise PluginError(f"{where} has no constraint: write constraint(joint, a, b) that returns {ROW}")
+    given = tuple(inspect.signature(function).parameters)
+    if len(given) != len(ARGUMENTS):
+        raise PluginError(f"{where}: constraint takes ({', '.join(given)}), it must take ({', '.join(ARGUMENTS)})")
+    tried = [_try(where, component, dimensions) for dimensions in (2, 3)]
+    return tuple(single for single, _ in tried), tuple(rows for _, rows in tried)
+
+
+def _try(where: str, component: Any, dimensions: int) -> tuple[bool, tuple[bool, ...]]:
+    """Whether the function returns one row, and for each whether it tells its value."""
+    if dimensions not in component.dimensions:
+        return True, ()
+    a, b = PLACES
+    a, b = (Placed(p[:dimensions], tuple(axis[:dimensions] for axis in axes[:dimensions])) for p, axes in (a, b))
+    said = f"{where}: constraint, tried in {dimensions}D,"
+    try:
+        made = component.constraint(parameters_of(sample_of(component, dimensions), dimensions), a, b)
+    except Exception as error:  # whatever it raises, its author has to hear of
+        raise PluginError(f"{said} raised {type(error).__name__}: {error}") from error
+    rows = (made,) if _is_single(made) else made
+    for row in rows:
+        if not isinstance(row, tuple) or len(row) != 5:
+            raise PluginError(f"{said} returned {row!r}: return {ROW}, or a tuple of such rows")
+        for name, vector in zip(("along_a", "turn_a", "along_b", "turn_b"), row[1:], strict=True):
+            if not (isinstance(vector, tuple) and len(vector) == dimensions and all(map(_is_finite, vector))):
+                flat = " (in 2D a turn is (turn, 0.0))" if dimensions == 2 and name[:4] == "turn" else ""
+                raise PluginError(f"{said} returned {vector!r} as {name}: return a tuple of {dimensions} numbers{flat}")
+        if row[0] is not None and not _is_finite(row[0]):
+            raise PluginError(f"{said} returned {row[0]!r} as value: return a number, or None for the sum of changes")
+    return _is_single(made), tuple(row[0] is not None for row in rows)
+
+
+def _is_finite(value: Any) -> bool:
+    number = isinstance(value, numbers.Real) and not isinstance(value, (bool, np.bool_))
+    return bool(number and math.isfinite(value))

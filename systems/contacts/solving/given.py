@@ -1,0 +1,76 @@
+"""Rows whose value a function of a plugin gives, see docs/write-a-joint.md: how their bodies move with them.
+
+A row has four vectors, ``along_a``, ``turn_a``, ``normal`` and ``turn_b``: what the velocity and the spin of each body
+change of its value per second, and along which its impulse pushes and turns them. The function is linked, see
+linked_joint, and called in each substep. Where it tells no value this is the sum of these changes.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from ....framework.compilation import inlined, part
+from ....framework.jit.lazy import types
+from ....framework.jit.records.record_type import record_type
+from ....framework.vectors import add, add_scaled, dot, scale
+from ...integration.turning import change_of_spin
+from ...shapes.linking.signatures import call_in_dimension, vector_type
+from .records import SOLVER
+
+
+@cache
+def given_signature(dimensions: int) -> Any:
+    """(solver, row) -> (value, or NaN where the function tells none, along a, turn of a, along b, turn of b)."""
+    vector = vector_type(dimensions)
+    return types.Tuple((types.float64, *(vector,) * 4))(record_type(SOLVER, dimensions), types.int64)
+
+
+call_given = call_in_dimension(given_signature)
+
+
+@inlined
+def speed_of_given(solver, j):
+    """How fast the value of a row changes."""
+    joints = solver.joints
+    a, b = joints.first[j], joints.second[j]
+    at_a = dot(joints.along_a[j], solver.velocity[a]) + dot(joints.turn_a[j], solver.spin[a])
+    return at_a + dot(joints.normal[j], solver.velocity[b]) + dot(joints.turn_b[j], solver.spin[b])
+
+
+@part
+def measure_given(solver, j):
+    """The value of a row now. Its sum of changes takes the mean of those before and after a substep."""
+    joints = solver.joints
+    a, b = joints.first[j], joints.second[j]
+    moved_for = joints.moved_for
+    before = speed_of_given(solver, j) if moved_for > 0.0 else 0.0
+    joints.asked = joints.joint[j]
+    value, along_a, turn_a, along_b, turn_b = call_given(joints.function[j], solver, j)
+    joints.asked = 0
+    joints.along_a[j], joints.turn_a[j], joints.normal[j], joints.turn_b[j] = along_a, turn_a, along_b, turn_b
+    moved = solver.inverse_mass[a] * dot(along_a, along_a) + dot(turn_a, change_of_spin(solver, a, turn_a))
+    moved += solver.inverse_mass[b] * dot(along_b, along_b) + dot(turn_b, change_of_spin(solver, b, turn_b))
+    joints.mass[j] = 1.0 / moved if moved > 0.0 else 0.0
+    if value != value:
+        value = joints.value[j]
+        if moved_for > 0.0:
+            value += 0.5 * moved_for * (before + speed_of_given(solver, j))
+        else:
+            value += dot(along_a, solver.shift[a]) + dot(along_b, solver.shift[b])
+    joints.value[j] = value
+    return value
+
+
+@inlined
+def push_given(solver, j, impulse):
+    """Let a row act with an impulse."""
+    joints = solver.joints
+    a, b = joints.first[j], joints.second[j]
+    w_a, w_b = solver.inverse_mass[a], solver.inverse_mass[b]
+    if w_a > 0.0:
+        solver.velocity[a] = add_scaled(solver.velocity[a], joints.along_a[j], impulse * w_a)
+        solver.spin[a] = add(solver.spin[a], change_of_spin(solver, a, scale(joints.turn_a[j], impulse)))
+    if w_b > 0.0:
+        solver.velocity[b] = add_scaled(solver.velocity[b], joints.normal[j], impulse * w_b)
+        solver.spin[b] = add(solver.spin[b], change_of_spin(solver, b, scale(joints.turn_b[j], impulse)))

@@ -1,0 +1,427 @@
+"""Joints of plugins, whose rows a function gives: gears, pulleys, and one that is a built-in one again."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers_joints import G, at, chain, disc, joint_world, plank, run
+
+from carom import Phase, Physics, Plugin, PluginError, RigidBody, StepError, System, Transform, World, column
+from carom.framework.typing import Vector
+from carom.framework.vectors import add, divided, dot, length, replace, scale, sub
+from carom.plugins.joints import (
+    DRIVE,
+    GIVEN,
+    HOLD,
+    LIMIT,
+    SERVO,
+    SPRING,
+    Distance,
+    Driven,
+    Joint,
+    Joints,
+    Motor,
+    Row,
+    arm_of,
+    moment,
+)  # fmt: skip
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
+
+machines = Plugin("machines", version="1.0")
+
+
+@machines.joint
+class Gear(Joint):
+    a: int | None = column(dtype=int)
+    b: int | None = column(dtype=int)
+    ratio: float = column(default=1.0)
+    axle_a: Vector = column(default=0.0, item="vector", kw_only=True)
+    axle_b: Vector = column(default=0.0, item="vector", kw_only=True)
+
+    @staticmethod
+    def constraint(joint, a, b):
+        nothing = scale(a.position, 0.0)
+        axis_a = axis_b = replace(nothing, 0, 1.0)
+        if len(nothing) == 3:
+            axis_a, axis_b = arm_of(a, joint.axle_a), arm_of(b, joint.axle_b)
+        return None, nothing, axis_a, nothing, scale(axis_b, joint.ratio)
+
+
+@machines.joint
+class Pulley(Joint):
+    a: int | None = column(dtype=int)
+    b: int | None = column(dtype=int)
+    wheel_a: Vector = column(item="vector")
+    wheel_b: Vector = column(item="vector")
+    ratio: float = column(default=1.0, positive=True)
+    anchor_a: Vector = column(default=0.0, item="vector", kw_only=True)
+    anchor_b: Vector = column(default=0.0, item="vector", kw_only=True)
+
+    @staticmethod
+    def constraint(joint, a, b):
+        arm_a, arm_b = arm_of(a, joint.anchor_a), arm_of(b, joint.anchor_b)
+        rope_a, rope_b = sub(add(a.position, arm_a), joint.wheel_a), sub(add(b.position, arm_b), joint.wheel_b)
+        along_a, along_b = divided(rope_a, length(rope_a)), scale(rope_b, joint.ratio / length(rope_b))
+        whole = length(rope_a) + joint.ratio * length(rope_b)
+        return whole, along_a, moment(arm_a, along_a), along_b, moment(arm_b, along_b)
+
+
+@machines.joint
+class Rod(Joint):
+    """As Distance is, written as a function."""
+
+    a: int | None = column(dtype=int)
+    b: int | None = column(dtype=int)
+    anchor_a: Vector = column(default=0.0, item="vector")
+    anchor_b: Vector = column(default=0.0, item="vector")
+
+    @staticmethod
+    def constraint(joint, a, b):
+        arm_a, arm_b = arm_of(a, joint.anchor_a), arm_of(b, joint.anchor_b)
+        way = sub(add(b.position, arm_b), add(a.position, arm_a))
+        along = divided(way, length(way))
+        back = scale(along, -1.0)
+        return length(way), back, moment(arm_a, back), along, moment(arm_b, along)
+
+
+@machines.joint
+class Rail(Driven):
+    """b's way along x, and its height: two values with rules of their own."""
+
+    a: int | None = column(dtype=int)
+    b: int | None = column(dtype=int)
+    rule: int = column(default=-1, dtype=int)
+    to: float = column(default=0.0)
+
+    @staticmethod
+    def constraint(joint, a, b):
+        nothing = scale(b.position, 0.0)
+        x, y = replace(nothing, 0, 1.0), replace(nothing, 1, 1.0)
+        return (
+            (b.position[0], nothing, nothing, x, nothing),
+            (dot(b.position, y), nothing, nothing, y, nothing),
+        )
+
+    def rows(self, dimensions):
+        along = Row(GIVEN, HOLD, 0.0, most=50.0)
+        across = Row(GIVEN, HOLD, 0.0, part=1)
+        if self.rule >= 0:
+            rule = along._replace(rule=self.rule, low=self.to, high=self.to + 1.0, target=self.to)
+            return [rule._replace(frequency=1.0, damping_ratio=0.0), across]
+        return [*self.moving(along, 5.0), across]
+
+
+def machine_world(dimensions=2, gravity=G, **settings):
+    if dimensions == 2:
+        world, joints = joint_world((0.0, -gravity), **settings)
+    else:
+        joints = Joints()
+        world = World(Physics(dimensions=3, gravity=(0, -gravity, 0)), Rotation(), joints)
+    world.add_plugin(machines)
+    return world, joints
+
+
+def body(world, place, inertia=0.0, mass=1.0, **fields):
+    d = world.dimensions
+    spin = [Spin(inertia=inertia if d == 2 else np.full(3, inertia))] if inertia else []
+    return world.create_entity(Transform((*place, 0)[:d]), RigidBody(mass=mass, **fields), *spin)
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_gear_keeps_its_ratio_under_a_torque(dimensions):
+    world, joints = machine_world(dimensions, gravity=0.0)
+    a, b = body(world, (0, 0), 1.0), body(world, (5, 0), 2.0)
+    space: Any = {} if dimensions == 2 else {"axis": (0, 0, 1)}
+    axles: Any = {} if dimensions == 2 else {"axle_a": (0, 0, 1), "axle_b": (0, 1, 0)}  # bevel wheels
+    world.create_entity(Motor(None, a, speed=1e3, max_torque=9.0, **space))
+    gear = world.create_entity(Gear(a, b, 0.5, **axles))
+    run(world, 120)
+    w_a, w_b = (np.atleast_1d(world.component_for_entity(each, Spin).angular_velocity) for each in (a, b))
+    w_a, w_b = w_a[-1], w_b[-1 if dimensions == 2 else 1]
+    assert w_a == pytest.approx(9.0 / (1.0 + 2.0 / 0.5**2) * 2.0, rel=1e-9)  # T t / (I_a + I_b / ratio^2)
+    assert w_a + 0.5 * w_b == pytest.approx(0.0, abs=1e-9)
+    assert abs(joints.state(gear).value) < 1e-4  # rad
+    if dimensions == 2:
+        assert at(world, a).rotation == pytest.approx(-0.5 * at(world, b).rotation, abs=1e-4)
+        assert abs(joints.state(gear).torque - 2.0 * w_b / 120) < 1e-9
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("dimensions", [2, 3])
+@pytest.mark.parametrize("inertia", [0.0, 0.4])
+@pytest.mark.parametrize("ratio", [1.0, 2.0])
+def test_pulley_falls_as_atwood_says(dimensions, inertia, ratio):
+    world, joints = machine_world(dimensions)
+    a, b = body(world, (0, -1), inertia, mass=3.0), body(world, (2, -8), inertia)
+    pulley = world.create_entity(Pulley(a, b, (0, 0, 0)[:dimensions], (2, 0, 0)[:dimensions], ratio))
+    run(world, 60)
+    speed = -world.component_for_entity(a, RigidBody).linear_velocity[1]
+    fall = G * (3.0 - 1.0 / ratio) / (3.0 + 1.0 / ratio**2)
+    assert speed == pytest.approx(fall, rel=1e-4)
+    assert joints.state(pulley).value == pytest.approx(1.0 + 8.0 * ratio, abs=1e-3)
+    assert joints.state(pulley).impulse[1] * 60 == pytest.approx(ratio * 3.0 * (G - fall), rel=1e-3)
+
+
+def test_pulley_in_balance_stays_where_it_is():
+    world, _ = machine_world(sleeping=True)
+    a, b = body(world, (0, -1), mass=2.0), body(world, (2, -2))
+    world.create_entity(Pulley(a, b, (0, 0), (2, 0), 0.5))
+    run(world, 600)
+    np.testing.assert_allclose(at(world, a).position, (0, -1), atol=1e-3)
+    assert world.kinetic_energy() < 1e-6
+
+
+def test_pulley_on_bodies_that_swing_and_turn_keeps_its_length_and_gains_no_energy():
+    world, joints = machine_world(dt=1 / 240)
+    a, b = body(world, (0.8, -1), 0.2, mass=1.2), body(world, (2, -2), 0.3)
+    pulley = world.create_entity(Pulley(a, b, (0, 0), (2, 0), anchor_a=(0.2, 0.1), anchor_b=(0, 0.3)))
+    before = world.kinetic_energy() + world.potential_energy()
+    world.step()
+    whole = joints.state(pulley).value
+    for _ in range(240):
+        world.step()
+        assert joints.state(pulley).value == pytest.approx(whole, abs=3e-3)
+        now = world.kinetic_energy() + world.potential_energy()
+        assert now < before + 0.01 * G
+    assert now > before - 0.05 * G
+
+
+@pytest.mark.plain
+def test_rod_as_a_function_moves_as_the_built_in_one():
+    places = []
+    for kind in (Distance, Rod):
+        world, _ = machine_world()
+        a, b = disc(world, (0, 0)), disc(world, (1, 0.5))
+        world.component_for_entity(a, RigidBody).linear_velocity = (0, 3)
+        for one, other, ends in ((a, b, ((0.1, 0), (0, 0.2))), (None, a, ((0, 2), (0.0, 0.1)))):
+            world.create_entity(kind(one, other, *ends))
+        run(world, 120)
+        places.append([[*at(world, each).position, at(world, each).rotation] for each in (a, b)])
+    np.testing.assert_allclose(places[0], places[1], atol=1e-9)
+
+
+@pytest.mark.plain
+def test_free_bodies_keep_momentum_and_angular_momentum():
+    world, _ = machine_world(gravity=0.0, dt=1 / 240)
+    a, b = body(world, (0, 0), 0.5), body(world, (1, 0.5), 0.3, mass=2.0, linear_velocity=(1, -2))
+    world.create_entity(Rod(a, b, (0.1, 0.2), (0, -0.3)))
+
+    def momentum():
+        turning = 0.0
+        for each, inertia in ((a, 0.5), (b, 0.3)):
+            x, y = at(world, each).position
+            u, v = world.component_for_entity(each, RigidBody).linear_velocity
+            mass = world.component_for_entity(each, RigidBody).mass
+            turning += mass * (x * v - y * u) + inertia * world.component_for_entity(each, Spin).angular_velocity
+        return np.append(world.momentum(), turning)
+
+    before = momentum()
+    world.step()  # it stops what the rod does not let them do
+    energy = world.kinetic_energy()
+    run(world, 480)
+    now = momentum()
+    np.testing.assert_allclose(now[:2], before[:2], atol=1e-12)
+    assert now[2] == pytest.approx(before[2], rel=2e-3)
+    assert world.kinetic_energy() == pytest.approx(energy, rel=0.02)
+
+
+@pytest.mark.plain
+def test_values_obey_every_rule():
+    world, joints = machine_world(gravity=0.0)
+    rails = {}
+    for rule, to in ((HOLD, 0.5), (LIMIT, 0.5), (DRIVE, 0.25), (SPRING, 0.5), (SERVO, 0.5)):
+        rails[rule] = world.create_entity(Rail(None, body(world, (0, 0), linear_velocity=(0.1, 0)), rule, to))
+    driven = world.create_entity(Rail(None, body(world, (0, 0)), lower=-1.0, upper=1.0, motor_speed=0.5))
+    heights = [world.component_for_entity(entity, Rail).b or 0 for entity in (*rails.values(), driven)]
+    ways = []
+    for _ in range(240):
+        world.step()
+        ways.append(joints.state(rails[SPRING]).value)
+    for rule, to in ((HOLD, 0.5), (DRIVE, 1.0), (SERVO, 0.5)):
+        assert joints.state(rails[rule]).value == pytest.approx(to, abs=0.01)
+    assert joints.state(rails[DRIVE]).speed == pytest.approx(0.25)
+    assert joints.state(rails[LIMIT]).value > 0.49
+    assert joints.state(driven).value == pytest.approx(1.0, abs=1e-3)
+    passes = np.flatnonzero((np.array(ways[:-1]) < 0.5) & (np.array(ways[1:]) >= 0.5))
+    assert np.diff(passes).mean() / 60 == pytest.approx(1.0, abs=0.03)  # s
+    assert max(abs(at(world, each).y) for each in heights) < 1e-9
+
+
+def test_fields_are_seen_at_once_and_wake_the_bodies():
+    world, joints = machine_world(sleeping=True)
+    plank(world, (0, -1.5), (20, 0.5), mass=1e3)
+    world.create_entity(Transform((0, -3)), BoxCollider((20.0, 1.0)))
+    a, b = disc(world, (0, -0.9)), disc(world, (5, -0.9))
+    gear = world.create_entity(Gear(a, b))
+    run(world, 120)
+    assert world.component_for_entity(a, RigidBody).asleep
+    world.component_for_entity(gear, Gear).ratio = -3.0
+    world.step()
+    assert not world.component_for_entity(b, RigidBody).asleep
+    world.component_for_entity(a, Spin).angular_velocity = 10.0
+    world.step()
+    w_a, w_b = (world.component_for_entity(each, Spin).angular_velocity for each in (a, b))
+    assert w_a == pytest.approx(3.0 * w_b, rel=1e-3)
+    assert w_b > 0.1
+    assert joints.of(a) == [gear]
+
+
+def build():
+    world, joints = machine_world()
+    a, b = disc(world, (0, -1), mass=2.0), disc(world, (2, -2))
+    _, hinges = chain(world, 4, (0.8, 0.6), (0.45, 0.1))
+    pulley = world.create_entity(Pulley(a, b, (0, 0), (2, 0), anchor_a=(0.1, 0.1)))
+    gear = world.create_entity(Gear(a, b, 0.7))
+    world.component_for_entity(a, Spin).angular_velocity = 5.0
+    world.create_entity(Distance(None, b, anchor_a=(2.5, 0)))
+    return world, joints, (pulley, gear, *hinges)
+
+
+def test_same_bits_again_from_snapshots_and_files(tmp_path):
+    world, joints, (_, gear, *hinges) = build()
+    run(world, 30)
+    snapshot, value = world.snapshot(), joints.state(gear).value
+    world.save(tmp_path / "machines.carom")
+    run(world, 30)
+    later = world.state_hash(), joints.state(gear).value
+    world.delete_entity(hinges[2])
+    run(world, 3)
+    world.restore(snapshot)
+    assert value != later[1] != 0.0
+    run(world, 30)
+    assert (world.state_hash(), joints.state(gear).value) == later
+    joints = Joints()
+    gravity = Physics(dimensions=2, gravity=(0, -G))
+    loaded = World.load(tmp_path / "machines.carom", gravity, Rotation(), joints, machines)
+    run(loaded, 30)
+    assert (loaded.state_hash(), joints.state(gear).value) == later
+
+
+class Fails(System):
+    """Raises once."""
+
+    phase = Phase.END
+    due = 5
+
+    def process(self, dt):
+        if self.world.step_count == self.due:
+            self.due = -1
+            raise RuntimeError("once")
+
+
+def test_step_that_fails_leaves_forces_and_values_as_they_were():
+    found = []
+    for fails in (False, True):
+        world, joints, (_, gear, *_) = build()
+        system = Fails()
+        system.due = 5 if fails else -1
+        world.add_system(system)
+        for _ in range(20):
+            try:
+                world.step()
+            except StepError:
+                world.step()
+        found.append((world.state_hash(), joints.state(gear).value))
+    assert found[0] == found[1]
+
+
+def test_they_break_and_are_lost_as_others():
+    world, joints = machine_world()
+    a, b = body(world, (0, -1), mass=3.0), body(world, (2, -2))
+    pulley = Pulley(a, b, (0, 0), (2, 0), breaking_force=2.0 * 3.0 / 4.0 * G * 0.99)
+    events = []
+    for event in ("joint_broken", "joint_lost"):
+        world.on(event, lambda entity, joint, event=event: events.append((event, joint)))
+    world.create_entity(pulley)
+    run(world, 3)
+    assert events == [("joint_broken", pulley)]
+    again = Pulley(a, b, (0, 0), (2, 0))
+    world.create_entity(again)
+    run(world, 30)
+    np.testing.assert_allclose(joints.columns()["impulse"][0, 1] * 60, 1.5 * G, rtol=1e-3)
+    world.delete_entity(b)
+    world.step()
+    assert events[1:] == [("joint_lost", again)]
+    assert len(joints) == 0
+
+
+# -- errors ----------------------------------------------------------------------------------------
+
+
+def declared(returned):
+    """A joint whose function returns that, registered."""
+
+    def constraint(joint, a, b):
+        return returned(a, b)
+
+    fields = {"a": column(dtype=int), "b": column(dtype=int), "constraint": constraint, "__module__": __name__}
+    return Plugin("wrong").joint(type("Wrong", (Joint,), fields))
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize(
+    ("returned", "message"),
+    [
+        (lambda a, b: 1.0, r"returned 1.0: return \(value, along_a"),
+        (lambda a, b: (1.0, a.position), "or a tuple of such rows"),
+        (lambda a, b: (1.0, a.position, (0.0,), a.position, a.position), r"turn_a.*\(in 2D a turn is \(turn, 0.0\)\)"),
+        (lambda a, b: (math.nan, *(a.position,) * 4), "nan as value: return a number, or None"),
+        (lambda a, b: (1.0 / a.position[0], *(a.position,) * 4), "raised ZeroDivisionError"),
+    ],
+)
+def test_what_no_constraint_returns_is_refused_when_it_is_registered(returned, message):
+    with pytest.raises(PluginError, match=f"plugin wrong: joint Wrong: constraint, tried in 2D, .*{message}"):
+        declared(returned)
+
+
+def test_what_is_no_joint_is_refused():
+    for thing, message in ((Transform, "derive a class from carom.plugins.joints.Joint"), (Distance, "no constraint")):
+        with pytest.raises(PluginError, match=message):
+            Plugin("wrong").joint(thing)
+    with pytest.raises(ValueError, match=r"Gear does nothing without the plugin .* World\(Physics.*, plugin\)"):
+        World(Physics(), Joints()).create_entity(Gear(None, 1))
+    with pytest.raises(ValueError, match=r"Gear does nothing without its plugin: World\(Physics\(...\), Joints\(\)\)"):
+        World(Physics(), machines).create_entity(Gear(None, 1))
+
+
+@pytest.mark.plain
+def test_numbers_that_are_not_finite_name_joint_and_entity():
+    world, _ = machine_world()
+    a = body(world, (0, 0))
+    pulley = Pulley(None, a, (1, 0), (0, 0))
+    entity = world.create_entity(pulley)
+    with pytest.raises(ValueError, match=f"entity {entity}: Pulley: where it takes hold .* not finite"):
+        world.step()
+    pulley.wheel_b = (0, 2)
+    world.step()
+    before = world.state_hash()
+    pulley.wheel_b = at(world, a).position
+    with pytest.raises(StepError, match=f"plugin machines: constraint of Pulley, entity {entity}: .* not finite"):
+        world.step()
+    assert world.state_hash() == before
+
+
+@pytest.mark.plain
+def test_rows_of_a_part_that_there_is_not_are_refused():
+    class Half(Joint):
+        a: int | None = column(dtype=int)
+        b: int | None = column(dtype=int)
+
+        @staticmethod
+        def constraint(joint, a, b):
+            return (None, *(scale(a.position, 0.0),) * 4)
+
+        def rows(self, dimensions):
+            return [Row(GIVEN, HOLD, part=1)]
+
+    half = Plugin("half")
+    half.joint(Half)
+    world, _ = machine_world()
+    world.add_plugin(half)
+    world.create_entity(Half(body(world, (0, 0)), body(world, (1, 0))))
+    with pytest.raises(ValueError, match="speak of part 1, but its constraint returns 1"):
+        world.step()
