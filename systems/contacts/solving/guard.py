@@ -1,4 +1,4 @@
-"""What the usual passes of a substep leave undone: further passes, and a bound on the energy that contacts give.
+"""What the usual passes of a substep leave undone: further passes, and a bound on the energy that rows give.
 
 Contacts at rest take energy from their island. Impulses that were those of another moment may give some: passes go on
 over the rows of such islands, and over rows that are not solved. What energy is left after these, but for a
@@ -11,7 +11,7 @@ import math
 
 from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, dot, scale, sub
-from ...integration.turning import spin_energy
+from ...integration.turning import cross_spin, spin_energy
 from ..constants import (
     DEEP,
     FADING,
@@ -23,7 +23,7 @@ from ..constants import (
     SOLVED,
     SWEEPS,
 )  # fmt: skip
-from .joints import relax_struck
+from .joints import POINT, TURN, relax_struck
 from .rows import closing_speed, relax_listed, velocity_at
 
 
@@ -75,9 +75,28 @@ def weigh(solver, span, islands):
             if island[a] >= 0:
                 work = dot(push, velocity_at(solver, b, solver.arm_b, k, arms))
             slope[island_of(solver, k)] += work
-    for t in range(islands[0], islands[1] if len(arms) > 1 else islands[0]):
-        if solver.jointed[t]:  # motors and springs give energy
-            slope[t] = -math.inf
+    if len(arms) > 1:
+        weigh_movers(solver)
+        for t in range(islands[0], islands[1]):
+            if solver.driven[t]:
+                slope[t] = -math.inf
+
+
+@part
+def weigh_movers(solver):
+    """The work of what moves by itself at the other ends of joints is none of theirs."""
+    joints, island = solver.joints, solver.island
+    for e in range(joints.begin, joints.end if solver.movers > 0 else joints.begin):
+        j = joints.order[e]
+        a, b = joints.first[j], joints.second[j]
+        if island[a] < 0 or island[b] < 0:
+            q, arm, away = (a, joints.arm_a[j], -1.0) if island[a] < 0 else (b, joints.arm_b[j], 1.0)
+            if joints.kind[j] >= TURN:
+                work = joints.impulse[j] * dot(joints.normal[j], solver.spin[q])
+            else:
+                push = joints.push[j] if joints.kind[j] == POINT else scale(joints.normal[j], joints.impulse[j])
+                work = dot(push, add(solver.velocity[q], cross_spin(solver.spin[q], arm)))
+            solver.slope[max(island[a], island[b])] += away * work
 
 
 @part
@@ -93,7 +112,7 @@ def allow(solver, bias_rate, h, dt, span, islands):
     small share of its motion and of the energy at the speed of pushing."""
     start, stop, begin, end, _ = span
     allowed, motion = solver.allowed, solver.momentum
-    share, zero = h / dt, scale(solver.normal[start], 0.0)  # of what a step may give
+    share, zero = h / dt, scale(solver.velocity[begin], 0.0)  # of what a step may give
     for t in range(islands[0], islands[1]):
         motion[t] = zero
     for q in range(begin, end):
@@ -104,6 +123,8 @@ def allow(solver, bias_rate, h, dt, span, islands):
         mass, force = solver.mass_of[t], solver.force_of[t] * h / dt
         energy = max(0.0, solver.energy[t] - dot(motion[t], motion[t]) / mass)
         allowed[t] = (0.5 + GAIN_WEIGHT * dt / h) * force * force / mass + share * GAIN_MOTION * energy
+        if solver.jointed[t]:
+            allowed[t] = solver.credit[t] + (allowed[t] if solver.size_of[t] > 0 else 0.0)
     for k in range(start, stop):
         speed = bias_rate * DEEP * solver.extent[k]
         allowed[island_of(solver, k)] += share * GAIN_PUSH * solver.mass[k] * speed * speed
@@ -138,14 +159,19 @@ def find_unsolved(solver, turn, any_struck, dt, span, islands):
 
 @part
 def restrain(solver, span, islands):
-    """In islands that still gain only the share acts that takes the most energy: the least of E(s)."""
+    """In islands that still gain only the share acts that takes the most energy: the least of E(s). Where there are
+    joints the largest share acts that gives no more than is allowed."""
     start, stop, begin, end, arms = span
     share, any_gain = solver.share, False
     for t in range(islands[0], islands[1]):
         share[t] = 1.0
         if gains(solver, t):
             slope, curvature = solver.slope[t] - solver.allowed[t], solver.curvature[t]
-            share[t] = min(1.0, max(0.0, -slope / curvature)) if curvature < math.inf else 0.0
+            most = -slope / curvature
+            if solver.jointed[t]:  # all that is allowed, as joints are to hold
+                root = math.sqrt(solver.slope[t] * solver.slope[t] + 2.0 * curvature * solver.allowed[t])
+                most = (root - solver.slope[t]) / curvature
+            share[t] = min(1.0, max(0.0, most)) if curvature < math.inf else 0.0
             solver.taken[t] += slope + 0.5 * curvature - share[t] * (slope + 0.5 * share[t] * curvature)
             any_gain = True
     for q in range(begin, end if any_gain else begin):
@@ -157,6 +183,8 @@ def restrain(solver, span, islands):
             if len(arms) > 0:
                 turned = sub(solver.spin[q], solver.spin_before[q])
                 solver.spin[q] = add_scaled(solver.spin_before[q], turned, share[t])
+    if len(arms) > 1 and any_gain:
+        fade_joints(solver)
     for k in range(start, stop if any_gain else start):
         kept = share[island_of(solver, k)]
         if kept < 1.0:
@@ -166,14 +194,36 @@ def restrain(solver, span, islands):
 
 
 @part
+def fade_joints(solver):
+    """Joints of islands that the guard has restrained begin the next substep with as much less."""
+    joints = solver.joints
+    for e in range(joints.begin, joints.end):
+        j = joints.order[e]
+        kept = solver.share[max(solver.island[joints.first[j]], solver.island[joints.second[j]])]
+        if kept < 1.0:
+            kept = max(kept, FADING)
+            joints.impulse[j], joints.push[j] = kept * joints.impulse[j], scale(joints.push[j], kept)
+
+
+@part
+def settle(solver, islands):
+    """What joints have taken in a substep they may give back later in the step."""
+    for t in range(islands[0], islands[1]):
+        s = solver.share[t]
+        if solver.jointed[t] and not solver.driven[t]:
+            solver.credit[t] = max(0.0, solver.credit[t] - s * (solver.slope[t] + 0.5 * s * solver.curvature[t]))
+
+
+@part
 def finish_substep(solver, bias_rate, any_struck, h, dt, span):
     """Further passes over the islands of a range that gain or are struck, then the bound on their energy."""
     islands, any_gain = islands_of(solver, span), False
     weigh(solver, span, islands)
     for t in range(islands[0], islands[1]):
-        solver.allowed[t] = 0.0
+        solver.allowed[t], solver.share[t] = solver.credit[t], 1.0
         any_gain |= gains(solver, t)
     if not (any_gain or any_struck):
+        settle(solver, islands)
         return
     allow(solver, bias_rate, h, dt, span, islands)
     turn, count = 0, find_unsolved(solver, 0, any_struck, dt, span, islands)
@@ -186,3 +236,4 @@ def finish_substep(solver, bias_rate, any_struck, h, dt, span):
         turn += SWEEPS
         count = find_unsolved(solver, turn, any_struck, dt, span, islands)
     restrain(solver, span, islands)
+    settle(solver, islands)

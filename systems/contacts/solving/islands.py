@@ -106,6 +106,7 @@ def weigh_joint(state, j):
     solver, joints, inverse_mass = state.solver, state.solver.joints, state.bodies.inverse_mass
     a, b, t = joints.row_a[j], joints.row_b[j], island_of_joint(state, j)
     solver.jointed[t] = True
+    solver.driven[t] |= joints.rule[j] > LIMIT
     w_a, w_b = inverse_mass[a] if a >= 0 else 0.0, inverse_mass[b] if b >= 0 else 0.0
     solver.borne[t] = min(solver.borne[t], w_a if w_a > 0.0 else w_b, w_b if w_b > 0.0 else w_a)
     solver.welds[t] += joints.kind[j] == TURN and joints.rule[j] == HOLD
@@ -136,6 +137,7 @@ def number_islands(state):
             solver.lightest[t], solver.most_change[t], solver.mass_of[t], solver.force_of[t] = math.inf, 0.0, 0.0, 0.0
             solver.stiff[t] = solver.own[t] = solver.strike[t] = solver.taken[t] = 0.0
             solver.size_of[t], solver.leader[t] = 0, i
+            solver.driven[t], solver.credit[t] = False, 0.0
             solver.jointed[t], solver.give[t], solver.borne[t], solver.welds[t] = False, 0.0, math.inf, 0
         solver.number[q] = t
         change = sub(velocity[i], start[i])

@@ -1,0 +1,98 @@
+"""Joints without motors and springs give no energy: random chains of all kinds, whose masses differ by a million."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers_joints import energy, joint_world
+
+from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World
+from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Slider, Weld
+from carom.plugins.rotation import Rotation, Spin
+
+SUBSTEPS = (1, 2, 4, 8, 16)
+
+
+def random_joint(random: np.random.Generator, d: int, a: tuple[Any, Any], b: tuple[Any, Any]) -> Any:
+    """Between two (entity, place)."""
+    ends, middle = (a[0], b[0]), 0.5 * (a[1] + b[1])
+    axis = {"axis": random.normal(size=3)} if d == 3 else {}
+    limits = (-0.5, 0.5) if random.random() < 0.5 else None
+    place, length = (a[1] if a[0] is None else np.zeros(d)), float(np.linalg.norm(b[1] - a[1]))
+    kinds = [
+        lambda: Distance(*ends, anchor_a=place),
+        lambda: Distance(*ends, anchor_a=place, length=(0.0, length)),
+        lambda: Hinge(*ends, anchor=middle, limits=limits, **axis),
+        lambda: Ball(*ends, anchor=middle),
+        lambda: Weld(*ends, anchor=middle),
+        lambda: Slider(*ends, direction=random.normal(size=d), limits=limits),
+        lambda: Slider(*reversed(ends), direction=random.normal(size=d)),
+        lambda: Cone(*ends, anchor=middle, swing=0.7, twist=limits, **axis),
+    ]
+    return kinds[int(random.integers(0, len(kinds) - (d == 2)))]()
+
+
+def random_chain(seed: int, d: int, gravity: float) -> tuple[World, bool]:
+    """Bodies that move and turn anyhow, each joined to an earlier one, or to the world; and whether it is."""
+    random, settings = np.random.default_rng(seed), Settings(substeps=SUBSTEPS[seed % 5], on_fault="ignore")
+    world = World(Physics(dimensions=d, gravity=(0,) * (d - 1) + (-gravity,)), Rotation(), Joints(), settings=settings)
+    place, ends = np.zeros(d), [(None, np.zeros(d))]
+    for _ in range(int(random.integers(2, 9))):
+        place = place + random.normal(size=d)
+        mass = 10.0 ** random.uniform(-3, 3)
+        inertia = mass * random.uniform(0.05, 0.5)
+        body = world.create_entity(
+            Transform(place),
+            RigidBody(mass=mass, linear_velocity=random.normal(0, 2, d)),
+            Spin(random.normal(0, 2, None if d == 2 else 3), inertia=inertia if d == 2 else np.full(3, inertia)),
+        )
+        ends.append((body, place))
+    first = 1 + int(random.integers(0, 2))  # the first body hangs on the world, or on nothing
+    for k in range(first, len(ends)):
+        before = ends[k - 1 if random.random() < 0.7 else int(random.integers(first - 1, k))]
+        world.create_entity(random_joint(random, d, before, ends[k]))
+    return world, first == 1
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("gravity", [0.0, 9.81])
+def test_no_chain_gains_energy(d, gravity):
+    for seed in range(15):
+        world, hangs = random_chain(seed, d, gravity)
+        start = lowest = energy(world)
+        momentum, fastest = world.momentum(), world.kinetic_energy()
+        for _ in range(150):
+            world.step()
+            now, fastest = energy(world), max(fastest, world.kinetic_energy())
+            assert now <= start + 1e-8 * fastest
+            if not gravity:  # what brings joints together lifts bodies
+                assert now <= lowest + 1e-8 * fastest
+                lowest = min(lowest, now)
+        if not (gravity or hangs):
+            np.testing.assert_allclose(world.momentum(), momentum, atol=1e-9 * sum(abs(momentum)))
+        world.close()
+
+
+@pytest.mark.parametrize("substeps", SUBSTEPS)
+def test_sliders_of_a_light_body_between_heavy_ones_give_no_energy(substeps):
+    world, _ = joint_world(0, substeps=substeps, on_fault="ignore")
+    post = world.create_entity(Transform((8, -2)), RigidBody(kind="static"), SphereCollider(0.2))
+    bodies = [
+        world.create_entity(
+            Transform(place), RigidBody(mass=mass, linear_velocity=velocity), Spin(spin), SphereCollider(0.5)
+        )
+        for place, mass, velocity, spin in (
+            ((-6, 0), 178.0, (3, -0.5), -0.06),
+            ((-2, -8), 0.752, (1.2, -2.1), -3.5),
+            ((4, 6), 282.0, (1.8, 2.3), -1.4),
+        )
+    ]
+    world.create_entity(Slider(bodies[1], bodies[0], direction=(-1.77, -0.117)))
+    world.create_entity(Slider(bodies[1], post, direction=(0.154, 0.399), collide_connected=True))
+    world.create_entity(Ball(bodies[2], bodies[1], anchor=(1, -1), collide_connected=True))
+    start = world.kinetic_energy()
+    for _ in range(600):
+        world.step()
+        assert world.kinetic_energy() <= start
