@@ -38,7 +38,8 @@ def random_chain(seed: int, d: int, gravity: float) -> tuple[World, bool]:
     """Bodies that move and turn anyhow, each joined to an earlier one, or to the world; and whether it is."""
     random, settings = np.random.default_rng(seed), Settings(substeps=SUBSTEPS[seed % 5], on_fault="ignore")
     world = World(Physics(dimensions=d, gravity=(0,) * (d - 1) + (-gravity,)), Rotation(), Joints(), settings=settings)
-    place, ends = np.zeros(d), [(None, np.zeros(d))]
+    place = np.zeros(d)
+    ends: list[tuple[Any, Any]] = [(None, place)]
     for _ in range(int(random.integers(2, 9))):
         place = place + random.normal(size=d)
         mass = 10.0 ** random.uniform(-3, 3)
