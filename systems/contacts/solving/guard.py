@@ -23,7 +23,8 @@ from ..constants import (
     SOLVED,
     SWEEPS,
 )  # fmt: skip
-from .joints import POINT, TURN, relax_struck
+from .given import rates_of_given
+from .joints import GIVEN, POINT, TURN, relax_struck
 from .rows import closing_speed, relax_listed, velocity_at
 
 
@@ -91,7 +92,10 @@ def weigh_movers(solver):
         a, b = joints.first[j], joints.second[j]
         if island[a] < 0 or island[b] < 0:
             q, arm, away = (a, joints.arm_a[j], -1.0) if island[a] < 0 else (b, joints.arm_b[j], 1.0)
-            if joints.kind[j] >= TURN:
+            if joints.kind[j] == GIVEN:
+                at_a, at_b = rates_of_given(solver, j)
+                work = away * joints.impulse[j] * (at_a if q == a else at_b)
+            elif joints.kind[j] >= TURN:
                 work = joints.impulse[j] * dot(joints.normal[j], solver.spin[q])
             else:
                 push = joints.push[j] if joints.kind[j] == POINT else scale(joints.normal[j], joints.impulse[j])
@@ -122,9 +126,11 @@ def allow(solver, bias_rate, h, dt, span, islands):
     for t in range(islands[0], islands[1]):
         mass, force = solver.mass_of[t], solver.force_of[t] * h / dt
         energy = max(0.0, solver.energy[t] - dot(motion[t], motion[t]) / mass)
-        allowed[t] = (0.5 + GAIN_WEIGHT * dt / h) * force * force / mass + share * GAIN_MOTION * energy
+        allowed[t] = (0.5 + GAIN_WEIGHT * dt / h) * force * force / mass
+        if solver.size_of[t] > 0:
+            allowed[t] += share * GAIN_MOTION * energy
         if solver.jointed[t]:
-            allowed[t] = solver.credit[t] + (allowed[t] if solver.size_of[t] > 0 else 0.0)
+            allowed[t] += solver.credit[t]
     for k in range(start, stop):
         speed = bias_rate * DEEP * solver.extent[k]
         allowed[island_of(solver, k)] += share * GAIN_PUSH * solver.mass[k] * speed * speed
