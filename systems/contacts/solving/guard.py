@@ -126,8 +126,9 @@ def allow(solver, bias_rate, h, dt, span, islands):
     for t in range(islands[0], islands[1]):
         mass, force = solver.mass_of[t], solver.force_of[t] * h / dt
         energy = max(0.0, solver.energy[t] - dot(motion[t], motion[t]) / mass)
-        allowed[t] = (0.5 + GAIN_WEIGHT * dt / h) * force * force / mass
-        if solver.size_of[t] > 0:
+        touches = solver.size_of[t] > 0
+        allowed[t] = (0.5 + GAIN_WEIGHT * (dt / h if touches else 1.0)) * force * force / mass
+        if touches:
             allowed[t] += share * GAIN_MOTION * energy
         if solver.jointed[t]:
             allowed[t] += solver.credit[t]
