@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ..framework.errors import CaromError
 from ..framework.typing import Vector
 from ..framework.vectors import item
 from .colliders import AABBCollider, Collider
+from .part_of import rows_of_parts
 from .rigid_body import RigidBody, add_push, force_applied
 
 UNKNOWN = "Spin.inertia is None, and it has no collider that tells it, or several: give a number"
@@ -101,14 +102,21 @@ class Spin(Component):
         given, store = self.inertia, self._in_world()
         if given is not None:
             return np.diag(given) if np.ndim(given) else float(given)
-        row, d = store.find(self._entity), store.dimensions
-        colliders = [component for component in store.types_in(row) if issubclass(component, Collider)]
-        if len(colliders) != 1 or not hasattr(colliders[0], "second_moments"):
-            raise CaromError(f"entity {self._entity}: {UNKNOWN}")
-        shape = self._handle(colliders[0])
-        found = colliders[0].second_moments(shape, d)  # type: ignore[attr-defined]
-        xx, yy, zz, xy, xz, yz = inertia_about(found, shape.offset, store.column("mass")[row])
-        return float(zz) if d == 2 else np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
+        row = store.find(self._entity)
+        parts, mass = rows_of_parts(store, int(store.column("entity")[row])), float(store.column("mass")[row])
+        if not len(parts):
+            shape = mass_of_shape(store, row)
+            if shape is None:
+                raise CaromError(f"entity {self._entity}: {UNKNOWN}")
+            return shape.inertia(mass)
+        masses, turns = store.column("part_of.added")[parts], store.column("part_of.turn")[parts]
+        own, share = mass - masses.sum(), min(1.0, mass / max(masses.sum(), mass))
+        total: Any = 0.0
+        for k, weight, turn in zip((row, *parts), (own, *share * masses), (0.0, *turns), strict=True):
+            shape = mass_of_shape(store, k) if weight > 0.0 else None
+            if shape is not None:
+                total = total + shape.inertia(weight, turn)
+        return total
 
     def _turned_by(self, twist: Any) -> Angular:
         """The change of the angular velocity by an angular impulse, N m s, along the world's axes."""
@@ -121,9 +129,7 @@ class Spin(Component):
     def _axes(self) -> np.ndarray:
         """The matrix of the body's quaternion w, x, y, z."""
         store = self._in_world()
-        w, x, y, z = store.column("rotation")[store.find(self._entity)].tolist()
-        across = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
-        return np.eye(3) + 2.0 * w * across + 2.0 * across @ across
+        return axes_of(store.column("rotation")[store.find(self._entity)])
 
     def _turn(self, torque: Any) -> None:
         if self._store is None or self._handle(RigidBody).kind == "dynamic":
@@ -154,6 +160,46 @@ class Spin(Component):
             argument.check_dimensions(found, d, self._entity)
             found = argument.whole(found, d) if argument.item_shape(d) else found
         return found
+
+
+def axes_of(rotation: np.ndarray) -> np.ndarray:
+    """The matrix of a quaternion w, x, y, z."""
+    w, x, y, z = rotation.tolist()
+    across = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+    return np.eye(3) + 2.0 * w * across + 2.0 * across @ across
+
+
+class MassOfShape(NamedTuple):
+    """The only collider of a body, as what its mass is spread over.
+
+    centre
+        (d,) m from the body's position, along its own axes
+    moments
+        measure, centre and second moments, as the shape tells them
+    """
+
+    centre: np.ndarray
+    moments: Any
+    offset: np.ndarray
+
+    def inertia(self, mass: float, turn: Any = 0.0) -> Any:
+        """kg m^2 about the body's position; in 3D (3, 3), along the axes that it is turned against."""
+        xx, yy, zz, xy, xz, yz = inertia_about(self.moments, self.offset, mass)
+        if len(self.offset) == 2:
+            return float(zz)
+        axes = axes_of(turn) if np.ndim(turn) else np.eye(3)
+        return axes @ np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))) @ axes.T
+
+
+def mass_of_shape(store: Any, row: Any) -> MassOfShape | None:
+    """That of a row; None without a collider that tells it, or with several."""
+    colliders = [component for component in store.types_in(row) if issubclass(component, Collider)]
+    if len(colliders) != 1 or not hasattr(colliders[0], "second_moments"):
+        return None
+    shape: Any = object.__new__(colliders[0])
+    shape._bind(store, int(store.column("entity")[row]))
+    moments, offset = colliders[0].second_moments(shape, store.dimensions), np.array(shape.offset)  # type: ignore[attr-defined]
+    return MassOfShape(offset + np.array(moments[1 : 1 + store.dimensions]), moments, offset)
 
 
 def spin_energy(store: Any, entities: np.ndarray) -> float:

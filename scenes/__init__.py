@@ -17,7 +17,7 @@ from .levels import conveyor, lift, maze, platforms, player, static_world
 from .motion import freefall, jump, orbit, spring
 from .protocol import Build, Scene
 from .rest import few, pile, pile2d, pile3d, pyramid, stack
-from .turning import billiards_spin, dominoes, flipper, hills, rubble, tumbler
+from .turning import billiards_spin, dominoes, flipper, hills, pieces, rubble, tumbler
 
 _SCENES: dict[str, Scene] = {
     scene.name: scene
@@ -57,6 +57,7 @@ _SCENES: dict[str, Scene] = {
         dominoes.SCENE,
         tumbler.SCENE,
         rubble.SCENE,
+        pieces.SCENE,
         bridge.SCENE,
         ragdoll.SCENE,
         car.SCENE,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..framework.compilation import part
 from .codes import NEED_SWEEPS, OK, ROTATE
+from .compounds.stages import share_masses
 
 DISCRETE = 0
 OPENED, KEEPS_VELOCITY, KEEPS_START, KEEPS_FORCE, KEEPS_WRITTEN = 1, 2, 4, 8, 16  # bits of state.kept
@@ -42,7 +43,7 @@ def keep_state(state, dt):
     If nothing changes the velocity before keep_start, start_velocity has it too.
     """
     bodies, pairs, impacts = state.bodies, state.pairs, state.impacts
-    state.unforced, state.pushed, state.moved = False, True, False
+    state.unforced, state.pushed, state.moved, state.compound = False, True, False, False
     state.forces_summed = state.candidates_ready = state.contacts_ready = False
     state.event_count, state.flight_usual = 0, False
     pairs.count = pairs.found = pairs.resting_count = pairs.disabled_count = pairs.touching_count = 0
@@ -87,6 +88,7 @@ def read_bodies(state, dt):
     every = state.read_version != state.statics_version or state.inverse_masses_exposed
     for i in range(state.dynamic, state.count if every else state.moving):
         inverse_mass[i] = 0.0
+    share_masses(state)
     state.limits_speed, state.spinning = limited, False
     state.sweeping = state.collides and (state.mode != DISCRETE or any_ccd(state))
     if state.sweeping and not state.sweeps_ready:

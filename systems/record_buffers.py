@@ -21,6 +21,7 @@ SPARE = 1 << 16  # rows at most that are reserved beyond what is asked for
 COLUMNS_OF = {
     "sum_forces": ("force",), "end_flight": records.UNDO_FORCE, "predict_rest": records.PREDICTED,
     "gather": records.HELD, "begin_joints": (*records.SPINS, *records.COLLISIONS),
+    "begin_parts": records.COMPOUNDS,
 }  # fmt: skip
 
 

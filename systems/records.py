@@ -14,6 +14,7 @@ from ..components import Collider, RigidBody
 from ..framework.jit.records.schema import Schema, Section, flag, flags, floats, integer, ints, number, vectors
 from ..framework.schedule.stages import PROGRAM_FIELDS
 from .broad_phase.records import GRID
+from .compounds.records import COMPOUNDS, PARTS
 from .contacts.solving.records import ARMS, SOLVER, TURNS, WARM_START
 
 
@@ -135,7 +136,7 @@ SLEEPING = Section(
 
 BODIES = Schema(
     "Bodies", *TABLE_SECTIONS, SLEEP_COLUMNS, START, QUARANTINE, COLLISIONS, PREDICTED, HELD, CURVES, SWEEPS,
-    EVALUATIONS, SPINS, UNDO, UNDO_FORCE, SLEEPING,
+    EVALUATIONS, SPINS, COMPOUNDS, UNDO, UNDO_FORCE, SLEEPING,
     Section(
         "body", "rotation", "some body is rotated, or a shape reads its axes",
         axes=floats(),  # rotation matrices (n, d, d), flat,
@@ -397,6 +398,7 @@ STATE = Schema(
     slot_count=integer(),  # types of colliders in the stacks
     has_force_systems=flag(),
     rotated=flag(),  # some body is
+    compound=flag(),  # bodies have parts: ``bodies.owner`` and what goes with it have rows
     spinning=flag(),  # some body spins: ``bodies.spin`` and what goes with it have rows
     limits_speed=flag(),
     others_write=flag(),  # code that is not carom's runs in the step
@@ -499,6 +501,7 @@ STATE = Schema(
     warm_start=WARM_START,
     contacts=CONTACTS,
     impacts=IMPACTS,
+    parts=PARTS,
     grid=GRID,  # of what moves
     static_grid=GRID,
 )

@@ -16,6 +16,7 @@ from ..framework.settings import Settings
 from .records import (
     COLLIDERS,
     COLLISIONS,
+    COMPOUNDS,
     HELD,
     PREDICTED,
     QUARANTINE,
@@ -31,7 +32,7 @@ from .shapes.linking.linked_shapes import LinkedShapes, ParameterRecords, linked
 from .shapes.rotation import axes_of
 
 # Made when the first stage asks for them; then they have a row for each of the table, like all others.
-ON_DEMAND = (*QUARANTINE, *UNDO_FORCE, *PREDICTED, *HELD, *SPINS)
+ON_DEMAND = (*QUARANTINE, *UNDO_FORCE, *PREDICTED, *HELD, *SPINS, *COMPOUNDS)
 # What is kept of bodies from step to step, and moves with their rows: static bodies are not boxed again for others. The
 # shape comes first: it tells which bodies have arrived.
 KEPT_COLUMNS = ("shape", "collider_slot", "offset", "half_extents", "min_extent", "lower", "upper", "origin")

@@ -119,7 +119,7 @@ class Simulation:
         self._pushed, self._found_current = (self.state.word_of(name) for name in ("pushed", "found_current"))
         self.contacts_before: Any = None  # contacts that no RESPONSE has replaced, at the start of the step
         self._generation = self.table.generation
-        self.settled, self.take_deferred = self.adoption.settled, self.contacts.take_deferred
+        self.take_deferred = self.contacts.take_deferred
 
     @property
     def systems(self) -> tuple[System, ...]:
@@ -146,10 +146,16 @@ class Simulation:
 
     # -- a step -----------------------------------------------------------------------------------
 
+    def settled(self) -> bool:
+        """Whether the table is in step with esper, and no plugin moves bodies between steps."""
+        return self.adoption.settled() and not self.extensions.adopters
+
     def synchronize(self) -> None:
         """Bring the table in step with esper."""
         self.take_deferred()
         self.adoption.synchronize()
+        for follow in self.extensions.adopters:
+            follow(self._world)
 
     def open_window(self, step: int) -> None:
         self.contacts.open_window(step)

@@ -8,6 +8,7 @@ from .broad_phase.boxes import bound_searches, box_rest_of_step, box_standing
 from .broad_phase.system import BroadPhase
 from .ccd.refresh_pairs import merge_pairs
 from .ccd.time_of_impact import first_touch
+from .compounds.stages import begin_parts
 from .contacts.events import ContactEvents
 from .contacts.response import Response
 from .extensions.kept import keep_written
@@ -28,6 +29,10 @@ OPENING = (
     Stage(
         check_columns, "takes out bodies with values that cannot be",
         ("mass", "gravity_scale", "constant_force", "rotation", "restitution", "friction"), ("quarantined",),
+    ),
+    Stage(
+        begin_parts, "which rows are parts of one body; where the game has moved it they follow", (),
+        ("position", "linear_velocity", "rotation"), "parts",
     ),
     Stage(
         read_bodies, "1 / mass of what moves freely; whether any speed is limited, any body swept or rotated",
@@ -71,8 +76,8 @@ WITH_COLLIDERS = frozenset((
     "many bodies", "swept bodies",
 ))  # fmt: skip
 CONDITIONS = (
-    "", "dynamic bodies", *sorted(WITH_COLLIDERS), "bodies spin", "bodies spin, no joints", "joints", "standard",
-    "sleeping", "stages of plugins", "on demand",
+    "", "dynamic bodies", *sorted(WITH_COLLIDERS), "bodies spin", "bodies spin, no joints", "joints", "parts",
+    "standard", "sleeping", "stages of plugins", "on demand",
 )  # fmt: skip
 # What a failed step puts back, in this order: the bit of state.kept that says that the copy is made; the column, its
 # copy, and their rows.

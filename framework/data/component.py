@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
 
 import numpy as np
@@ -32,6 +32,8 @@ class Component:
     prefix: ClassVar[str] = ""  # of the columns' names in a table
     makes_body: ClassVar[bool] = False  # an entity that has it together with a Transform is a body
     excludes: ClassVar[Mapping[type[Component], str]] = {}  # what no entity has together with it, and the cure
+    # What an entity that has it gets too, if it has none: their types, and what of their values in d dimensions.
+    brings: ClassVar[Mapping[type[Component], Callable[[int], dict[str, Any]]]] = {}
     plugin: ClassVar[str] = ""  # the plugin without which it does nothing
     until_frame_ends: ClassVar[tuple[str, ...]] = ()  # columns of a push from outside, and of the frame that it is of
     _abstract: ClassVar[bool] = True
@@ -187,6 +189,9 @@ class Component:
                 fits = vector and type(value) is np.ndarray and len(value) == dimensions
             if not fits:
                 column.check_dimensions(value, dimensions, entity)
+
+    def check_in(self, contents: Any, entity: int | None) -> None:
+        """ValueError if it cannot be in a world with these contents."""
 
     def fit(self, dimensions: int, entity: int | None = None) -> None:
         """Whole vectors, of that many dimensions, from now on; ValueError if one has others."""

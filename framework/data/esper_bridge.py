@@ -179,6 +179,14 @@ class Contents:
             self.forget_queries()
         return range(first, first + count)
 
+    def add(self, entity: int, component: Any) -> None:
+        """What esper.add_component does, for a component that the entity does not have."""
+        if type(component) not in self.members:
+            self.members[type(component)] = ()  # type: ignore[index]
+        self.members[type(component)].add(entity)
+        dict.__getitem__(self.entities, entity)[type(component)] = component
+        self.forget_queries()
+
     def delete(self, entities: Iterable[int]) -> None:
         self.forget_queries()
         self.entities.delete(entities)

@@ -66,6 +66,10 @@ class EntityVerbs:
         dimensions = self.dimensions
         if dimensions is None:
             raise NoPhysicsError("no physics in this world: World(Physics(...))")
+        for one in many:
+            for other, values in one.component.brings.items():
+                if other not in types:
+                    many = *many, other.many(**values(dimensions))
         return self._contents().create_many({one.component: one.store(count, dimensions) for one in many}, count)
 
     def delete_entity(self, entity: int, immediate: bool = False) -> None:
@@ -186,6 +190,7 @@ class EntityVerbs:
                     component.fit(dimensions, entity)
                 if plugin is not None:
                     plugin.check_component(component, entity)
+                component.check_in(self._contents(), entity)
             elif isinstance(component, type):
                 raise TypeError(f"components are instances: {component.__name__}(...), got the class itself")
             elif isinstance(component, (list, tuple, Many)):

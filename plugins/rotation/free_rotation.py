@@ -11,33 +11,11 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
+from ...systems.shapes.quaternions import product
 
 SWEEPS = 16  # of Jacobi rotations: each squares what is off the diagonal
 SPHERICAL = 1e-24  # square of the sine between momentum and angular velocity: less is none
 DIAGONAL = 1e-15  # of the trace: what is off the diagonal by less is rounding
-
-
-@part
-def product(p, q):
-    """The rotation q, then p: unit quaternions w, x, y, z."""
-    a, b, c, d = p
-    w, x, y, z = q
-    return (
-        a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y,
-        a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w,
-    )  # fmt: skip
-
-
-@part
-def rotate(q, v, back):
-    """The vector v turned by a unit quaternion; ``back``: by its inverse."""
-    w, x, y, z = q
-    if back:
-        w = -w
-    a = 2.0 * (y * v[2] - z * v[1])
-    b = 2.0 * (z * v[0] - x * v[2])
-    c = 2.0 * (x * v[1] - y * v[0])
-    return v[0] + w * a + y * c - z * b, v[1] + w * b + z * a - x * c, v[2] + w * c + x * b - y * a
 
 
 @part

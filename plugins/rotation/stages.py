@@ -15,10 +15,21 @@ from ...framework import Plugin
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import item, length, replace, scale
+from ...systems.compounds.inertia import inertia_of_compound
+from ...systems.compounds.rows import has_parts
 from ...systems.forces.stages import is_zero
 from ...systems.integration.stages import CUBIC, LINE, phi1, phi2
 from ...systems.shapes.dispatch import second_moments
-from .free_rotation import diagonalised, product, rotate, turn_freely, turn_to_energy
+from ...systems.shapes.quaternions import (
+    product,
+    product_of,
+    rotate,
+    rotation_in_space,
+    set_rotation,
+    turned_tensor,
+    write_axes,
+)
+from .free_rotation import diagonalised, turn_freely, turn_to_energy
 
 TRIPLE = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))  # of the step: the outer two of Yoshida's three
 PARALLEL = 1e-9  # square of the sine between spin and angular momentum: less is none
@@ -41,6 +52,8 @@ def inertia_of(state, spin, i):
         if d == 2:
             return 0.0, 0.0, spin.inertia[i, 0], 0.0, 0.0, 0.0
         return spin.inertia[i, 0], spin.inertia[i, 1], spin.inertia[i, 2], 0.0, 0.0, 0.0
+    if has_parts(state, i):
+        return inertia_of_compound(state, i)
     shape = bodies.levels[0, i] if state.collides else -1
     several = state.collides and state.several_levels and bodies.levels[state.level_count - 1, i] != shape
     if shape < 0 or several or state.shapes.moments[shape] == 0:
@@ -101,24 +114,6 @@ def turn_between_pushes(q, m, inverse, act, h):
     m = pushed(q, m, inverse, act, 0.5 * h)
     q, m, gained = turn_freely(q, m, inverse, h)
     return q, pushed(q, m, inverse, act, 0.5 * h), gained
-
-
-@part
-def rotation_in_space(state, i):
-    """The quaternion of a body, of length 1."""
-    rotation, k = state.bodies.rotation, 4 * i
-    w, x, y, z = rotation[k], rotation[k + 1], rotation[k + 2], rotation[k + 3]
-    size = math.sqrt(w * w + x * x + y * y + z * z)
-    return w / size, x / size, y / size, z / size
-
-
-@part
-def set_rotation(state, i, q):
-    """The quaternion of a body."""
-    rotation, k = state.bodies.rotation, 4 * i
-    size = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    rotation[k], rotation[k + 1] = q[0] / size, q[1] / size
-    rotation[k + 2], rotation[k + 3] = q[2] / size, q[3] / size
 
 
 @part
@@ -188,27 +183,6 @@ def spin_of(state, spin, i):
     return w
 
 
-@part
-def write_axes(state, i):
-    """The rotation matrix of a body, where shapes read it."""
-    axes, d = state.bodies.axes, len(zero_of(state))
-    if len(axes) == 0:
-        return
-    known = state.bodies.axes_rotation
-    if d == 2:
-        angle = known[i] = state.bodies.rotation[i]
-        cosine, sine, k = math.cos(angle), math.sin(angle), 4 * i
-        axes[k], axes[k + 1], axes[k + 2], axes[k + 3] = cosine, -sine, sine, cosine
-        return
-    for k in range(4 * i, 4 * i + 4):
-        known[k] = state.bodies.rotation[k]
-    w, x, y, z = rotation_in_space(state, i)
-    k = 9 * i
-    axes[k], axes[k + 1], axes[k + 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
-    axes[k + 3], axes[k + 4], axes[k + 5] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
-    axes[k + 6], axes[k + 7], axes[k + 8] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
-
-
 @spinning.stage(
     after="check_flight", records=(Spin,),
     reads=(
@@ -263,21 +237,9 @@ def write_inverse_inertia(state, spin, i):
     if xx == yy == zz and xy == xz == yz == 0.0:  # round, to the bit
         bodies.inverse_inertia[i] = replace(replace(replace(nothing, 0, xx), 1, xx), len(nothing) - 1, xx)
         return
-    q = rotation_in_space(state, i)
-    x, y, z = rotate(q, (1.0, 0.0, 0.0), True), rotate(q, (0.0, 1.0, 0.0), True), rotate(q, (0.0, 0.0, 1.0), True)
-    along_x = xx * x[0] + xy * x[1] + xz * x[2], xy * x[0] + yy * x[1] + yz * x[2], xz * x[0] + yz * x[1] + zz * x[2]
-    along_y = xx * y[0] + xy * y[1] + xz * y[2], xy * y[0] + yy * y[1] + yz * y[2], xz * y[0] + yz * y[1] + zz * y[2]
-    along_z = xx * z[0] + xy * z[1] + xz * z[2], xy * z[0] + yy * z[1] + yz * z[2], xz * z[0] + yz * z[1] + zz * z[2]
-    diagonal = replace(replace(nothing, 0, product_of(along_x, x)), 1, product_of(along_y, y))
-    products = replace(replace(nothing, 0, product_of(along_x, y)), 1, product_of(along_x, z))
-    bodies.inverse_inertia[i] = replace(diagonal, len(nothing) - 1, product_of(along_z, z))
-    bodies.inverse_products[i] = replace(products, len(nothing) - 1, product_of(along_y, z))
-
-
-@part
-def product_of(u, v):
-    """The scalar product of two triples."""
-    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+    xx, yy, zz, xy, xz, yz = turned_tensor(rotation_in_space(state, i), (xx, yy, zz, xy, xz, yz))
+    bodies.inverse_inertia[i] = replace(replace(replace(nothing, 0, xx), 1, yy), len(nothing) - 1, zz)
+    bodies.inverse_products[i] = replace(replace(replace(nothing, 0, xy), 1, xz), len(nothing) - 1, yz)
 
 
 @spinning.stage(

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from ...framework.schedule.phases import Phase
 from ...framework.schedule.plan import PlannedKernel
 from ...framework.schedule.stages import Program, Stage
+from ..compounds.stages import leave_out_parts
 from ..contacts.solving.joined import leave_out_joined
 from ..sleeping.stages import leave_out_still
 from ..staged import StagedSystem
@@ -75,6 +76,7 @@ class BroadPhase(StagedSystem):
         Stage(
             leave_out_joined, "pairs that a joint keeps from touching", ("candidates",), ("candidates",), "joints",
         ),
+        Stage(leave_out_parts, "pairs of parts of one body", ("candidates",), ("candidates",), "parts"),
     )  # fmt: skip
 
     def __init__(self, program: Program, search: CandidateSearch) -> None:

@@ -6,6 +6,8 @@ from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..codes import NEED_COLUMNS, NEED_SOLVER, OK
+from ..compounds.rows import has_parts, next_row, owner_of, place_of
+from ..compounds.stages import share_places
 from ..integration.trajectory import along, path_of
 from ..integration.turning import size_of_turn
 from .constants import FREQUENCY, SAG, TIPPING_FREQUENCY, TIPPING_SAG
@@ -31,6 +33,20 @@ def start_of_flight(state, i, v, a, dt):
     t = bodies.last_impact[i]
     there = sub(along(path_of(state, i), t), bodies.previous_position[i])
     return add_scaled(add_scaled(there, v, -t), a, -0.5 * t * (t + dt / state.substeps))
+
+
+@part
+def reach_from_centre(state, i):
+    """How far the shapes of body i reach from its centre of mass."""
+    bodies = state.bodies
+    if not has_parts(state, i):
+        return length(bodies.half_extents[i]) + length(bodies.offset[i])
+    reach, k = 0.0, i
+    while k >= 0:
+        if bodies.shape[k] >= 0:
+            reach = max(reach, length(bodies.half_extents[k]) + length(bodies.offset[k]))
+        k = next_row(state, k)
+    return reach
 
 
 @part
@@ -68,7 +84,7 @@ def gather(state, dt):
     for r in range(solver.contacts):
         c, k = solver.pair[r], solver.slot[r]
         a, b = pairs.a[c], pairs.b[c]
-        solver.first[k], solver.second[k] = bodies.place[a], bodies.place[b]
+        solver.first[k], solver.second[k] = place_of(state, a), place_of(state, b)
         solver.fixed[k] = solver.tips and (inverse_mass[a] == 0.0 or inverse_mass[b] == 0.0)
     nothing = zero_of(state)
     solver.movers = 0
@@ -96,7 +112,7 @@ def gather(state, dt):
         i = solver.body_row[q]
         solver.spin[q] = bodies.spin[i]
         turn_body(solver, q, scale(bodies.turn[i], -1.0))  # to where the step starts
-        solver.reach[q] = length(bodies.half_extents[i]) + length(bodies.offset[i]) if state.collides else 0.0
+        solver.reach[q] = reach_from_centre(state, i) if state.collides else 0.0
         solver.inverse_inertia[q] = bodies.inverse_inertia[i]
         solver.inverse_products[q] = bodies.inverse_products[i]
     if solver.joints.active > 0:
@@ -117,7 +133,7 @@ def put_back(state, dt):
         a, b = solver.joints.row_a[solver.joints.order[e]], solver.joints.row_b[solver.joints.order[e]]
         for i in (a, b):
             if i >= 0:
-                bodies.held[i] = True
+                bodies.held[owner_of(state, i)] = True
     for q in range(solver.bodies if solver.contacts + solver.joints.active > 0 else 0):
         i = solver.body_row[q]
         bodies.place[i] = -1
@@ -128,4 +144,5 @@ def put_back(state, dt):
                 bodies.spin[i], bodies.turn[i] = solver.spin[q], add(bodies.turn[i], solver.turn[q])
     if state.any_warm_started:
         drop_support(state, dt)
+    share_places(state)
     return OK

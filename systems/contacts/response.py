@@ -11,6 +11,7 @@ from ...framework.schedule.phases import Phase
 from ...framework.schedule.stages import Program, PythonPart, Stage
 from ...framework.settings import Settings
 from ...framework.world.contacts import Contacts
+from ..compounds.stages import carry_parts
 from ..impacts.stages import begin_impacts, resolve_impacts
 from ..staged import StagedSystem
 from .bodies import gather, put_back
@@ -76,6 +77,10 @@ class Response(StagedSystem):
         Stage(
             resolve_static_penetration, "what the solver has pushed into or through what cannot be moved is put back",
             ("pairs",), MOTION, "colliders", REST,
+        ),
+        Stage(
+            carry_parts, "parts go where contacts have sent and turned their bodies", MOTION, (*MOTION, "rotation"),
+            "parts",
         ),
         Stage(store_warm_start, "the impulses, for the next step", ("solver",), ("warm_start",), "colliders", REST),
         Stage(find_touching, "which pairs touch in the end", MOTION, ("pairs",), "colliders", NEAR),

@@ -12,6 +12,7 @@ from ...framework.compilation import part
 from ...framework.vectors import add_scaled, dot, item, length, sub
 from ..ccd.search_bounds import FAST, turns_far
 from ..codes import OK
+from ..compounds.rows import next_row, owner_of
 from ..impacts.impulses import STOPPED
 from ..integration.trajectory import along, path_of
 from ..narrow_phase.manifolds import centre_offset, deepest_possible, evaluate_pair
@@ -57,23 +58,26 @@ def keep_out(state, c, a, b):
     if not far > 0.0:
         return 0.0
     i, fixed, sign = (b, a, 1.0) if bodies.inverse_mass[b] > 0.0 else (a, b, -1.0)
-    bodies.position[i] = add_scaled(bodies.position[i], normal, sign * far)
     velocity = bodies.linear_velocity[i]
     if fixed < state.moving:
         velocity = sub(velocity, bodies.linear_velocity[fixed])
     closing = sign * dot(velocity, normal)
-    if closing < 0.0:
-        bodies.linear_velocity[i] = add_scaled(bodies.linear_velocity[i], normal, -sign * closing)
+    k = owner_of(state, i)
+    while k >= 0:
+        bodies.position[k] = add_scaled(bodies.position[k], normal, sign * far)
+        if closing < 0.0:
+            bodies.linear_velocity[k] = add_scaled(bodies.linear_velocity[k], normal, -sign * closing)
+        k = next_row(state, k)
     return far
 
 
 @part
 def is_moved_by_solver(state, i):
     """Whether contacts at rest have moved body i, now or in the prediction, and no impact has stopped it."""
-    bodies = state.bodies
+    bodies, owner = state.bodies, owner_of(state, i)
     if bodies.impact_count[i] >= STOPPED:
         return False
-    return (state.any_warm_started and bodies.warm_started[i]) or (state.solver.contacts > 0 and bodies.held[i])
+    return (state.any_warm_started and bodies.warm_started[i]) or (state.solver.contacts > 0 and bodies.held[owner])
 
 
 @part

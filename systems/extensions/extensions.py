@@ -15,6 +15,7 @@ from ...framework.jit.records.schema import Schema
 from ...framework.plugins.registry import PluginStage, Registry
 from ...framework.schedule.stages import Program
 from .. import records
+from ..compounds.records import PARTS
 from ..contacts.solving.records import JOINTS
 from ..record_buffers import with_spare
 from ..scene import Scene
@@ -47,8 +48,10 @@ class Extensions:
         self.stages: tuple[PluginStage, ...] = ()
         self.written = ColumnCopies(self._table, ())
         self._own: dict[PluginStage, Record] = {}  # what each of them gets
-        self._records: dict[Schema, Record] = {JOINTS: state.solver.joints}  # of plugins' own; these are shared
+        # Of plugins' own; these are shared.
+        self._records: dict[Schema, Record] = {JOINTS: state.solver.joints, PARTS: state.parts}
         self.followers: list[Callable[[Any], None]] = []  # what plugins do with the world before each step,
+        self.adopters: list[Callable[[Any], None]] = []  # whenever the table is brought up to date,
         self.finishers: list[Callable[[Any], None]] = []  # after it,
         self.waiting: list[Callable[[], bool]] = []  # and whether they have something to do
         check_stages(registry.stages.values())

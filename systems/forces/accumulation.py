@@ -13,6 +13,7 @@ from ...framework.jit.records.record import Record
 from ...framework.schedule.phases import ForceSystem, Phase
 from ...framework.schedule.plan import PlannedKernel
 from ...framework.schedule.stages import Program, PythonPart, Stage
+from ..compounds.stages import carry_forces
 from ..staged import StagedSystem
 from .stages import limit_velocities, sum_forces
 
@@ -57,6 +58,8 @@ class ForceAccumulation(StagedSystem):
         """Sum all forces at the state in the columns; ``time`` in seconds."""
         self._program.run_span(sum_forces.__name__, self.world.settings.dt)
         self.add_systems(time)
+        if self._state.compound:
+            self._program.run_one(carry_forces.__name__, self.world.settings.dt)
 
     def add_systems(self, time: float) -> None:
         """Let each force system add to ``force``: in place where all bodies have what it requires, else to copies."""

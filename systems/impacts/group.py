@@ -16,11 +16,12 @@ import math
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, scale, sub
+from ..compounds.rows import owner_of
 from ..integration.trajectory import rate_along, relative_path
 from ..integration.turning import compliance, is_turned, velocity_by_spin
 from ..shapes.dispatch import friction_of
 from .exact_sum import exact_sum
-from .impulses import deflect, is_counted, log_impact, stands_still
+from .impulses import count_impact, deflect, is_counted, log_impact, note_caught, stands_still
 from .turning import arms_of, turn_by_impact
 
 PASSES, LEAST_PASSES = 1000, 8  # over the impacts of a group
@@ -58,7 +59,7 @@ def push_bodies(state, count, rubs):
         m = impacts.group[g]
         c = impacts.event_pair[impacts.member[m]]
         for side in range(2):
-            i = pairs.a[c] if side == 0 else pairs.b[c]
+            i = owner_of(state, pairs.a[c] if side == 0 else pairs.b[c])
             if inverse_mass[i] > 0.0 and impacts.first_member[i] == 2 * m + side:  # once each
                 impacts.gained[i] = sum_pushes(state, i, rubs)
 
@@ -79,7 +80,7 @@ def gained_along(state, m):
     """The speed along member m's normal that its bodies have gained from each other."""
     impacts, pairs = state.impacts, state.pairs
     c = impacts.event_pair[impacts.member[m]]
-    gained = sub(impacts.gained[pairs.b[c]], impacts.gained[pairs.a[c]])
+    gained = sub(impacts.gained[owner_of(state, pairs.b[c])], impacts.gained[owner_of(state, pairs.a[c])])
     return dot(gained, impacts.event_normal[impacts.member[m]])
 
 
@@ -96,7 +97,7 @@ def solve_group(state, count):
     for g in range(count):
         m = impacts.group[g]
         c = impacts.event_pair[impacts.member[m]]
-        a, b, heavy = pairs.a[c], pairs.b[c], 0.0
+        a, b, heavy = owner_of(state, pairs.a[c]), owner_of(state, pairs.b[c]), 0.0
         if inverse_mass[a] > 0.0:
             heavy += inverse_mass[a] * count_coupled(state, m, a)
         if inverse_mass[b] > 0.0:
@@ -181,7 +182,7 @@ def shoots(state, count):
     for g in range(count):
         c = impacts.event_pair[impacts.member[impacts.group[g]]]
         for side in range(2):
-            i = pairs.a[c] if side == 0 else pairs.b[c]
+            i = owner_of(state, pairs.a[c] if side == 0 else pairs.b[c])
             any_shot |= inverse_mass[i] > 0.0 and is_ejected(state, i)
     return any_shot
 
@@ -211,7 +212,7 @@ def solve_friction(state, count):
         mu, impacts.friction_impulse[m] = friction_of(state, a, b), zero_of(state)
         if mu > 0.0 and impacts.ahead[m] > 0.0:
             w = rate_along(relative_path(state, a, b), impacts.now)
-            w = add(w, sub(impacts.gained[b], impacts.gained[a]))
+            w = add(w, sub(impacts.gained[owner_of(state, b)], impacts.gained[owner_of(state, a)]))
             arms = normal, normal
             if state.spinning:
                 arms = arms_of(state, impacts.member[m])
@@ -220,7 +221,7 @@ def solve_friction(state, count):
             fast, light = length(sliding), 0.0
             for side in range(2 if fast > 0.0 else 0):
                 i, arm, turns = (a, arms[0], 0.0) if side == 0 else (b, arms[1], 0.0)
-                entry = impacts.first_member[i] if inverse_mass[i] > 0.0 else -1
+                entry = impacts.first_member[owner_of(state, i)] if inverse_mass[i] > 0.0 else -1
                 if state.spinning:
                     turns = compliance(state.bodies, i, arm, divided(sliding, fast))
                 while entry >= 0:
@@ -235,7 +236,7 @@ def solve_friction(state, count):
 def push_group(state, count, dt):
     """Give the bodies of a group their impulses, all at once, and note these."""
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
-    inverse_mass, caught = bodies.inverse_mass, bodies.caught
+    inverse_mass = bodies.inverse_mass
     rubs = solve_friction(state, count)
     if rubs:
         push_bodies(state, count, True)
@@ -248,12 +249,11 @@ def push_group(state, count, dt):
         event = impacts.member[m]
         c = impacts.event_pair[event]
         for side in range(2):
-            i = pairs.a[c] if side == 0 else pairs.b[c]
+            i = owner_of(state, pairs.a[c] if side == 0 else pairs.b[c])
             if inverse_mass[i] > 0.0 and impacts.first_member[i] == 2 * m + side:
                 deflect(state, i, impacts.gained[i], impacts.now, dt)
             if inverse_mass[i] > 0.0 and impacts.ahead[m] > 0.0:
-                bodies.impact_count[i] += 1
-                bodies.counted_impacts[i] += is_counted(state, event)
+                count_impact(state, i, is_counted(state, event))
         if impacts.ahead[m] > 0.0:
             impacts.event_time[event] = impacts.now
             log_impact(state, event, impacts.ahead[m])
@@ -265,4 +265,4 @@ def push_group(state, count, dt):
                 i = a if side == 0 else b
                 still = stands_still(bodies, a + b - i)
                 if inverse_mass[i] > 0.0 and still == (strikes_mover == 0):
-                    caught[i] = caught[i] + 1 if still else 0
+                    note_caught(state, i, still)

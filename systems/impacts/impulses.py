@@ -13,6 +13,7 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST
+from ..compounds.rows import next_row, owner_of
 from ..integration.trajectory import along, path_of, rate_along
 from ..narrow_phase.manifolds import forget_manifold
 from ..shapes.dispatch import restitution_of
@@ -33,20 +34,41 @@ def deflect(state, i, dv, now, dt):
     In an event-driven world damping acts at the end of the step, for half of it. Else it acts all the time, and the
     velocity of a straight path is that of the end already. What has been stopped stays where it is.
     """
-    bodies = state.bodies
-    if bodies.impact_count[i] >= STOPPED:
-        bodies.linear_velocity[i] = add(bodies.linear_velocity[i], dv)
-        return
-    bodies.start_velocity[i] = add(bodies.start_velocity[i], dv)
-    bodies.origin[i] = add_scaled(bodies.origin[i], dv, -now)
-    bodies.path_velocity[i] = add(bodies.path_velocity[i], dv)
-    bodies.position[i] = add_scaled(bodies.position[i], dv, dt - now)
+    bodies, i = state.bodies, owner_of(state, i)
     acting = dt - now if state.path_degree > 1 else 0.0
     if state.impacts.sweeps and state.mode == EVENT_DRIVEN:
         acting = 0.5 * dt
     fading = bodies.linear_damping[i] * acting
     decay = math.exp(-fading) if fading > 0.0 else 1.0
-    bodies.linear_velocity[i] = add_scaled(bodies.linear_velocity[i], dv, decay)
+    while i >= 0:
+        if bodies.impact_count[i] >= STOPPED:
+            bodies.linear_velocity[i] = add(bodies.linear_velocity[i], dv)
+        else:
+            bodies.start_velocity[i] = add(bodies.start_velocity[i], dv)
+            bodies.origin[i] = add_scaled(bodies.origin[i], dv, -now)
+            bodies.path_velocity[i] = add(bodies.path_velocity[i], dv)
+            bodies.position[i] = add_scaled(bodies.position[i], dv, dt - now)
+            bodies.linear_velocity[i] = add_scaled(bodies.linear_velocity[i], dv, decay)
+        i = next_row(state, i)
+
+
+@part
+def count_impact(state, i, counted):
+    """One more impact of body i; counted: by the cap, too."""
+    bodies, i = state.bodies, owner_of(state, i)
+    while i >= 0:
+        bodies.impact_count[i] += 1
+        bodies.counted_impacts[i] += counted
+        i = next_row(state, i)
+
+
+@part
+def note_caught(state, i, still):
+    """One more impact of body i in a row with what stands still, or the end of these."""
+    caught, i = state.bodies.caught, owner_of(state, i)
+    while i >= 0:
+        caught[i] = caught[i] + 1 if still else 0
+        i = next_row(state, i)
 
 
 @part
@@ -101,10 +123,9 @@ def bounce(state, event, dt):
     for side in range(2):
         i = a if side == 0 else b
         if inverse_mass[i] > 0.0:  # what cannot be moved is as it was: its other impacts stand, and no cap is on it
-            bodies.impact_count[i] += 1
-            bodies.counted_impacts[i] += counted
+            count_impact(state, i, counted)
             if impacts.sweeps:
-                bodies.caught[i] = bodies.caught[i] + 1 if stands_still(bodies, a + b - i) else 0
+                note_caught(state, i, stands_still(bodies, a + b - i))
             deflect(state, i, scale(change, (-mass if side == 0 else mass) * inverse_mass[i]), now, dt)
     log_impact(state, event, impacts.event_change[event] * mass)
 
@@ -140,14 +161,15 @@ def is_beyond_cap(state, a, b):
 def stop(state, i, now):
     """Beyond the cap a fast body stays where it is until the step ends, and keeps its velocity."""
     bodies, path, zero = state.bodies, path_of(state, i), zero_of(state)
-    at = along(path, now)
-    bodies.linear_velocity[i] = rate_along(path, now)
-    bodies.position[i] = at
-    bodies.origin[i], bodies.path_velocity[i] = at, zero
-    if state.path_degree > 1:
-        bodies.path_second[i], bodies.path_third[i] = zero, zero
-    bodies.impact_count[i] += STOPPED
-    bodies.counted_impacts[i] += STOPPED
+    at, velocity, i = along(path, now), rate_along(path, now), owner_of(state, i)
+    while i >= 0:
+        bodies.linear_velocity[i], bodies.position[i] = velocity, at
+        bodies.origin[i], bodies.path_velocity[i] = at, zero
+        if state.path_degree > 1:
+            bodies.path_second[i], bodies.path_third[i] = zero, zero
+        bodies.impact_count[i] += STOPPED
+        bodies.counted_impacts[i] += STOPPED
+        i = next_row(state, i)
 
 
 @part
@@ -161,11 +183,13 @@ def slide(state, i, normal, rate, dt):
     x1 = add_scaled(x1, normal, rate - dot(x1, normal))
     x2, x3 = add_scaled(x2, normal, -dot(x2, normal)), add_scaled(x3, normal, -dot(x3, normal))
     x0 = add(x0, sub(along(old, now), along((x0, x1, x2, x3), now)))
-    bodies.position[i] = add(bodies.position[i], sub(along((x0, x1, x2, x3), dt), along(old, dt)))
-    bodies.origin[i], bodies.path_velocity[i] = x0, x1
-    if state.path_degree > 1:
-        bodies.path_second[i], bodies.path_third[i] = x2, x3
-    bodies.impact_count[i] += 1
+    at, i = add(bodies.position[i], sub(along((x0, x1, x2, x3), dt), along(old, dt))), owner_of(state, i)
+    count_impact(state, i, False)
+    while i >= 0:
+        bodies.position[i], bodies.origin[i], bodies.path_velocity[i] = at, x0, x1
+        if state.path_degree > 1:
+            bodies.path_second[i], bodies.path_third[i] = x2, x3
+        i = next_row(state, i)
 
 
 @part

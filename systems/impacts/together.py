@@ -13,6 +13,7 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import dot
 from ..ccd.time_of_impact import clear_of_rounding
 from ..codes import NEED_EVENTS, OK
+from ..compounds.rows import owner_of
 from ..integration.trajectory import rate_along, relative_path
 from .group import WORK, is_affordable, push_group, shoots, solve_group, turns
 from .heap import heap_pop, heap_push, holds
@@ -108,11 +109,11 @@ def link_members(state, members):
     for m in range(members):
         c = impacts.event_pair[impacts.member[m]]
         for side in range(2):
-            i = pairs.a[c] if side == 0 else pairs.b[c]
+            i = owner_of(state, pairs.a[c] if side == 0 else pairs.b[c])
             impacts.first_member[i], impacts.gained[i] = -1, zero_of(state)
     for m in range(members):
         c = impacts.event_pair[impacts.member[m]]
-        a, b = pairs.a[c], pairs.b[c]
+        a, b = owner_of(state, pairs.a[c]), owner_of(state, pairs.b[c])
         entry = impacts.first_member[a if inverse_mass[a] > 0.0 else b]
         while entry >= 0 and impacts.event_pair[impacts.member[entry // 2]] != c:
             entry = impacts.next_member[entry]
@@ -148,7 +149,7 @@ def find_group(state, m):
         c = impacts.event_pair[impacts.member[impacts.group[done]]]
         done += 1
         for side in range(2):
-            i = pairs.a[c] if side == 0 else pairs.b[c]
+            i = owner_of(state, pairs.a[c] if side == 0 else pairs.b[c])
             entry = impacts.first_member[i] if inverse_mass[i] > 0.0 else -1
             while entry >= 0:
                 if impacts.is_left[entry // 2]:
@@ -188,7 +189,7 @@ def take_group(state, m, dt):
     for k in range(logged, impacts.logged):
         c, listed = impacts.log_pair[k], -1
         for side in range(2):
-            i = pairs.a[c] if side == 0 else pairs.b[c]
+            i = owner_of(state, pairs.a[c] if side == 0 else pairs.b[c])
             if bodies.inverse_mass[i] == 0.0:
                 continue
             if impacts.first_member[i] >= 0:

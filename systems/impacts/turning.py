@@ -14,6 +14,7 @@ import math
 
 from ...framework.compilation import part
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, scale, sub
+from ..compounds.rows import next_row, owner_of
 from ..integration.trajectory import along, path_of
 from ..integration.turning import arms_to, change_of_spin, compliance, cross_spin, lever, twist, velocity_by_spin
 from ..shapes.poses import turn_shape
@@ -129,8 +130,10 @@ def turn_by_impact(state, event, arms, impulse, friction, dt):
         i, arm, sign = (state.pairs.a[c], arms[0], -1.0) if side == 0 else (state.pairs.b[c], arms[1], 1.0)
         twisted = add(scale(lever(bodies, i, arm, normal), impulse), twist(arm, friction))
         change = scale(change_of_spin(bodies, i, twisted), sign)
-        if length(change) > 0.0:
+        i = owner_of(state, i) if length(change) > 0.0 else -1
+        while i >= 0:
             bodies.spin[i] = add(bodies.spin[i], change)
             bodies.turn[i] = add_scaled(bodies.turn[i], change, left)
             if bodies.rolling_radius[i] == 0.0:
                 turn_shape(state, i, scale(change, left))
+            i = next_row(state, i)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from ...framework.compilation import inlined, part
 from ..ccd.search_bounds import FAST, leaves_bounds_at
+from ..compounds.rows import next_row, owner_of
 from ..shapes.tolerances import smaller_extent
 from .find import bounce_threshold
 from .impulses import STOPPED
@@ -52,8 +53,9 @@ def link_pairs(state):
         for side in range(2):
             i = pairs.a[c] if side == 0 else pairs.b[c]
             if i < state.moving:
-                links[2 * c + side] = heads[i]
-                heads[i] = 2 * c + side
+                first = owner_of(state, i)
+                links[2 * c + side] = heads[first]
+                heads[first] = 2 * c + side
     impacts.linked = True
 
 
@@ -61,9 +63,12 @@ def link_pairs(state):
 def list_pairs_of(state, i, but, dt):
     """Body i goes on from an impact: list its pairs but one from now on, and note when it may leave its bounds."""
     impacts, bodies = state.impacts, state.bodies
-    if impacts.sweeps and bodies.impact_count[i] < STOPPED:
-        bodies.last_impact[i] = impacts.now
-        impacts.until = min(impacts.until, leaves_bounds_at(state, i, impacts.now, dt))
+    i = owner_of(state, i)
+    k = i if impacts.sweeps and bodies.impact_count[i] < STOPPED else -1
+    while k >= 0:
+        bodies.last_impact[k] = impacts.now
+        impacts.until = min(impacts.until, leaves_bounds_at(state, k, impacts.now, dt))
+        k = next_row(state, k)
     if not impacts.linked:
         link_pairs(state)
     entry = impacts.heads[i]
@@ -100,9 +105,11 @@ def list_landings(state, c, now):
         link_pairs(state)
     for side in range(2):
         i = pairs.a[c] if side == 0 else pairs.b[c]
-        entry = impacts.heads[i] if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] == 0 else -1
+        free = bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] == 0
+        entry = impacts.heads[owner_of(state, i)] if free else -1
         while entry >= 0:
             p = entry // 2
-            if p != c and pairs.is_solid[p] and may_have_sunk(state, i, pairs.a[p] + pairs.b[p] - i, now):
+            one, other = (pairs.a[p], pairs.b[p]) if entry % 2 == 0 else (pairs.b[p], pairs.a[p])
+            if p != c and pairs.is_solid[p] and may_have_sunk(state, one, other, now):
                 list_pair(impacts, p, 0.0)
             entry = impacts.links[entry]

@@ -15,6 +15,7 @@ from ...framework.schedule.phases import Phase
 from ...framework.schedule.plan import PlannedKernel, kernels_of
 from ...framework.schedule.stages import Program, PythonPart, Stage
 from ...framework.settings import Settings
+from ..compounds.stages import carry_forces, move_parts
 from ..contacts.solving.joined import begin_joints
 from ..forces.accumulation import ForceAccumulation
 from ..scene import Scene
@@ -54,6 +55,7 @@ class Integration(StagedSystem):
     phase = Phase.INTEGRATION
     writes = ("position", "linear_velocity", "previous_position")
     STAGES = (
+        Stage(carry_forces, "forces on parts act on their bodies", ("force",), ("force",), "parts"),
         Stage(
             look_at_sleepers, "what code of the game has done to sleepers in this step", ("force", "rest_force"),
             ("still",), "sleeping", "bodies sleep",
@@ -84,6 +86,10 @@ class Integration(StagedSystem):
         ),
         Stage(
             note_path, "the path within the step, on which impacts are found", MOTION, ("path_velocity",), "colliders",
+        ),
+        Stage(
+            move_parts, "parts fly and turn with their bodies", (*MOTION, "rotation"),
+            (*MOTION, "rotation", "axes", "path_velocity"), "parts",
         ),
         Stage(
             rest_sleepers, "puts sleepers back that have flown with the others, as some were disturbed", MOTION,

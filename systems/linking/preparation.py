@@ -58,6 +58,8 @@ def kind_of(scene: Scene, integration: Integration, program: Program) -> Kind:
         conditions |= {NEEDED}
     if scene.state.solver.joints.count > 0:
         conditions |= {"joints", "colliders or joints"}
+    if scene.state.parts.count > 0:
+        conditions |= {"parts"}
     if linked is None:
         return dimensions, stages, conditions, None, ()
     asking = dict.fromkeys((*QUERY_SHAPES, *(shape.component for shape in linked.shapes)))

@@ -33,7 +33,7 @@ class StepLinks:
         self._integration, self._search, self._extensions = integration, search, extensions
         self._state.links = np.zeros(len(PLACES), np.int64)
         self.version = self._forces = NEVER  # of the scene, and how many force systems there were
-        self._joined = False  # there are joints
+        self._joined = False, False  # there are joints, and parts of bodies
         self._bounces = False  # some collider does, or has
         self._key: Any = None  # what the linked stages depend on
         self._usual: Any = None  # what of that bodies may change
@@ -42,8 +42,11 @@ class StepLinks:
 
     def follows(self, force_systems: int) -> bool:
         """Whether nothing has changed since the last time that makes other functions necessary."""
-        joined = self._state.solver.joints.count > 0
+        joined = self._have_joints_and_parts()
         return self._scene.version == self.version and force_systems == self._forces and joined == self._joined
+
+    def _have_joints_and_parts(self) -> tuple[bool, bool]:
+        return self._state.solver.joints.count > 0, self._state.parts.count > 0
 
     def needs_sweeps(self) -> bool:
         """Whether some body is swept: all of them in the mode, or those whose ccd is set."""
@@ -63,7 +66,7 @@ class StepLinks:
         self.version = NEVER  # until it is done
         scene, state = self._scene, self._state
         collides = state.collides
-        joined = self._joined = state.solver.joints.count > 0
+        joined = self._joined = self._have_joints_and_parts()
         state.sweeps_ready = sweeps = collides and self.needs_sweeps()
         if collides and not self._bounces:
             self._bounces = bool(np.any(state.colliders.restitution[:, : state.count]))
@@ -108,12 +111,13 @@ class StepLinks:
     def _conditions(self) -> dict[str, bool]:
         """What is true of the scene now, as in ``stage_list.CONDITIONS``."""
         state = self._state
-        moves, collides, joined = state.dynamic > 0, state.collides, self._joined
+        moves, collides, (joined, parted) = state.dynamic > 0, state.collides, self._joined
         met = {
             "": True,
             "dynamic bodies": moves,
             "colliders": collides,
             "joints": joined,
+            "parts": parted,
             "colliders or joints": collides or joined,
             "contacts": collides or bool(state.contacts.counts.any()) or state.asleep > 0,  # sleepers have theirs
             "one level": collides and not state.several_levels,

@@ -8,6 +8,7 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import dot, item, length, sub
 from ..codes import LOOK, OK, WAKE, WAKE_TOUCHED
+from ..compounds.rows import has_parts, next_row, owner_of
 from ..forces.stages import is_zero
 from ..islands import root_of
 from ..shapes.tolerances import contact_margin
@@ -190,9 +191,21 @@ def find_touched(state, dt):
 
 
 @inlined
+def least_extent(state, i):
+    """The smallest extent of the shapes of body i; 0 without any."""
+    bodies, extent = state.bodies, state.bodies.min_extent[i]
+    k = next_row(state, i) if has_parts(state, i) else -1
+    while k >= 0:
+        other = bodies.min_extent[k]
+        extent = other if extent == 0.0 or 0.0 < other < extent else extent
+        k = next_row(state, k)
+    return extent
+
+
+@inlined
 def is_unmoved(state, i, dt):
     """Whether a body stands as good as still."""
-    v, least = state.bodies.linear_velocity[i], UNMOVED_SIZES * state.bodies.min_extent[i] / dt
+    v, least = state.bodies.linear_velocity[i], UNMOVED_SIZES * least_extent(state, i) / dt
     return dot(v, v) <= least * least
 
 
@@ -212,9 +225,10 @@ def is_at_rest(state, i, dt):
     as still: what drifts in space is not at rest.
     """
     bodies = state.bodies
-    if bodies.quarantined[i] or bodies.shape[i] < 0 or (state.impacts.logged > 0 and bodies.impact_count[i] > 0):
+    shapeless = bodies.shape[i] < 0 and not has_parts(state, i)
+    if bodies.quarantined[i] or shapeless or (state.impacts.logged > 0 and bodies.impact_count[i] > 0):
         return False
-    v, extent, forced = bodies.linear_velocity[i], bodies.min_extent[i], bodies.force_speed_change[i]
+    v, extent, forced = bodies.linear_velocity[i], least_extent(state, i), bodies.force_speed_change[i]
     away = length(sub(bodies.position[i], bodies.rest_position[i])) if bodies.rest_steps[i] > 0 else math.inf
     limit = min(REST_SIZES * extent / dt, (RATTLE_SHARE if away <= RATTLE_ROOM * extent else REST_SHARE) * forced)
     slow = dot(v, v) <= limit * limit and (bodies.rest_steps[i] == 0 or away <= REST_ROOM * extent)
@@ -240,6 +254,10 @@ def count_rest(state, dt, needed):
             if bodies.rest_steps[i] <= 1:
                 bodies.rest_position[i] = bodies.position[i]
             ripe |= bodies.rest_steps[i] >= needed and i < last
+    for k in range(state.parts.count if state.compound else 0):  # parts rest as their bodies do
+        i, body = state.parts.row[k], state.parts.body_row[k]
+        if body >= 0 and state.first <= i < state.moving:
+            bodies.rest_steps[i], bodies.rest_position[i] = bodies.rest_steps[body], bodies.rest_position[body]
     return ripe
 
 
@@ -258,7 +276,8 @@ def join_islands(state, dt, needed):
     for c in range(pairs.count):
         a, b = pairs.a[c], pairs.b[c]
         if pairs.is_solid[c] and pairs.near_contact[c]:
-            for i in (a, b):
+            for row in (a, b):
+                i = owner_of(state, row)
                 if i < state.dynamic and bodies.rest_steps[i] >= needed:
                     keeps_awake[i] = goes_on(state, i, dt)
     reach = reach_of_next_step(state, dt)
@@ -267,6 +286,11 @@ def join_islands(state, dt, needed):
         awake = b < state.dynamic and still[a] == AWAKE and still[b] == AWAKE
         if awake and pairs.is_solid[c] and (pairs.near_contact[c] or wakes(state, dt, c, reach)):
             one, other = root_of(root, a), root_of(root, b)
+            root[max(one, other)] = min(one, other)
+    for i in range(state.first, state.dynamic if state.compound else state.first):
+        if owner_of(state, i) != i:
+            keeps_awake[i] = False
+            one, other = root_of(root, i), root_of(root, owner_of(state, i))
             root[max(one, other)] = min(one, other)
     joints = state.solver.joints
     for e in range(joints.active):

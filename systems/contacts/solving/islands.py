@@ -15,6 +15,7 @@ from ....framework.compilation import part
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import dot, length, sub
 from ...bits import lowest_bit
+from ...compounds.rows import owner_of, place_of
 from ...islands import root_of
 from ...shapes.tolerances import smaller_extent
 from ..constants import (
@@ -40,7 +41,7 @@ COLOURS = 62  # bits of a mask; rows of a body beyond them share the last one
 @part
 def number_body(state, i):
     """The place of a row among the bodies of the solver, a new one if it has none yet."""
-    solver, place = state.solver, state.bodies.place
+    solver, place, i = state.solver, state.bodies.place, owner_of(state, i)
     if place[i] < 0:
         q = solver.bodies
         place[i] = q
@@ -95,9 +96,9 @@ def join_bodies(state):
 @part
 def island_of_joint(state, j):
     """The island of a row of joints."""
-    joints, island, place = state.solver.joints, state.solver.island, state.bodies.place
+    joints, island = state.solver.joints, state.solver.island
     a, b = joints.row_a[j], joints.row_b[j]
-    return max(island[place[a]] if a >= 0 else -1, island[place[b]] if b >= 0 else -1)
+    return max(island[place_of(state, a)] if a >= 0 else -1, island[place_of(state, b)] if b >= 0 else -1)
 
 
 @part
@@ -162,7 +163,7 @@ def weigh_rows(state, dt):
     for r in range(solver.contacts):
         c = solver.pair[r]
         a, b = pairs.a[c], pairs.b[c]
-        t = max(solver.island[bodies.place[a]], solver.island[bodies.place[b]])
+        t = max(solver.island[place_of(state, a)], solver.island[place_of(state, b)])
         w_a, w_b, inverse_extent = inverse_mass[a], inverse_mass[b], 1.0 / smaller_extent(bodies, a, b)
         v_a, v_b = velocity[a] if a < state.moving else nothing, velocity[b] if b < state.moving else nothing
         solver.size_of[t] += 1
@@ -225,7 +226,7 @@ def place_rows(state):
         ends[s] = body_ends[s] = 0
     for r in range(solver.contacts):
         c = solver.pair[r]
-        t = max(island[bodies.place[pairs.a[c]]], island[bodies.place[pairs.b[c]]])
+        t = max(island[place_of(state, pairs.a[c])], island[place_of(state, pairs.b[c])])
         solver.slot[r] = range_of[t]
         ends[range_of[t]] += 1
     for q in range(solver.bodies):

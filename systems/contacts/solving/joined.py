@@ -8,6 +8,7 @@ from ....framework.compilation import inlined, part
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add, add_scaled, item, replace, scale, sub
 from ...codes import NEED_COLUMNS, OK
+from ...compounds.rows import owner_of, place_of
 from ...integration.turning import cross_spin
 from .joints import GIVEN, POINT, SLIDE, TURN
 from .rows import turn_body
@@ -87,7 +88,8 @@ def leave_out_joined(state, dt):
     for c in range(candidates.count):
         a, b = first[c], second[c]
         first[kept], second[kept] = a, b
-        kept += not is_apart(joints, min(entity[a], entity[b]), max(entity[a], entity[b]))
+        one, other = entity[owner_of(state, a)], entity[owner_of(state, b)]
+        kept += not is_apart(joints, min(one, other), max(one, other))
     candidates.count = kept
     return OK
 
@@ -123,6 +125,7 @@ def push_joined(state, dt):
         push = scale(joints.pull[j] if joints.kind[j] == POINT else scale(joints.normal[j], joints.load[j]), dt)
         back = scale(joints.along_a[j], -joints.load[j] * dt) if given else push
         a, b = joints.row_a[j], joints.row_b[j]
+        a, b = owner_of(state, a) if a >= 0 else a, owner_of(state, b) if b >= 0 else b
         if a >= 0 and inverse_mass[a] > 0.0:
             bodies.warm_started[a], velocity[a] = True, add_scaled(velocity[a], back, -inverse_mass[a])
         if b >= 0 and inverse_mass[b] > 0.0:
@@ -154,8 +157,8 @@ def lay_joints(state):
     for e in range(joints.active):
         j = joints.order[e]
         a, b = joints.row_a[j], joints.row_b[j]
-        joints.first[j] = bodies.place[a] if a >= 0 else ground
-        joints.second[j] = bodies.place[b] if b >= 0 else ground
+        joints.first[j] = place_of(state, a) if a >= 0 else ground
+        joints.second[j] = place_of(state, b) if b >= 0 else ground
         if joints.kind[j] == GIVEN:
             lay_given(state, j)
             continue

@@ -13,6 +13,8 @@ from ....framework.compilation import packed, part
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add, add_scaled, dot, length, scale, sub
 from ...codes import NEED_COLUMNS, OK
+from ...compounds.rows import owner_of
+from ...compounds.stages import share_prediction
 from .joined import push_joined
 from .warm_start import find_rows, scale_to
 
@@ -47,7 +49,8 @@ def find_closing(state):
         to_hold[i] = nothing
     for m in range(memory.counts[now]):
         if not memory.off[m]:
-            a, b, push = memory.first[now, m], memory.second[now, m], memory.push[now, m]
+            a, b = owner_of(state, memory.first[now, m]), owner_of(state, memory.second[now, m])
+            push = memory.push[now, m]
             closing = dot(push, sub(velocity[a], velocity[b])) / length(push) - memory.closing[now, m]
             if a < state.moving and closing > length(to_hold[a]):
                 to_hold[a] = scale(push, -closing / length(push))
@@ -62,7 +65,8 @@ def apply_remembered(state):
     velocity, inverse_mass = bodies.linear_velocity, bodies.inverse_mass
     for m in range(memory.counts[now]):
         if not memory.off[m]:
-            a, b, push = memory.first[now, m], memory.second[now, m], memory.push[now, m]
+            a, b = owner_of(state, memory.first[now, m]), owner_of(state, memory.second[now, m])
+            push = memory.push[now, m]
             w_a, w_b = inverse_mass[a], inverse_mass[b]
             if w_a > 0.0:  # storing what stays as it is would make contacts with one floor wait for each other
                 bodies.warm_started[a], velocity[a] = True, add_scaled(velocity[a], push, -w_a)
@@ -119,6 +123,7 @@ def predict_rest(state, dt):
                 bodies.path_second[i] = add_scaled(bodies.path_second[i], dv, travels / dt)
             else:
                 bodies.path_velocity[i] = add_scaled(bodies.path_velocity[i], dv, travels)
+    share_prediction(state)
     return OK
 
 

@@ -1,0 +1,287 @@
+"""Bodies of several parts: ``World(Physics(...), Parts())``, then entities with a ``PartOf(body, ...)``."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...components import Collider, RigidBody, Transform
+from ...components.part_of import WEIGHTLESS, Changes, PartOf, rows_of_parts
+from ...components.spin import Spin, mass_of_shape
+from ...framework import NoPhysicsError, Plugin, World
+from ...systems.compounds.records import PARTS
+from .outline import Outline, Piece, parts_from_outline
+from .poses import Pose, turned_by
+
+FIELDS = ("body", "position", "rotation", "mass")
+
+
+class Place(NamedTuple):
+    """Where a part belongs: the entity of its body, and its pose along the axes of that."""
+
+    holder: int
+    pose: Pose
+
+
+class Parts(Plugin):
+    """The parts of bodies of one world: entities with a :class:`PartOf` and a collider.
+
+    When a body is deleted its parts are deleted too, and the event ``part_lost`` is sent with entity and component.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("parts", version="1.0")
+        self.components = (PartOf,)
+        self.world: World | None = None
+
+    def install(self, world: World) -> None:
+        if world.physics is None:
+            raise NoPhysicsError("parts need physics before them: World(Physics(...), Parts())")
+        if self.world is not None and not self.world.closed:
+            raise ValueError(f"these parts belong to world {self.world.name!r}: each world takes its own Parts()")
+        self.world, physics = world, world.physics
+        self._physics: Any = physics
+        self._table: Any = self._physics.table
+        self._record: Any = physics.record(PARTS)
+        self._contents = world._contents()
+        self._physics.adoption.register((PartOf,))
+        self._seen: Any = None  # what the record depends on,
+        self._followed: Any = None  # and what of that concerns more than the order of rows
+        self._known: dict[int, tuple[int, float]] = {}  # of the parts: their body, and what they have added to its mass
+        self._any_static = False
+        self._rows: Any = ()  # of the parts and of their bodies
+        world.events.define("part_lost")
+        self._physics.extensions.adopters.append(self._follow)
+        self._physics.extensions.waiting.append(lambda: self._now() != self._seen)
+        super().install(world)
+
+    def of(self, body: int) -> list[int]:
+        """The parts of a body, by their entities."""
+        self._physics.synchronize()
+        return self._table.column("entity")[rows_of_parts(self._table, body)].tolist()
+
+    def centre(self, body: int) -> np.ndarray:
+        """(d,) m: the centre of mass of a body with its parts, from its position, along its own axes. It should be 0,
+        for a body turns about its position: see :meth:`balance`."""
+        self._physics.synchronize()
+        table, d = self._table, self._physics.dimensions
+        row, parts = table.find(body), rows_of_parts(table, body)
+        masses, total, moment = table.column("part_of.added")[parts], 0.0, np.zeros(d)
+        turns = table.column("part_of.turn")[parts]
+        own = max(0.0, float(table.column("mass")[row]) - float(masses.sum()))
+        for i, mass, turn in zip((row, *parts), (own, *masses), (0.0, *turns), strict=True):
+            shape = mass_of_shape(table, i) if mass > 0.0 else None
+            if shape is not None:
+                moment += mass * Pose.of(0.0, turn, d).point(shape.centre)
+            total += mass
+        return moment / total
+
+    def balance(self, body: int) -> None:
+        """Move the position of a body to its centre of mass; its colliders and its parts stay where they are."""
+        centre, entities = self.centre(body), self._contents.entities
+        own, d = entities[body], self._physics.dimensions
+        transform = own[Transform]
+        transform.position = transform.position + Pose.of(0.0, transform.rotation, d).point(centre)
+        for component, handle in own.items():
+            if issubclass(component, Collider):
+                handle.offset = handle.offset - centre
+        for part in self.of(body):
+            if entities[part][PartOf].body == body:
+                entities[part][PartOf].position = entities[part][PartOf].position - centre
+        self._follow(self.world)
+
+    # -- snapshots --------------------------------------------------------------------------------
+
+    def saved(self, world: Any) -> Any:
+        """The parts that have been followed, and what they have added to their bodies."""
+        holders, added = zip(*self._known.values(), strict=True) if self._known else ((), ())
+        return {"entity": list(self._known), "holder": list(holders), "added": list(added)}
+
+    def take_back(self, world: Any, saved: Any) -> None:
+        """Go on from there."""
+        known = zip(saved["holder"], saved["added"], strict=True)
+        self._known, self._seen = dict(zip(saved["entity"], known, strict=True)), None
+
+    # -- what has changed -------------------------------------------------------------------------
+
+    def _now(self) -> Any:
+        """Another value whenever bodies have come or gone, or a field was set."""
+        table = self._table
+        inside = tuple(table.column(key).tobytes() for name in FIELDS if (key := f"part_of.{name}") in table.lent)
+        statics = table.static_version if self._any_static else 0
+        return self._contents.log.rounds, table.version, table.members_version, statics, Changes.count, inside
+
+    def _look(self) -> tuple[Any, list[int], list[int]]:
+        """(another value whenever parts may have to be followed, their entities in order, what they are parts of)."""
+        table = self._table
+        rows = np.flatnonzero(table.has_mask(PartOf)[: table.count])
+        rows = rows[np.argsort(table.column("entity")[rows])]
+        ids, columns = table.column("entity")[rows], [table.column(f"part_of.{name}")[rows] for name in FIELDS]
+        bodies = columns[0]
+        of = table.rows_of(bodies)
+        kinds = np.where(of < 0, -1, np.searchsorted(table.stops, of, side="right"))
+        values = *(column.tobytes() for column in (ids, kinds, *columns)), table.members_version
+        statics = table.static_version if self._any_static else 0
+        return (*values, statics), ids.tolist(), bodies.tolist()
+
+    def _follow(self, world: Any) -> None:
+        """Which parts there are, where they belong, and what they add to their bodies."""
+        now = self._now()
+        if now == self._seen:
+            self._place_moved()
+            return
+        found, ids, bodies = self._look()
+        if self._seen is not None and found == self._followed:  # rows have moved, no more
+            self._find_rows()
+            self._seen = now
+            self._place_moved()
+            return
+        body_of = dict(zip(ids, bodies, strict=True))
+        places = {entity: self._place(entity, body_of) for entity in ids}
+        lost = [entity for entity, place in places.items() if self._table.row_of(place.holder) < 0]
+        gone = [(entity, self._contents.entities[entity][PartOf]) for entity in lost]
+        places = {entity: place for entity, place in places.items() if entity not in lost}
+        for entity, place in places.items():
+            self._check(entity, place.holder)
+        self._add_masses(places)
+        for entity, place in places.items():
+            self._put(entity, place)
+        self._contents.delete(lost)
+        self._physics.adoption.synchronize()
+        self._write(places)
+        self._seen, self._followed = self._now(), self._look()[0]
+        for entity, part in gone:
+            world.events.dispatch("part_lost", entity, part)
+
+    def _place(self, entity: int, body_of: dict[int, int]) -> Place:
+        """The body at the end of the chain of parts, and the pose against it."""
+        d, seen = self._physics.dimensions, [entity]
+        part = self._contents.entities[entity][PartOf]
+        pose = Pose.of(part.position, part.rotation, d)
+        while body_of[seen[-1]] in body_of:
+            body = body_of[seen[-1]]
+            if body in seen:
+                raise ValueError(f"entities {', '.join(map(str, sorted(seen)))} are parts of each other")
+            seen.append(body)
+            part = self._contents.entities[body][PartOf]
+            pose = Pose.of(part.position, part.rotation, d).then(pose)
+        return Place(body_of[seen[-1]], pose)
+
+    def _check(self, entity: int, holder: int) -> None:
+        """ValueError for a part that the body cannot have."""
+        own, body = self._contents.entities.types_of(entity), self._contents.entities.types_of(holder)
+        if Spin in own:
+            raise ValueError(f"entity {entity}: a part turns with its body, entity {holder}: give that a Spin")
+        for collider, cure in Spin.excludes.items():
+            if collider in own and Spin in body:
+                raise ValueError(f"entity {entity}: {collider.__name__} is no part of a body that turns: {cure}")
+        components = self._contents.entities[entity]
+        for component in own if not components[PartOf].holder else ():
+            if issubclass(component, Collider) and np.any(components[component].offset):
+                raise ValueError(f"entity {entity}: {component.__name__}.offset: give PartOf.position instead")
+
+    def _add_masses(self, places: dict[int, Place]) -> None:
+        """What parts add to the masses of their bodies, and no more what others have added."""
+        before, now = self._known, {}
+        for entity, place in places.items():
+            part = self._contents.entities[entity][PartOf]
+            mass = part.mass
+            now[entity] = place.holder, (0.0 if self._is_sensor(entity) else 1.0) if mass is None else mass
+        for entity, (holder, mass) in before.items():
+            if now.get(entity, (0, 0.0))[0] != holder:
+                self._add(holder, -mass)
+                if entity not in now and entity in self._contents.entities:
+                    self._release(entity, holder, mass)
+        for entity, (holder, mass) in now.items():
+            old, added = before.get(entity, (0, 0.0))
+            self._add(holder, mass - added if old == holder else mass)
+            part = self._contents.entities[entity][PartOf]
+            _set(part, "added", mass)
+            _set(part, "holder", holder)
+        self._known = now
+
+    def _add(self, body: int, mass: float) -> None:
+        """A body becomes heavier or lighter, as long as something is left."""
+        if mass != 0.0 and self._table.row_of(body) >= 0:
+            handle = self._contents.entities[body].get(RigidBody)
+            if handle is not None and handle.mass + mass > 0.0:
+                handle.mass += mass
+
+    def _is_sensor(self, entity: int) -> bool:
+        own = self._contents.entities[entity]
+        return any(issubclass(component, Collider) and handle.sensor for component, handle in own.items())
+
+    def _release(self, entity: int, holder: int, mass: float) -> None:
+        """What was a part is a body by itself, where it is, and as fast."""
+        own, d, table = self._contents.entities[entity], self._physics.dimensions, self._table
+        if Transform not in own or RigidBody not in own:
+            return
+        arm = np.zeros(d)
+        for component, handle in own.items():
+            if issubclass(component, Collider):
+                arm = Pose.of(0.0, own[Transform].rotation, d).point(handle.offset)
+                handle.offset = np.zeros(d)
+        spin, row = table.arrays.get("spin.angular_velocity"), table.row_of(holder)
+        w = np.reshape(spin[row], -1) if spin is not None and row >= 0 else np.zeros(1)
+        turned = w[0] * np.array((-arm[1], arm[0])) if d == 2 else np.cross(w, arm) if len(w) == 3 else 0.0
+        own[Transform].position = own[Transform].position + arm
+        own[RigidBody].mass = mass if mass > 0.0 else 1.0
+        own[RigidBody].linear_velocity = own[RigidBody].linear_velocity + turned
+
+    def _put(self, entity: int, place: Place) -> None:
+        """Write what a part has of its body, and the places of its colliders."""
+        own, body = self._contents.entities[entity], self._contents.entities[place.holder]
+        d, rigid, transform = self._physics.dimensions, body.get(RigidBody), body[Transform]
+        _set(own[RigidBody], "kind", rigid.kind if rigid is not None else "static")
+        _set(own[RigidBody], "mass", WEIGHTLESS)
+        if rigid is not None:
+            _set(own[RigidBody], "linear_velocity", rigid.linear_velocity)
+        turned = Pose.of(transform.position, transform.rotation, d).then(Pose.of(0.0, place.pose.rotation, d))
+        _set(own[Transform], "position", transform.position)
+        _set(own[Transform], "rotation", turned.rotation)
+        _set(own[PartOf], "turn", place.pose.rotation)
+        for component, handle in own.items():
+            if issubclass(component, Collider):
+                _set(handle, "offset", place.pose.local(np.zeros(d)) * -1.0)
+
+    def _place_moved(self) -> None:
+        """Parts are where the game has put their bodies since the last step."""
+        arrays, record, count = self._table.arrays, self._record, self._record.count
+        if not count:
+            return
+        rows, bodies = self._rows
+        if (arrays["position"][rows] != arrays["position"][bodies]).any():
+            arrays["position"][rows] = arrays["position"][bodies]
+            arrays["previous_position"][rows] = arrays["previous_position"][bodies]
+        rotation = arrays.get("rotation")
+        if rotation is not None:
+            turned = turned_by(rotation[bodies], record.turn[:count])
+            if (rotation[rows] != turned).any():
+                rotation[rows] = turned
+
+    def _write(self, places: dict[int, Place]) -> None:
+        """The record of the parts."""
+        record, d = self._record, self._physics.dimensions
+        record.reserve(max(len(places), 1), *record.columns())
+        record.count, record.rows_version = len(places), -1
+        for k, (entity, place) in enumerate(places.items()):
+            record.entity[k], record.body[k] = entity, place.holder
+            record.mass[k] = self._known[entity][1]
+            record.turn[k] = (place.pose.rotation, 0.0, 0.0, 0.0) if d == 2 else place.pose.rotation
+        self._find_rows()
+
+    def _find_rows(self) -> None:
+        """The rows of the parts and of their bodies."""
+        record, count, table = self._record, self._record.count, self._table
+        self._rows = table.rows_of(record.entity[:count]), table.rows_of(record.body[:count])
+        self._any_static = bool((self._rows[1] >= table.stops[1]).any())
+
+
+def _set(handle: Any, name: str, value: Any) -> None:
+    """Write a field if it has another value."""
+    if np.any(getattr(handle, name) != value):
+        setattr(handle, name, value)
+
+
+__all__ = ["Outline", "PartOf", "Parts", "Piece", "parts_from_outline"]

@@ -1,0 +1,66 @@
+"""Where one thing is from another, and how it is turned."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+
+class Pose(NamedTuple):
+    """A position (d,) and a rotation: an angle, in space a unit quaternion (w, x, y, z)."""
+
+    position: np.ndarray
+    rotation: Any
+
+    @classmethod
+    def of(cls, position: Any, rotation: Any, dimensions: int) -> Pose:
+        """The same from what fields hold, where a number may stand for a vector or for no rotation."""
+        place = np.zeros(dimensions) + np.asarray(position, float)
+        if dimensions == 2:
+            return cls(place, float(rotation))
+        return cls(place, np.asarray(rotation, float) if np.ndim(rotation) else np.array((1.0, 0.0, 0.0, 0.0)))
+
+    def axes(self) -> np.ndarray:
+        """(d, d): its axes as columns."""
+        if len(self.position) == 2:
+            c, s = np.cos(self.rotation), np.sin(self.rotation)
+            return np.array(((c, -s), (s, c)))
+        w, x, y, z = self.rotation
+        across = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+        return np.eye(3) + 2.0 * w * across + 2.0 * across @ across
+
+    def point(self, local: Any) -> np.ndarray:
+        return self.position + self.axes() @ np.asarray(local, float)
+
+    def local(self, point: Any) -> np.ndarray:
+        return self.axes().T @ (np.asarray(point, float) - self.position)
+
+    def then(self, inner: Pose) -> Pose:
+        """The pose of what is at ``inner`` along the axes of this."""
+        if len(self.position) == 2:
+            return Pose(self.point(inner.position), self.rotation + inner.rotation)
+        a, b, c, d = self.rotation
+        w, x, y, z = inner.rotation
+        turned = np.array((
+            a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y,
+            a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w,
+        ))  # fmt: skip
+        return Pose(self.point(inner.position), turned)
+
+
+def turned_by(rotations: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """Rotations (n,) or (n, 4) of bodies, turned against them by turns (n, 4), to the bit as the stages of parts do."""
+    if rotations.ndim == 1:
+        return rotations + turns[:, 0]
+    a, b, c, d = _unit(rotations).T
+    w, x, y, z = turns.T
+    return _unit(np.stack((
+        a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y,
+        a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w,
+    ), axis=1))  # fmt: skip
+
+
+def _unit(q: np.ndarray) -> np.ndarray:
+    w, x, y, z = q.T
+    return q / np.sqrt(w * w + x * x + y * y + z * z)[:, None]

@@ -1,0 +1,48 @@
+"""The inertia of a body of several parts: the parallel axis theorem."""
+
+from __future__ import annotations
+
+from ...components.spin import UNKNOWN, inertia_about
+from ...framework.compilation import part
+from ...framework.jit.records.record_type import zero_of
+from ..shapes.dispatch import second_moments
+from ..shapes.quaternions import turned_tensor
+
+
+@part
+def inertia_of_row(state, i, mass):
+    """(xx, yy, zz, xy, xz, yz) of a shape of that mass about the body's position, along the axes of its own row."""
+    shape = state.bodies.levels[state.level_count - 1, i] if state.collides else -1
+    if shape < 0 or state.shapes.moments[shape] == 0:
+        state.blamed = i + 1
+        raise ValueError(UNKNOWN)
+    return inertia_about(second_moments(state, shape, i), state.colliders.offset[state.shapes.slots[shape], i], mass)
+
+
+@part
+def inertia_of_compound(state, i):
+    """The same of a body and all its parts, along its own axes. What of its mass is not that of parts is spread over
+    its own collider; without one it is at its centre. If parts have more than the whole, theirs count for less."""
+    bodies, parts, plane = state.bodies, state.parts, len(zero_of(state)) == 2
+    of_parts, k = 0.0, bodies.next_part[i]
+    while k >= 0:
+        of_parts += parts.mass[bodies.part[k]]
+        k = bodies.next_part[k]
+    own, share = bodies.mass[i] - of_parts, 1.0
+    if own < 0.0:
+        own, share = 0.0, bodies.mass[i] / of_parts
+    xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if own > 0.0 and state.collides and bodies.levels[state.level_count - 1, i] >= 0:
+        xx, yy, zz, xy, xz, yz = inertia_of_row(state, i, own)
+    k = bodies.next_part[i]
+    while k >= 0:
+        p = bodies.part[k]
+        if parts.mass[p] > 0.0:
+            tensor = inertia_of_row(state, k, share * parts.mass[p])
+            if not plane:
+                turn = parts.turn[p, 0], parts.turn[p, 1], parts.turn[p, 2], parts.turn[p, 3]
+                tensor = turned_tensor(turn, tensor)
+            xx, yy, zz = xx + tensor[0], yy + tensor[1], zz + tensor[2]
+            xy, xz, yz = xy + tensor[3], xz + tensor[4], yz + tensor[5]
+        k = bodies.next_part[k]
+    return xx, yy, zz, xy, xz, yz

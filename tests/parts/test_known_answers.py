@@ -1,0 +1,220 @@
+"""Bodies of several parts against closed forms and conservation laws."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from helpers_parts import CORNER, G, L, U, angular_momentum, at, body_of, floor, parts_world, piece, run
+from worlds import MODES
+
+from carom import RigidBody, SphereCollider, Transform
+from carom.plugins.joints import Hinge, Joints
+from carom.plugins.parts import PartOf
+from carom.plugins.rotation import BoxCollider, Spin
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("beyond", [-0.02, 0.02])
+def test_a_piece_stays_on_an_edge_up_to_its_centre_of_mass(beyond):
+    """A plank with a load on its right end, on a table that ends there: the centre of both, of equal mass, is 0.2 from
+    the plank's."""
+    world, parts = parts_world((0, -G))
+    world.create_entity(Transform((-1.0 + 0.2 - beyond, -0.5)), BoxCollider((1.0, 0.5), friction=0.5))
+    plank = piece(
+        world, parts, (0, 0.1), (((0, 0), (0.5, 0.1), 1.0), ((0.4, 0.2), (0.1, 0.1), 1.0)), friction=0.5
+    )[0]  # fmt: skip
+    assert at(world, plank).position == pytest.approx((0.2, 0.2))
+    run(world, 60)
+    assert abs(at(world, plank).rotation) < 1e-3 if beyond < 0 else at(world, plank).rotation < -0.05
+
+
+@pytest.mark.plain
+def test_masses_add_up_by_the_parallel_axis_theorem():
+    world, parts = parts_world()
+    body = piece(world, parts, (3, 4), U, angle=0.7)[0]
+    masses, centres = np.array([box[2] for box in U]), np.array([box[0] for box in U])
+    middle = masses @ centres / masses.sum()
+    inertia = sum(
+        m * ((a * a + b * b) / 3 + ((c - middle) ** 2).sum())
+        for m, c, (a, b) in zip(masses, centres, [box[1] for box in U], strict=True)
+    )
+    assert body_of(world, body).mass == pytest.approx(3.0, rel=1e-15)
+    assert world.component_for_entity(body, Spin).moments == pytest.approx(inertia, rel=1e-14)
+    c, s = math.cos(0.7), math.sin(0.7)
+    assert at(world, body).position == pytest.approx(
+        (3 + c * middle[0] - s * middle[1], 4 + s * middle[0] + c * middle[1])
+    )
+    assert parts.centre(body) == pytest.approx((0, 0), abs=1e-15)
+    world.component_for_entity(body, Spin).apply_torque(2.0)
+    world.step()
+    assert world.component_for_entity(body, Spin).angular_velocity == pytest.approx(2.0 / 60 / inertia, rel=1e-14)
+
+
+def test_a_box_cut_into_two_is_the_whole_in_space():
+    """Its halves are turned, so that tensors are; it tumbles under no torque, and bounces on a corner."""
+    ends = []
+    for cut in (False, True):
+        world, _ = parts_world((0, -G, 0), 3)
+        world.create_entity(Transform((0, -2, 0)), BoxCollider((9, 1, 9), restitution=0.6))
+        body = world.create_entity(
+            Transform((0, 0.5, 0), rotation=(0.9, 0.1, 0.3, 0.3)), RigidBody(2.0), Spin(np.array((1.0, 2.0, -1.5))),
+            BoxCollider((0.2, 0.3, 0.4), restitution=0.6),
+        )  # fmt: skip
+        if cut:
+            world.component_for_entity(body, RigidBody).mass = 1.0
+            world.component_for_entity(body, BoxCollider).half_extents = (0.2, 0.3, 0.2)
+            world.component_for_entity(body, BoxCollider).offset = (0, 0, -0.2)
+            half = math.sqrt(0.5)
+            world.create_entity(
+                PartOf(body, (0, 0, 0.2), rotation=(half, 0, 0, half)), BoxCollider((0.3, 0.2, 0.2), restitution=0.6)
+            )
+        run(world, 45)  # it has bounced once
+        motion, spin = body_of(world, body), world.component_for_entity(body, Spin)
+        assert spin.moments == pytest.approx(np.diag((0.5, 0.4, 0.26)) / 3, abs=1e-15)
+        ends.append(np.concatenate((at(world, body).position, motion.linear_velocity, spin.angular_velocity)))
+        assert motion.linear_velocity[1] > 0.0
+    assert ends[0] == pytest.approx(ends[1], abs=5e-3)  # steps split turns by the axes, in another order
+
+
+@pytest.mark.plain
+def test_a_piece_on_a_hinge_has_the_period_of_a_physical_pendulum():
+    world, parts = parts_world((0, -G), dt=1 / 120)
+    joints = Joints()
+    world.add_plugin(joints)
+    body = piece(world, parts, (0, 0), L)[0]
+    inertia, mass = world.component_for_entity(body, Spin).moments, body_of(world, body).mass
+    place = at(world, body).position.copy()
+    world.create_entity(Hinge(None, body, anchor=(place[0], place[1] + 0.8)))
+    world.component_for_entity(body, Spin).angular_velocity = 0.3
+    world.component_for_entity(body, RigidBody).linear_velocity = (0.24, 0.0)
+    angles = []
+    for _ in range(600):
+        world.step()
+        angles.append(at(world, body).rotation)
+    passes = [k + a / (a - b) for k, (a, b) in enumerate(itertools.pairwise(angles)) if a < 0 <= b]
+    swing = math.sqrt((inertia + mass * 0.64) / (mass * G * 0.8))
+    k, m = math.sin(max(angles) / 2), 1.0  # the complete elliptic integral, by the arithmetic and geometric mean
+    other = math.sqrt(1 - k * k)
+    while abs(m - other) > 1e-15:
+        m, other = 0.5 * (m + other), math.sqrt(m * other)
+    assert np.diff(passes).mean() / 120 == pytest.approx(2 * math.pi * swing / m, rel=3e-4)
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("mode", MODES)
+def test_free_collisions_keep_momentum_and_energy(mode):
+    random = np.random.default_rng(7)
+    world, parts = parts_world(collision=mode)
+    bodies = []
+    for place in itertools.product((0.0, 1.8), (0.0, 1.8)):
+        velocity = random.normal(0.0, 1.5, 2) - np.array(place) + 0.9
+        bodies.append(
+            piece(world, parts, place, U, velocity=velocity, spin=random.normal(0.0, 3.0), restitution=1.0)[0]
+        )
+    energy, momentum, turning, struck = world.kinetic_energy(), world.momentum(), angular_momentum(world, bodies), 0
+    for _ in range(150):
+        world.step()
+        struck += len(world.contacts)
+    assert struck > 2
+    assert world.kinetic_energy() == pytest.approx(energy, rel=1e-12)
+    assert world.momentum() == pytest.approx(momentum, abs=1e-12)
+    assert angular_momentum(world, bodies) == pytest.approx(turning, rel=1e-11)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_free_collisions_in_space(mode):
+    random = np.random.default_rng(7)
+    world, parts = parts_world(dimensions=3, collision=mode, dt=1 / 240)
+    bodies = []
+    for place in itertools.product((0.0, 1.8), (0.0, 1.8), (0.0,)):
+        velocity = random.normal(0.0, 1.0, 3) - np.array(place) + (0.9, 0.9, 0)
+        spin = random.normal(0.0, 2.0, 3)
+        bodies.append(
+            piece(world, parts, place, CORNER, velocity=velocity, spin=spin, restitution=0.7, friction=0.3)[0]
+        )
+    energies, momentum, turning = [world.kinetic_energy()], world.momentum(), angular_momentum(world, bodies)
+    for _ in range(480):
+        world.step()
+        energies.append(world.kinetic_energy())
+    assert energies[-1] < 0.9 * energies[0]
+    assert np.diff(energies).max() < 1e-4 * energies[0]  # what turns freely is exact on average alone
+    assert world.momentum() == pytest.approx(momentum, abs=1e-12)
+    assert angular_momentum(world, bodies) == pytest.approx(turning, rel=1e-9)
+
+
+@pytest.mark.parametrize("mode", ["continuous", "event_driven"])
+@pytest.mark.parametrize("restitution", [0.0, 1.0])
+def test_fast_pieces_do_not_pass_walls(mode, restitution):
+    random = np.random.default_rng(3)
+    world, parts = parts_world(collision=mode)
+    for x, y in ((-3, 0), (3, 0), (0, -3), (0, 3)):
+        half = (0.05, 3.2) if x else (3.2, 0.05)
+        world.create_entity(Transform((x, y)), BoxCollider(half, restitution=restitution))
+    bodies = []
+    for place in itertools.product((-1.5, 0.0, 1.5), (-1.0, 1.0)):
+        velocity, spin = random.normal(0.0, 60.0, 2), random.normal(0.0, 3.0)
+        bodies.append(piece(world, parts, place, U, velocity=velocity, spin=spin, restitution=restitution)[0])
+    energy = world.kinetic_energy()
+    for _ in range(120):
+        world.step()
+        places = np.array([at(world, body).position for body in bodies])
+        assert (np.abs(places) < 3.0).all()
+        now = world.kinetic_energy()
+        assert now <= energy * (1 + 1e-9)
+        energy = max(now, 1e-12)
+
+
+@pytest.mark.plain
+def test_a_heap_of_pieces_comes_to_rest():
+    world, parts = parts_world((0, -G))
+    floor(world, friction=0.6)
+    bodies = [piece(world, parts, (0.2 * k, 0.7 + 1.1 * k), (L, U)[k % 2], friction=0.6)[0] for k in range(3)]
+    before = world.kinetic_energy() + world.potential_energy()
+    for _ in range(150):
+        world.step()
+        energy = world.kinetic_energy() + world.potential_energy()
+        assert energy <= before + 0.02 * G
+        before = min(energy, before)
+    assert world.kinetic_energy() < 1e-3
+    assert max(contact.depth for contact in world.contacts) < 0.02
+    assert min(at(world, body).y for body in bodies) > 0.1
+
+
+@pytest.mark.plain
+def test_a_turning_platform_of_parts_carries_what_lies_on_its_arms():
+    """A kinematic body and its parts move alike, and are moved by nothing."""
+    world, _ = parts_world((0, -G))
+    hub = world.create_entity(
+        Transform((0, 0)), RigidBody(kind="kinematic", linear_velocity=(1, 0)), BoxCollider((0.2, 0.2))
+    )
+    arm = world.create_entity(PartOf(hub, (2, 0)), BoxCollider((1.0, 0.2), friction=1.0))
+    load = world.create_entity(Transform((2, 0.45)), RigidBody(), Spin(), BoxCollider((0.25, 0.25), friction=1.0))
+    run(world, 90)
+    assert at(world, hub).position == pytest.approx((1.5, 0))
+    assert at(world, arm).position == pytest.approx((1.5, 0))
+    assert at(world, load).position == pytest.approx((3.5, 0.45), abs=0.06)
+    assert body_of(world, load).linear_velocity == pytest.approx((1, 0), abs=1e-3)
+
+
+@pytest.mark.plain
+def test_spheres_of_a_dumbbell_push_each_other_by_their_body_alone():
+    """Two overlapping parts do not touch, and a body without a Spin or a collider of its own moves as one."""
+    world, parts = parts_world()
+    body = world.create_entity(Transform((0, 0)), RigidBody(1.0))
+    ends = [world.create_entity(PartOf(body, (x, 0), mass=0.5), SphereCollider(0.6)) for x in (-0.5, 0.5)]
+    ball = world.create_entity(
+        Transform((3, 0)), RigidBody(2.0, linear_velocity=(-2, 0)), SphereCollider(0.5, restitution=1.0)
+    )
+    world.component_for_entity(ends[1], SphereCollider).restitution = 1.0
+    seen = set()
+    for _ in range(90):
+        world.step()
+        seen |= {(contact.entity_a, contact.entity_b) for contact in world.contacts}
+    assert seen == {(ends[1], ball)}
+    assert body_of(world, body).linear_velocity == pytest.approx((-2, 0))
+    assert body_of(world, ball).linear_velocity == pytest.approx((0, 0), abs=1e-12)
+    assert world.momentum() == pytest.approx((-4, 0))
+    assert parts.of(body) == ends

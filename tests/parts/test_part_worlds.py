@@ -1,0 +1,271 @@
+"""What worlds do with parts: errors, events, changes as the game runs, sensors, queries, going back, files, sleep."""
+
+from __future__ import annotations
+
+import math
+
+import esper
+import numpy as np
+import pytest
+from helpers_parts import G, U, at, body_of, floor, parts_world, piece, run
+
+from carom import (
+    AABBCollider,
+    ConvexPolygonCollider,
+    NoPhysicsError,
+    Physics,
+    RigidBody,
+    SphereCollider,
+    Transform,
+    World,
+)
+from carom.plugins import convex_polygon
+from carom.plugins.joints import Joints, Weld
+from carom.plugins.parts import PartOf, Parts
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
+
+pytestmark = pytest.mark.plain
+
+
+def test_what_no_part_can_be_is_refused_at_the_call():
+    world, _ = parts_world()
+    body = world.create_entity(Transform((0, 0)), RigidBody(), SphereCollider(0.5))
+    part = world.create_entity(PartOf(body, (1, 0)), SphereCollider(0.5))
+    inner = world.create_entity(PartOf(part, (1, 0)), SphereCollider(0.5))
+    sign, gone = world.create_entity("no body"), world.create_entity(Transform((9, 9)), SphereCollider(0.5))
+    world.delete_entity(gone)
+    for message, call in (
+        ("no entity 99", lambda: world.create_entity(PartOf(99), SphereCollider(0.5))),
+        (f"no entity {gone}", lambda: world.create_entity(PartOf(gone), SphereCollider(0.5))),
+        ("no body, it has no Transform", lambda: world.create_entity(PartOf(sign), SphereCollider(0.5))),
+        ("is a part of", lambda: world.add_component(body, PartOf(inner))),
+        ("is a part of", lambda: world.add_component(body, PartOf(body))),
+        ("2 components", lambda: world.create_entity(PartOf(body, (1, 0, 0)), SphereCollider(0.5))),
+        ("at least 0", lambda: PartOf(body, mass=-1.0)),
+        ("at least 1", lambda: PartOf(0)),
+    ):
+        with pytest.raises(ValueError, match=message):
+            call()
+    world.step()
+    handle = world.component_for_entity(part, PartOf)
+    for message, other in ((f"entity {inner} is a part of it", inner), ("no body 99", 99)):
+        with pytest.raises(ValueError, match=message):
+            handle.body = other
+    assert handle.body == body
+    assert len(world.get_entities()) == 4
+
+
+@pytest.mark.parametrize(
+    ("components", "message"),
+    [
+        ((AABBCollider((0.1, 0.1)),), "give it a BoxCollider"),
+        ((SphereCollider(0.1), Spin()), "a part turns with its body"),
+        ((SphereCollider(0.1, offset=(1, 0)),), "PartOf.position"),
+    ],
+)
+def test_what_does_not_go_together_is_refused_when_the_world_takes_it(components, message):
+    world, _ = parts_world()
+    body = world.create_entity(Transform((0, 0)), RigidBody(), Spin(), SphereCollider(0.5))
+    part = world.create_entity(PartOf(body, (1, 0)), *components)
+    with pytest.raises(ValueError, match=message):
+        world.step()
+    world.delete_entity(part, immediate=True)
+    world.step()
+
+
+def test_parts_belong_to_one_world_with_physics():
+    parts = Parts()
+    with pytest.raises(NoPhysicsError, match="need physics"):
+        World(parts)
+    with World(Physics(dimensions=2), parts), pytest.raises(ValueError, match="each world takes its own"):
+        World(Physics(dimensions=2), parts)
+
+
+def test_parts_go_with_their_body_and_it_loses_what_they_weigh():
+    world, parts = parts_world()
+    body, left, right = piece(world, parts, (0, 0), U)
+    lost = []
+
+    def note(entity, part):
+        lost.append((entity, part.mass))
+
+    world.events.on("part_lost", note)
+    world.step()
+    assert parts.of(body) == [left, right]
+    world.delete_entity(left)
+    world.step()
+    assert (body_of(world, body).mass, lost) == (2.0, [])
+    world.component_for_entity(right, PartOf).mass = 1.5
+    world.step()
+    assert body_of(world, body).mass == 3.0
+    body_of(world, body).mass = 9.0  # given: of the whole
+    world.step()
+    assert body_of(world, body).mass == 9.0
+    world.delete_entity(body)
+    world.step()
+    assert lost == [(right, 1.5)]
+    assert world.get_entities() == []
+
+
+def test_what_breaks_off_flies_on_by_itself():
+    world, parts = parts_world()
+    boxes = tuple(((3 * x, 3 * y), half, mass) for (x, y), half, mass in U)  # so that they do not touch
+    body, left, right = piece(world, parts, (0, 0), boxes, velocity=(1, 0), spin=2.0)
+    run(world, 10)
+    momentum, arm = world.momentum(), world.component_for_entity(right, BoxCollider).offset.copy()
+    angle = at(world, right).rotation
+    world.remove_component(right, PartOf)
+    world.step()
+    c, s = math.cos(angle), math.sin(angle)
+    turned = np.array((c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]))
+    velocity = body_of(world, right).linear_velocity
+    assert velocity == pytest.approx(np.array((1, 0)) + 2.0 * np.array((-turned[1], turned[0])))
+    assert body_of(world, right).mass == 0.5
+    assert world.component_for_entity(right, BoxCollider).offset == pytest.approx((0, 0))
+    assert parts.of(body) == [left]
+    assert momentum[0] == pytest.approx(3.0)
+
+
+def test_parts_of_parts_and_fields_that_change():
+    world, parts = parts_world()
+    body = world.create_entity(Transform((1, 2), rotation=math.pi / 2), RigidBody(), SphereCollider(0.5))
+    arm = world.create_entity(PartOf(body, (1, 0), rotation=math.pi / 2), SphereCollider(0.1))
+    hand = world.create_entity(PartOf(arm, (1, 0)), SphereCollider(0.1))
+    assert set(world.query_sphere((0, 3), 0.05)) == {hand}  # 1 along the body's x, then 1 along its y
+    assert parts.of(body) == [arm, hand]
+    world.component_for_entity(hand, PartOf).position = (3, 0)
+    world.step()
+    assert set(world.query_sphere((-2, 3), 0.05)) == {hand}
+    world.component_for_entity(hand, PartOf).body = body
+    world.refresh_queries()
+    assert set(world.query_sphere((1, 5), 0.05)) == {hand}
+    at(world, body).position = (11, 2)
+    world.refresh_queries()
+    assert set(world.query_sphere((11, 5), 0.05)) == {hand}
+    at(world, body).rotation = 0.0
+    world.refresh_queries()
+    assert set(world.query_sphere((14, 2), 0.05)) == {hand}
+    world.component_for_entity(arm, PartOf).position[:] = (2, 0)  # in place
+    world.refresh_queries()
+    assert set(world.query_sphere((13, 2), 0.05)) == {arm}
+    body_of(world, body).kind = "static"
+    world.step()
+    at(world, body).position = (1, 2)
+    world.refresh_queries()
+    assert set(world.query_sphere((3, 2), 0.05)) == {arm}
+    assert body_of(world, arm).kind == "static"
+
+
+def test_a_foot_and_a_cone_of_sight_report_as_themselves():
+    world = World(Physics(dimensions=2, gravity=(0, -G)), Rotation(), Parts(), convex_polygon.plugin)
+    ground = floor(world)
+    hero = world.create_entity(Transform((0, 0.52)), RigidBody(2.0), Spin(inertia=1.0), BoxCollider((0.3, 0.5)))
+    foot = world.create_entity(PartOf(hero, (0, -0.5)), BoxCollider((0.2, 0.1), sensor=True))
+    cone = ConvexPolygonCollider(((0, 0), (6, -2), (6, 2)), sensor=True)
+    sight = world.create_entity(PartOf(hero, (0.3, 0.3)), cone)
+    thief = world.create_entity(Transform((4, 1.5)), RigidBody(gravity_scale=0), SphereCollider(0.3))
+    ghost = world.create_entity(Transform((-4, 1.5)), RigidBody(gravity_scale=0), SphereCollider(0.3))
+    run(world, 30)
+    pairs = {(contact.entity_a, contact.entity_b) for contact in world.contacts}
+    assert pairs == {(ground, hero), (ground, foot), (ground, sight), (sight, thief)}
+    assert world.component_for_entity(sight, PartOf).body == hero
+    assert body_of(world, hero).mass == 2.0  # sensors weigh nothing
+    at(world, hero).rotation = math.pi
+    world.step()
+    pairs = {(contact.entity_a, contact.entity_b) for contact in world.contacts}
+    assert (sight, ghost) in pairs
+    assert (sight, thief) not in pairs
+
+
+def test_plain_esper_calls_and_bulk_creation_make_parts():
+    world, parts = parts_world((0, -G))
+    body = world.create_entity(Transform((0, 5)), RigidBody(), SphereCollider(0.5))
+    esper.switch_world(world.name)
+    part = esper.create_entity(PartOf(body, (1, 0), mass=2.0), SphereCollider(0.5))
+    many = world.create_entities(
+        2, PartOf.many(body=body, position=np.array(((0, 1), (0, -1.0))), mass=0.5), SphereCollider.many(radius=0.2)
+    )
+    world.step()
+    assert parts.of(body) == [part, *many]
+    assert body_of(world, body).mass == 4.0
+    assert esper.component_for_entity(part, Transform).position == pytest.approx(at(world, body).position)
+    esper.delete_entity(part)
+    world.step()
+    assert body_of(world, body).mass == 2.0
+    esper.switch_world("default")
+
+
+def test_forces_and_joints_at_a_part_move_the_body():
+    world, parts = parts_world()
+    world.add_plugin(Joints())
+    body, left, _ = piece(world, parts, (0, 0), U)
+    body_of(world, left).apply_force((6.0, 0.0))
+    world.step()
+    assert body_of(world, body).linear_velocity == pytest.approx((6.0 / 3.0 / 60, 0))
+    body_of(world, body).linear_velocity = (0, 0)
+    other = world.create_entity(Transform((0, 3)), RigidBody(1.0), Spin(), BoxCollider((0.2, 0.2)))
+    world.create_entity(Weld(left, other, anchor=(0, 2)))
+    body_of(world, other).linear_velocity = (4, 0)
+    run(world, 60)
+    assert world.momentum() == pytest.approx((4, 0))
+    assert world.component_for_entity(body, Spin).angular_velocity == pytest.approx(
+        world.component_for_entity(other, Spin).angular_velocity, abs=1e-6
+    )
+
+
+def test_snapshots_rollback_and_files_go_on_to_the_bit(tmp_path):
+    world, parts = parts_world((0, -G))
+    floor(world, friction=0.5)
+    pieces = [piece(world, parts, (0.3 * k, 0.8 + 1.2 * k), U, angle=0.4, friction=0.5) for k in range(2)]
+    run(world, 20)
+    snapshot = world.snapshot()
+
+    def hashes():
+        found = []
+        for k in range(25):
+            if k == 5:
+                world.delete_entity(pieces[0][1])
+            world.step()
+            found.append(world.state_hash())
+        return found
+
+    first = hashes()
+    world.restore(snapshot)
+    world.save(tmp_path / "pieces.carom")
+    assert hashes() == first
+    world.restore(snapshot)
+    assert world.entity_exists(pieces[0][1])
+    loaded = World.load(tmp_path / "pieces.carom", Physics(dimensions=2, gravity=(0, -G)), Rotation(), Parts())
+    run(world, 25)
+    run(loaded, 25)
+    assert loaded.state_hash() == world.state_hash()
+
+
+def test_pieces_sleep_as_one_and_wake_to_the_bit():
+    world, parts = parts_world((0, -G), sleeping=True)
+    floor(world, friction=0.5)
+    frame = world.create_entity(Transform((0, 0.4)), RigidBody(), Spin())  # without a collider of its own
+    pieces = [
+        [frame, *(world.create_entity(PartOf(frame, (x, 0)), BoxCollider((0.2, 0.4))) for x in (-0.4, 0.4))],
+        piece(world, parts, (3, 0.5), (((0, 0), (0.5, 0.15), 2.0), ((0, -0.25), (0.5, 0.1), 2.0)), friction=0.5),
+    ]
+    for _ in range(150):
+        world.step()
+        if all(body_of(world, entity).asleep for own in pieces for entity in own):
+            break
+    else:
+        raise AssertionError("something does not sleep")
+    rested = [at(world, own[0]).position.copy() for own in pieces]
+    run(world, 5)
+    snapshot, hashes = world.snapshot(), []
+    for _ in range(2):
+        body_of(world, pieces[0][0]).apply_impulse((0, 2.0))
+        run(world, 12)
+        assert [body_of(world, entity).asleep for own in pieces for entity in own] == [False] * 3 + [True] * 2
+        hashes.append(world.state_hash())
+        world.restore(snapshot)
+    assert hashes[0] == hashes[1]
+    assert [at(world, own[0]).position.tolist() for own in pieces] == [place.tolist() for place in rested]
+    world.create_entity(Transform((3.2, 1.2)), RigidBody(linear_velocity=(0, -2)), SphereCollider(0.1))
+    run(world, 15)
+    assert not body_of(world, pieces[1][1]).asleep
