@@ -139,7 +139,7 @@ def test_free_collisions_in_space(mode):
     for _ in range(480):
         world.step()
         energies.append(world.kinetic_energy())
-    assert energies[-1] < 0.9 * energies[0]
+    assert energies[-1] < 0.98 * energies[0]
     assert np.diff(energies).max() < 1e-4 * energies[0]  # what turns freely is exact on average alone
     assert world.momentum() == pytest.approx(momentum, abs=1e-12)
     assert angular_momentum(world, bodies) == pytest.approx(turning, rel=1e-9)
