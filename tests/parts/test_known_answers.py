@@ -10,7 +10,7 @@ import pytest
 from helpers_parts import CORNER, G, L, U, angular_momentum, at, body_of, floor, parts_world, piece, run
 from worlds import MODES
 
-from carom import RigidBody, SphereCollider, Transform
+from carom import RigidBody, SphereCollider, Transform, scenes
 from carom.plugins.joints import Hinge, Joints
 from carom.plugins.parts import PartOf
 from carom.plugins.rotation import BoxCollider, Spin
@@ -181,6 +181,21 @@ def test_a_heap_of_pieces_comes_to_rest():
     assert world.kinetic_energy() < 1e-3
     assert max(contact.depth for contact in world.contacts) < 0.02
     assert min(at(world, body).y for body in bodies) > 0.1
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_pieces_of_the_scene_start_apart_and_stay_in_their_bin(mode):
+    scene = scenes.get("pieces")
+    with scene.build(scene.settings.replace(collision=mode), n=25) as world:
+        world.step()
+        assert len(world.contacts) == 0
+        energy = world.kinetic_energy() + world.potential_energy()
+        run(world, 300)
+        places = world.bodies.dynamic.position
+        assert (places > 0.1).all()
+        assert (places[:, 0] < 7.5 - 0.1).all()
+        assert world.kinetic_energy() < 1e-3
+        assert world.potential_energy() < 0.6 * energy
 
 
 @pytest.mark.plain
