@@ -18,8 +18,8 @@ import numpy as np
 
 from ..framework import Bodies, CaromError, ForceSystem, NoPhysicsError, Phase, Plugin, System, World
 
-# Above it no explicit integrator holds a spring, see Springs.
-STABLE = 2.0
+FIELDS = ("rest_length", "stiffness", "damping", "only_pulls")
+STABLE = 2.0  # above it no explicit integrator holds a spring, see Springs
 
 
 class Spring:
@@ -37,99 +37,53 @@ class Spring:
         a rope: slack below its rest length, never pushes
     """
 
-    __slots__ = (
-        "__weakref__", "_a", "_b", "_damping", "_number", "_only_pulls", "_rest_length", "_springs", "_stiffness",
-    )  # fmt: skip
+    __slots__ = ("__weakref__", "_number", "_springs", "a", "b", *FIELDS)
 
-    def __init__(
-        self, springs: Springs, a: int, b: int, rest_length: float, stiffness: float, damping: float, only_pulls: bool
-    ) -> None:
-        self._springs: Springs | None = None
-        self._a, self._b = a, b
-        self._number = 0  # in its Springs, which never gives a number twice
-        self.rest_length = rest_length
-        self.stiffness = stiffness
-        self.damping = damping
-        self.only_pulls = only_pulls
-        self._springs = springs
+    a: int
+    b: int
+    rest_length: float
+    stiffness: float
+    damping: float
+    only_pulls: bool
 
-    @property
-    def a(self) -> int:
-        return self._a
+    def __init__(self, springs: Springs, number: int, *values: Any) -> None:
+        self._number = number  # in its Springs, which never gives a number twice
+        for name, value in zip(("a", "b", *FIELDS), values, strict=True):
+            setattr(self, name, value)
+        self._springs: Springs = springs
 
-    @property
-    def b(self) -> int:
-        return self._b
-
-    @property
-    def rest_length(self) -> float:
-        return self._rest_length
-
-    @rest_length.setter
-    def rest_length(self, value: float) -> None:
-        self._set("_rest_length", _number("rest_length", value))
-
-    @property
-    def stiffness(self) -> float:
-        return self._stiffness
-
-    @stiffness.setter
-    def stiffness(self, value: float) -> None:
-        self._set("_stiffness", _number("stiffness", value))
-
-    @property
-    def damping(self) -> float:
-        return self._damping
-
-    @damping.setter
-    def damping(self, value: float) -> None:
-        self._set("_damping", _number("damping", value))
-
-    @property
-    def only_pulls(self) -> bool:
-        return self._only_pulls
-
-    @only_pulls.setter
-    def only_pulls(self, value: bool) -> None:
-        if not isinstance(value, (bool, np.bool_)):
-            raise ValueError(f"Spring.only_pulls must be True or False, got {value!r}")
-        self._set("_only_pulls", bool(value))
+    def __setattr__(self, name: str, value: Any) -> None:
+        made = hasattr(self, "_springs")
+        if name in FIELDS:
+            value = _checked(name, value)
+        elif made:
+            raise AttributeError(f"Spring.{name} cannot be set")
+        super().__setattr__(name, value)
+        if made:
+            self._springs._columns = None
 
     @property
     def connected(self) -> bool:
         """True while it acts: not removed, and both bodies exist."""
-        return self._springs is not None and self in self._springs
+        return self in self._springs
 
     @property
     def length(self) -> float:
         """m, the present distance of the two bodies. CaromError if it is no longer connected."""
-        return self._now()[0]
+        return self._springs._now(self)[0]
 
     @property
     def tension(self) -> float:
         """N, the present attractive force; negative: it pushes. CaromError if it is no longer connected."""
-        return self._now()[1]
+        return self._springs._now(self)[1]
 
     def remove(self) -> None:
         """Remove the spring. Removing it twice has no effect."""
-        if self._springs is not None:
-            self._springs._remove(self)
-
-    def _now(self) -> tuple[float, float]:
-        if self._springs is None or not self.connected:
-            raise CaromError(f"{self!r} is not connected any more")
-        return self._springs._now(self)
-
-    def _set(self, name: str, value: Any) -> None:
-        setattr(self, name, value)
-        if self._springs is not None:
-            self._springs._changed()
+        self._springs._springs.pop(self, None)
+        self._springs._columns = None
 
     def __repr__(self) -> str:
-        return (
-            f"Spring({self._a}, {self._b}, rest_length={self.rest_length!r}, stiffness={self.stiffness!r}, "
-            f"damping={self.damping!r}, only_pulls={self.only_pulls!r})"
-        )
+        return f"Spring({self.a}, {self.b}, {', '.join(f'{name}={getattr(self, name)!r}' for name in FIELDS)})"
 
 
 class Springs(Plugin):
@@ -150,15 +104,8 @@ class Springs(Plugin):
         self._columns: _Columns | None = None  # of the present springs
         self._numbers = itertools.count(1)
         self._by_number: WeakValueDictionary[int, Spring] = WeakValueDictionary()  # removed ones too
-
-        def spring_forces() -> ForceSystem:
-            return SpringForces(self)
-
-        def lost_springs() -> System:
-            return LostSprings(self)
-
-        self.system(spring_forces)
-        self.system(lost_springs)
+        for kind in (SpringForces, LostSprings):
+            self.system(lambda kind=kind: kind(self))
 
     def install(self, world: World) -> None:
         if world.physics is None:
@@ -167,20 +114,13 @@ class Springs(Plugin):
             raise ValueError(f"these springs belong to world {self.world.name!r}: each world takes its own Springs()")
         self.world = world
         world.events.define("spring_lost")
-        self._springs.clear()
-        self._changed()
+        self.clear()
         super().install(world)
 
     def connect(
-        self,
-        a: int,
-        b: int,
-        rest_length: float | None = None,
-        *,
-        stiffness: float,
-        damping: float = 0.0,
+        self, a: int, b: int, rest_length: float | None = None, *, stiffness: float, damping: float = 0.0,
         only_pulls: bool = False,
-    ) -> Spring:
+    ) -> Spring:  # fmt: skip
         """Connect two bodies with a spring; see :class:`Spring`. It acts from the next evaluation of forces on.
 
         rest_length
@@ -188,23 +128,20 @@ class Springs(Plugin):
 
         ValueError if an entity is not a body, if both are the same, or if a number is out of range.
         """
-        world = self._world()
+        bodies, places = self._bodies(), []
         for name, entity in (("a", a), ("b", b)):
             try:
-                world.bodies.row_of(entity)
+                places.append(bodies.position[bodies.row_of(entity)])
             except (KeyError, TypeError):
                 raise ValueError(
                     f"springs.connect: {name} must be the entity of a body (Transform and RigidBody or a collider) in "
-                    f"world {world.name!r}, got {entity!r}"
+                    f"world {self.world.name!r}, got {entity!r}"  # type: ignore[union-attr]
                 ) from None
         if a == b:
             raise ValueError(f"springs.connect: a spring needs two bodies, got entity {a} twice")
-        rest = _distance(world.bodies, a, b) if rest_length is None else rest_length
-        spring = Spring(self, int(a), int(b), rest, stiffness, damping, only_pulls)
-        self._give_number(spring)
-        self._springs[spring] = None
-        self._changed()
-        return spring
+        rest = math.hypot(*(places[1] - places[0])) if rest_length is None else rest_length
+        number = next(n for n in self._numbers if n not in self._by_number)
+        return self._add(Spring(self, number, int(a), int(b), rest, stiffness, damping, only_pulls))
 
     def of(self, entity: int) -> list[Spring]:
         """The springs at that entity, in order of their creation."""
@@ -213,7 +150,7 @@ class Springs(Plugin):
     def clear(self) -> None:
         """Remove all springs."""
         self._springs.clear()
-        self._changed()
+        self._columns = None
 
     @property
     def highest_frequency(self) -> float:
@@ -222,27 +159,26 @@ class Springs(Plugin):
         With D the sum of stiffnesses at a body and m its mass: the largest D/m + D'/m' of two connected bodies
         (Gershgorin's circles of the springs' matrix). A step dt holds them if dt times this is below 2.
         """
-        bodies = self._world().bodies
-        return math.sqrt(self._current(bodies).rates(bodies)[0])
+        bodies = self._bodies()
+        columns = self._current(bodies)
+        return math.sqrt(columns.rate(bodies, columns.stiffness))
 
     # -- snapshots --------------------------------------------------------------------------------
 
     def saved(self, world: World) -> Any:
         """(n, 7) number, a, b and the fields of all springs, in order of their creation."""
-        return [[s._number, s.a, s.b, s.rest_length, s.stiffness, s.damping, s.only_pulls] for s in self._springs]
+        return [[s._number, s.a, s.b, *(getattr(s, name) for name in FIELDS)] for s in self._springs]
 
     def take_back(self, world: World, saved: Any) -> None:
         """Connect these springs and no others."""
-        self._springs.clear()
+        self.clear()
         for number, a, b, *fields in saved:
             spring = self._by_number.get(number)
             if spring is None or (spring.a, spring.b) != (a, b):
-                spring = Spring(self, a, b, *fields)
-                self._give_number(spring, number)
-            else:
-                spring.rest_length, spring.stiffness, spring.damping, spring.only_pulls = fields
-            self._springs[spring] = None
-        self._changed()
+                spring = Spring(self, number, a, b, *fields)
+            for name, value in zip(FIELDS, fields, strict=True):
+                setattr(spring, name, value)
+            self._add(spring)
 
     def __len__(self) -> int:
         return len(self._springs)
@@ -255,35 +191,25 @@ class Springs(Plugin):
 
     # -- for springs and systems ------------------------------------------------------------------
 
-    def _world(self) -> World:
+    def _bodies(self) -> Bodies:
         if self.world is None:
             raise CaromError("these springs are in no world yet: World(Physics(...), springs)")
-        return self.world
+        return self.world.bodies
 
-    def _give_number(self, spring: Spring, number: int | None = None) -> None:
-        """Give it a number that no other has, or the one that it has had in another process."""
-        if number is None:
-            number = next(n for n in self._numbers if n not in self._by_number)
-        spring._number = number
-        self._by_number[number] = spring
-
-    def _remove(self, spring: Spring) -> None:
-        self._springs.pop(spring, None)
-        self._changed()
-
-    def _changed(self) -> None:
-        self._columns = None
+    def _add(self, spring: Spring) -> Spring:
+        self._by_number[spring._number], self._springs[spring], self._columns = spring, None, None
+        return spring
 
     def _current(self, bodies: Bodies) -> _Columns:
         """The springs' columns, rebuilt if springs or rows have changed."""
-        if self._columns is None or not self._columns.fits(bodies):
+        if self._columns is None or not np.array_equal(self._columns.entity, bodies.entity):
             self._columns = _Columns(list(self._springs), bodies)
         return self._columns
 
     def _now(self, spring: Spring) -> tuple[float, float]:
-        bodies = self._world().bodies
-        columns = _Columns([spring], bodies)
-        length, _, tension = columns.tension(bodies)
+        if spring not in self:
+            raise CaromError(f"{spring!r} is not connected any more")
+        length, _, tension = _Columns([spring], self._bodies()).tension(self._bodies())
         return float(length[0]), float(tension[0])
 
 
@@ -292,21 +218,18 @@ class _Columns:
 
     def __init__(self, springs: list[Spring], bodies: Bodies) -> None:
         self.entity = bodies.entity.copy()
-        order = np.argsort(self.entity, kind="stable")
-        ranked = self.entity[order]
-        ends = np.array([sorted((spring.a, spring.b)) for spring in springs], np.int64).reshape(-1, 2)
-        places = np.minimum(np.searchsorted(ranked, ends), max(len(ranked) - 1, 0))
-        here = (ranked[places] == ends).all(axis=1) if len(ranked) else np.zeros(len(springs), bool)
+        ends = np.array([sorted((s.a, s.b)) for s in springs], np.int64).reshape(-1, 2)
         fields = np.array([(s.rest_length, s.stiffness, s.damping, s.only_pulls) for s in springs]).reshape(-1, 4)
-        self.missing = [spring for spring, known in zip(springs, here, strict=True) if not known]
-        ends, fields, rows = ends[here], fields[here], order[places[here]] if len(ranked) else places[here]
+        known = np.append(self.entity, np.iinfo(np.int64).max)  # what is sought is never behind the last
+        order = np.argsort(known, kind="stable")
+        rows = order[np.searchsorted(known, ends, sorter=order)]
+        here = (known[rows] == ends).all(axis=1)
+        self.missing = [spring for spring, found in zip(springs, here, strict=True) if not found]
         ranking = np.lexsort((*fields.T[::-1], ends[:, 1], ends[:, 0]))
+        ranking = ranking[here[ranking]]
         self.low, self.high = rows[ranking].T
         self.rest_length, self.stiffness, self.damping, pulls = fields[ranking].T
         self.only_pulls = pulls.astype(bool)
-
-    def fits(self, bodies: Bodies) -> bool:
-        return np.array_equal(self.entity, bodies.entity)
 
     def tension(self, bodies: Bodies) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(length (n,), unit vector (n, d) from the lower to the higher id, attractive force (n,))."""
@@ -321,29 +244,17 @@ class _Columns:
         slack = self.only_pulls & ((length <= self.rest_length) | (tension < 0))
         return length, unit, np.where(slack, 0.0, tension)
 
-    def forces(self, bodies: Bodies) -> np.ndarray:
-        """(rows, d), the forces on all bodies; each body's springs are summed in the order of the columns."""
-        _, unit, tension = self.tension(bodies)
-        pull = tension[:, None] * unit
-        rows, both = np.concatenate((self.low, self.high)), np.concatenate((pull, -pull))
-        return np.stack([np.bincount(rows, column, len(bodies)) for column in both.T], axis=1)
+    def summed(self, weights: np.ndarray, others: np.ndarray, count: int) -> np.ndarray:
+        """(count,) the weights at the lower ids and the others at the higher ones, in the order of the columns."""
+        return np.bincount(np.concatenate((self.low, self.high)), np.concatenate((weights, others)), count)
 
-    def energy(self, bodies: Bodies) -> float:
-        stretch = self.tension(bodies)[0] - self.rest_length
-        stretch = np.where(self.only_pulls, np.maximum(stretch, 0.0), stretch)
-        return float((0.5 * self.stiffness * stretch * stretch).sum())
-
-    def rates(self, bodies: Bodies) -> tuple[float, float]:
-        """The largest rates of stiffness (1/s^2) and damping (1/s): for each spring the sums of all springs at both of
+    def rate(self, bodies: Bodies, weights: np.ndarray) -> float:
+        """The largest rate, 1/s^2 of stiffness or 1/s of damping: for each spring the sums of all springs at both of
         its bodies, each divided by the body's mass, are added. Immovable bodies count as infinitely heavy."""
         inverse_mass = np.zeros(len(bodies))
         inverse_mass[bodies.dynamic.rows] = 1.0 / bodies.dynamic.mass
-        ends = np.concatenate((self.low, self.high))
-        found = []
-        for weights in (self.stiffness, self.damping):
-            at = np.bincount(ends, np.concatenate((weights, weights)), len(bodies)) * inverse_mass
-            found.append(float((at[self.low] + at[self.high]).max(initial=0.0)))
-        return found[0], found[1]
+        at = self.summed(weights, weights, len(bodies)) * inverse_mass
+        return float((at[self.low] + at[self.high]).max(initial=0.0))
 
 
 class SpringForces(ForceSystem):
@@ -355,12 +266,18 @@ class SpringForces(ForceSystem):
     def add_forces(self, bodies: Any, time: float) -> None:
         if len(self._springs):
             everything = self.world.bodies
-            bodies.force += self._springs._current(everything).forces(everything)[everything.dynamic.rows]
+            columns = self._springs._current(everything)
+            _, unit, tension = columns.tension(everything)
+            pull = (tension[:, None] * unit).T
+            forces = np.stack([columns.summed(part, -part, len(everything)) for part in pull], axis=1)
+            bodies.force += forces[everything.dynamic.rows]
 
     def potential_energy(self, bodies: Any) -> float:
         """Joules: half stiffness times stretch squared, summed in the springs' own order."""
-        everything = self.world.bodies
-        return self._springs._current(everything).energy(everything)
+        columns = self._springs._current(self.world.bodies)
+        stretch = columns.tension(self.world.bodies)[0] - columns.rest_length
+        stretch = np.where(columns.only_pulls, np.maximum(stretch, 0.0), stretch)
+        return float((0.5 * columns.stiffness * stretch * stretch).sum())
 
 
 class LostSprings(System):
@@ -373,39 +290,35 @@ class LostSprings(System):
         self._looked_at: tuple[Any, float] = (None, 0.0)
 
     def process(self, dt: float) -> None:
-        if not len(self._springs):
-            return
-        columns = self._springs._current(self.world.bodies)
+        bodies = self.world.bodies
+        columns = self._springs._current(bodies)
         for spring in columns.missing:
             spring.remove()
             self.world.dispatch_event("spring_lost", spring)
-        if self._looked_at != (columns, dt):
-            self._looked_at = (columns, dt)
-            self._look_at_step(columns, dt)
-
-    def _look_at_step(self, columns: _Columns, dt: float) -> None:
-        """Record a fault if semi-implicit Euler is unstable: (dt w)^2 + 2 dt c/m > 4."""
-        stiff, damped = columns.rates(self.world.bodies)
-        if dt * dt * stiff + 2 * dt * damped >= STABLE**2:
+        if self._looked_at == (columns, dt):
+            return
+        self._looked_at = (columns, dt)
+        stiff, damped = columns.rate(bodies, columns.stiffness), columns.rate(bodies, columns.damping)
+        if dt * dt * stiff + 2 * dt * damped >= STABLE**2:  # semi-implicit Euler is unstable
             longest = 4.0 / (damped + math.sqrt(damped * damped + 4.0 * stiff))
             self.world.report_fault(
                 f"springs: dt = {dt:.3g} s is too long for springs this stiff on bodies this light (highest frequency "
                 f"{math.sqrt(stiff):.4g} rad/s, damping rate {damped:.4g} /s); they hold up to dt = {longest:.3g} s: "
                 f"use smaller steps, softer springs or heavier bodies",
                 kind="springs",
-            )  # fmt: skip
+            )
 
     def reason(self) -> str:
         return f"{len(self._springs)} springs: removes those whose bodies are gone"
 
 
-def _distance(bodies: Bodies, a: int, b: int) -> float:
-    position = bodies.position
-    return math.hypot(*(position[bodies.row_of(b)] - position[bodies.row_of(a)]))
-
-
-def _number(name: str, value: Any) -> float:
-    number = isinstance(value, numbers.Real) and not isinstance(value, (bool, np.bool_))
-    if not number or not (math.isfinite(value) and float(value) >= 0):
+def _checked(name: str, value: Any) -> Any:
+    """A field as it is kept; ValueError for what it cannot be."""
+    truth = isinstance(value, (bool, np.bool_))
+    if name == "only_pulls":
+        if not truth:
+            raise ValueError(f"Spring.only_pulls must be True or False, got {value!r}")
+        return bool(value)
+    if truth or not isinstance(value, numbers.Real) or not (math.isfinite(value) and float(value) >= 0):
         raise ValueError(f"Spring.{name} must be a finite number of at least 0, got {value!r}")
     return float(value)
