@@ -38,6 +38,7 @@ SOLVED = EXCESS * LEAST_FURTHER_PASSES / FURTHER_PASSES  # less than this is wro
 # Joints that hold: springs that the passes which push solve, and the others as if they were none.
 JOINT_FREQUENCY = 0.25  # times the rate of the substeps: a fixed one gains nothing by more of them
 JOINT_DAMPING_RATIO = 2.0
+SPRING_FREQUENCY = 0.125  # times the rate of the substeps: faster springs hold; with more, springs at a light body gain
 
 # The number of substeps of an island.
 MOST_SAG = 0.005  # extents: no contact sags more under the island's heaviest body,

@@ -153,6 +153,25 @@ def test_springs_without_damping_give_no_energy(springs, frequency):
     assert springs * frequency > 40.0 or late > 0.98 * early
 
 
+@pytest.mark.parametrize("frequency", [3.0, 29.0, 31.0, 100.0, 1e4])
+@pytest.mark.parametrize("damping_ratio", [0.0, 1.0])
+def test_springs_of_any_stiffness_gain_no_energy_in_a_chain(frequency, damping_ratio):
+    world, joints = joint_world(0)
+    bodies = [disc(world, (k, 0)) for k in range(1, 21)]
+    for k, body in enumerate(bodies):
+        world.component_for_entity(body, RigidBody).linear_velocity = (math.sin(k), math.cos(3 * k))
+    spring = {"length": 1.0, "frequency": frequency, "damping_ratio": damping_ratio}
+    for a, b in itertools.pairwise([None, *bodies]):
+        world.create_entity(Distance(a, b, **spring))
+    last = world.create_entity(Distance(bodies[-1], None, anchor_b=(21.0, 0.0), **spring))
+    before = world.kinetic_energy()
+    for _ in range(300):
+        world.step()
+        assert world.kinetic_energy() < 1.001 * before
+    if frequency > 30.0:
+        assert joints.state(last).value == pytest.approx(1.0, abs=0.01)
+
+
 def test_rope_never_pushes_and_holds():
     world, joints = joint_world()
     body = disc(world, (0, -0.2))

@@ -5,7 +5,8 @@ SLIDE how far b's anchor is along an axis of a. Others are angles: TURN about an
 axis of b leads away from one of a in one direction, and CONE, by how much in all. GIVEN is what a plugin says, see
 given. A row HOLDs its value, keeps it within LIMITs, DRIVEs it at a speed, brings it there as a SERVO, or is a SPRING.
 What holds is as soft as a spring of a frequency that follows the rate of the substeps, and is solved without that in
-the passes that do not push; springs are solved in the pass that pushes alone.
+the passes that do not push; springs are solved in the pass that pushes alone. One that swings faster than substeps can
+follow holds its value.
 
 Joints come before the contacts of their range, in the pass that pushes and once in those that do not. Their bodies have
 the columns of bodies that spin, as contacts of such bodies have: see rows.JOINTED.
@@ -18,13 +19,19 @@ import math
 from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 from ...integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
-from ..constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY
+from ..constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY, SPRING_FREQUENCY
 from .given import measure_given, push_given, speed_of_given
 
 POINT, LINE, SLIDE, TURN, ALIGN, CONE, GIVEN = range(7)
 HOLD, LIMIT, DRIVE, SPRING, SERVO = range(5)
 LEAST_SHARE = 1e-9  # of its mass that a spring without damping takes part with
 BRAKES = 0.9  # of the speed from which a servo could just stop in time
+
+
+@inlined
+def swings(joints, j):
+    """Whether a row is a spring that its substeps can follow: others gain energy where springs meet at a body."""
+    return joints.rule[j] == SPRING and joints.frequency[j] <= joints.fastest
 
 
 # -- in a range --------------------------------------------------------------------------------------------------------
@@ -38,7 +45,7 @@ def count_springs(solver):
         for e in range(joints.begin, joints.end):
             j = joints.order[e]
             for q in (joints.first[j], joints.second[j]):
-                moves = joints.rule[j] == SPRING and solver.inverse_mass[q] > 0.0
+                moves = swings(joints, j) and solver.inverse_mass[q] > 0.0
                 used[q] = used[q] + moves if count > 0 else 0
 
 
@@ -70,12 +77,12 @@ def start_joints(solver, h, period, usual):
     ``period``, whatever blows ask for: changes of it would give energy to what is stretched. What is stiffer than
     ``usual`` pushes errors out at the usual rate."""
     joints = solver.joints
-    joints.step, joints.moved_for = h, 0.0
+    joints.step, joints.moved_for, joints.fastest = h, 0.0, SPRING_FREQUENCY / period
     count_springs(solver)
     for e in range(joints.begin, joints.end):
         j = joints.order[e]
         joints.impulse[j], joints.push[j] = joints.load[j] * h, scale(joints.pull[j], h)
-        if joints.rule[j] == SPRING:
+        if swings(joints, j):
             omega = 2.0 * math.pi * joints.frequency[j]
             together = max(solver.used[joints.first[j]], solver.used[joints.second[j]])
             rate, mass_scale = spring_of(omega * h, joints.damping_ratio[j], together)
@@ -310,13 +317,13 @@ def solve_row(solver, j, pushes):
 def solve_joints(solver, pushes):
     """One pass over the joints of a range."""
     joints, columns, velocity, spin = solver.joints, columns_of(solver), solver.velocity, solver.spin
-    order, kind, rule, first, second = joints.order, joints.kind, joints.rule, joints.first, joints.second
+    order, kind, first, second = joints.order, joints.kind, joints.first, joints.second
     arm_a, arm_b, gap, push, most = joints.arm_a, joints.arm_b, joints.gap, joints.push, joints.most
     diagonal, others, step = joints.inverse, joints.inverse_products, joints.step
     rate, mass_scale, impulse_scale = joints.push_rate, joints.mass_scale, joints.impulse_scale
     for e in range(joints.begin, joints.end):
         j = order[e]
-        if not pushes and rule[j] == SPRING:
+        if not pushes and swings(joints, j):
             continue
         if kind[j] != POINT:
             solve_row(solver, j, pushes)
@@ -347,7 +354,7 @@ def relax_struck(solver, turn):
         j = joints.order[e]
         a, b = joints.first[j], joints.second[j]
         t = max(solver.island[a], solver.island[b])
-        if not solver.struck[t] or turn >= solver.passes[t] or joints.rule[j] == SPRING:
+        if not solver.struck[t] or turn >= solver.passes[t] or swings(joints, j):
             continue
         if joints.kind[j] != POINT:
             solve_row(solver, j, False)

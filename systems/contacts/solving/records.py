@@ -62,6 +62,7 @@ JOINTS = Schema(
     begin=integer(),  # places in ``order``
     end=integer(),
     step=number(),  # s of a substep
+    fastest=number(),  # Hz: springs above it hold
     moved_for=number(),  # s since the joints were measured
     asked=integer(),  # the joint whose function runs now; 0: none
     push_rate=floats(),  # 1/s at which error is pushed out,
