@@ -273,10 +273,6 @@ class Plugin:
         """Called by the world after all its plugins are registered; all of it, or an error and nothing."""
         self._add_systems(world, self.systems)
 
-    def check_component(self, component: Any, entity: int | None) -> None:
-        """Called before an entity (None: one that is being created) gets a component that needs this plugin: a
-        ValueError if the world cannot have it."""
-
     # -- snapshots --------------------------------------------------------------------------------
 
     def saved(self, world: Any) -> Any:

@@ -154,11 +154,10 @@ class Registry:
     joints: dict[type[Component], OwnJoint] = field(default_factory=dict)
     check_stages: Callable[[Iterable[PluginStage]], Any] = tuple  # PluginError for what no step can have
 
-    def require(self, component: type[Component], entity: int | None = None) -> Any:
-        """The plugin without which a component does nothing, ValueError if it is missing; None if it needs none."""
+    def require(self, component: type[Component], entity: int | None = None) -> None:
+        """ValueError if the plugin is missing without which a component does nothing."""
         needed = component.plugin
-        found = next((plugin for plugin in self.plugins if plugin.name == needed), None) if needed else None
-        if needed and found is None:
+        if needed and needed not in (plugin.name for plugin in self.plugins):
             where = "" if entity is None else f"entity {entity}: "
             raise ValueError(
                 f"{where}{component.__name__} does nothing without its plugin: "
@@ -170,7 +169,6 @@ class Registry:
                 f"{where}{component.__name__} does nothing without the plugin that has registered it with "
                 f"@plugin.joint: World(Physics(...), Joints(), plugin)"
             )
-        return found
 
     def add(self, plugin: Any) -> None:
         """PluginError if something of it is registered already; what it registers later is seen too."""

@@ -185,11 +185,9 @@ class EntityVerbs:
         dimensions = self.dimensions
         for component in components:
             if isinstance(component, Component):
-                plugin = self.registry.require(type(component), entity)
+                self.registry.require(type(component), entity)
                 if dimensions is not None:
                     component.fit(dimensions, entity)
-                if plugin is not None:
-                    plugin.check_component(component, entity)
                 component.check_in(self._contents(), entity)
             elif isinstance(component, type):
                 raise TypeError(f"components are instances: {component.__name__}(...), got the class itself")

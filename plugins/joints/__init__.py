@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...components import RigidBody
 from ...framework import NoPhysicsError, Plugin, PluginError, World
 from ...framework.jit.lazy import errors
 from ...framework.plugins.joints import Placed, numbers_of, rows_of
@@ -198,26 +197,10 @@ class Joints(Plugin):
     def _row(self, entity: int) -> int:
         return int(self._physics.table.row_of(entity))
 
-    def check_component(self, component: Any, entity: int | None) -> None:
-        """ValueError unless a joint has two bodies, or one and the world, one of which is dynamic."""
-        if not isinstance(component, Joint):
-            return
-        name, entities = f"{'' if entity is None else f'entity {entity}: '}{type(component).__name__}", []
-        for body in (component.a, component.b):
-            if body == WORLD:
-                continue
-            types = () if body in self._contents.dead else self._contents.entities.types_of(body)
-            if not any(getattr(kind, "makes_body", False) for kind in types):
-                why = "is no body" if types else "does not exist"
-                raise ValueError(f"{name} joins entity {body}, which {why} in world {self._physics._world.name!r}")
-            entities.append(self._contents.entities.handle(body, RigidBody) if RigidBody in types else None)
-        if not any(body is not None and body.kind == "dynamic" for body in entities):
-            raise ValueError(f"{name} joins no dynamic body")
-
     def _attach(self, entity: int, joint: Joint) -> None:
         """Take hold of the bodies where they are."""
         try:
-            self.check_component(joint, entity)
+            joint.check_in(self._contents, entity)
             places = self._place(joint.a or WORLD), self._place(joint.b or WORLD)
             joint.attach(*places)
             if type(joint) in self._own:

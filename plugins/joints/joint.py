@@ -7,6 +7,8 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from ...components import RigidBody
+from ...components.part_of import PartOf
 from ...framework.data.columns import special_column
 from ...framework.data.component import Component
 from ...framework.typing import Vector
@@ -142,6 +144,23 @@ class Joint(Component, abstract=True):
             raise ValueError(f"{name} is no joint of worlds of {dimensions} dimensions")
         if dimensions == 3 and "axis" in self.columns and not np.any(np.abs(self.axis) > LEAST):
             raise ValueError(f"{name} needs an axis in a world of 3 dimensions, got {np.asarray(self.axis).tolist()}")
+
+    def check_in(self, contents: Any, entity: int | None) -> None:
+        """ValueError unless it has two bodies, or one and the world, one of which is dynamic."""
+        name, dynamic = f"{'' if entity is None else f'entity {entity}: '}{type(self).__name__}", False
+        for body in (self.a, self.b):
+            if body == WORLD:
+                continue
+            types = () if body in contents.dead else contents.entities.types_of(body)
+            while PartOf in types:  # what it is a part of
+                body = contents.entities.handle(body, PartOf).body
+                types = contents.entities.types_of(body)
+            if not any(getattr(kind, "makes_body", False) for kind in types):
+                why = "is no body of this world" if types else "does not exist in this world"
+                raise ValueError(f"{name} joins entity {body}, which {why}")
+            dynamic |= RigidBody in types and contents.entities.handle(body, RigidBody).kind == "dynamic"
+        if not dynamic:
+            raise ValueError(f"{name} joins no dynamic body")
 
     def in_order(self, name: str, low: float | None, high: float | None) -> tuple[float, float]:
         """Two limits, none where they are None; ValueError if the first is the larger."""
