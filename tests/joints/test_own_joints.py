@@ -88,6 +88,25 @@ class Rod(Joint):
 
 
 @machines.joint
+class Stop(Joint):
+    """b turns against a by ``most`` at most."""
+
+    a: int | None = column(dtype=int)
+    b: int | None = column(dtype=int)
+    axle: Vector = column(default=0.0, item="vector")
+    most: float = column(default=1.0)
+
+    @staticmethod
+    def constraint(joint, a, b):
+        nothing = scale(a.position, 0.0)
+        axis = replace(nothing, 0, 1.0) if len(nothing) == 2 else arm_of(a, joint.axle)
+        return None, nothing, scale(axis, -1.0), nothing, axis
+
+    def rows(self, dimensions):
+        return [Row(GIVEN, LIMIT, low=-math.inf, high=self.most)]
+
+
+@machines.joint
 class Rail(Driven):
     """b's way along x, and its height: two values with rules of their own."""
 
@@ -191,16 +210,35 @@ def test_pulley_on_bodies_that_swing_and_turn_keeps_its_length_and_gains_no_ener
 
 
 @pytest.mark.plain
-def test_rod_as_a_function_moves_as_the_built_in_one():
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_turns_are_counted_beyond_the_first(dimensions):
+    world, joints = machine_world(dimensions, gravity=0.0)
+    wheel = body(world, (0, 0), 1.0)
+    world.component_for_entity(wheel, Spin).angular_velocity = 8.0 if dimensions == 2 else np.array((0, 0, 8.0))
+    axle: Any = 0.0 if dimensions == 2 else (0, 0, 1)
+    stop = world.create_entity(Stop(None, wheel, axle=axle, most=15.0))
+    run(world, 90)
+    assert joints.state(stop).value == pytest.approx(8.0 * 1.5, abs=1e-9)
+    run(world, 90)
+    assert joints.state(stop).value == pytest.approx(15.0, abs=1e-3)
+    turned: Any = at(world, wheel).rotation
+    share = turned / 2 if dimensions == 2 else math.asin(turned[3]) + 2 * math.pi
+    assert share == pytest.approx(15.0 / 2, abs=1e-3)
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_rod_as_a_function_moves_as_the_built_in_one(dimensions):
     places = []
     for kind in (Distance, Rod):
-        world, _ = machine_world()
-        a, b = disc(world, (0, 0)), disc(world, (1, 0.5))
-        world.component_for_entity(a, RigidBody).linear_velocity = (0, 3)
-        for one, other, ends in ((a, b, ((0.1, 0), (0, 0.2))), (None, a, ((0, 2), (0.0, 0.1)))):
-            world.create_entity(kind(one, other, *ends))
+        world, _ = machine_world(dimensions)
+        a, b = body(world, (0, 0), 1.0), body(world, (1, 0.5), 0.5)
+        world.component_for_entity(a, RigidBody).linear_velocity = (0, 3, 1)[:dimensions]
+        world.component_for_entity(a, Spin).angular_velocity = 2.0 if dimensions == 2 else np.array((1.0, 2.0, 3.0))
+        for one, other, ends in ((a, b, ((0.1, 0, 0.3), (0, 0.2, 0.1))), (None, a, ((0, 2, 1), (0.0, 0.1, -0.2)))):
+            world.create_entity(kind(one, other, *(end[:dimensions] for end in ends)))
         run(world, 120)
-        places.append([[*at(world, each).position, at(world, each).rotation] for each in (a, b)])
+        places.append([np.hstack((at(world, each).position, at(world, each).rotation)) for each in (a, b)])
     np.testing.assert_allclose(places[0], places[1], atol=1e-9)
 
 
