@@ -14,6 +14,7 @@ from ..framework.jit.records.schema import Column
 
 WARM_START = ("step",)  # numbers of which there are two, beside the counts
 CONTACTS = ("steps", "stays")
+BEFORE_STEP = ("load", "pull", "normal", "along_a", "value")  # of joints, what a step starts with
 
 
 def saved_rows(record: Record, numbers: tuple[str, ...]) -> dict[str, Any]:
@@ -37,7 +38,8 @@ def put_joints_back(state: Record) -> None:
     """The forces and values that joints had before the step, if it has begun with them."""
     joints = state.solver.joints
     if joints.kept_in == state.step_number + 1:
-        joints.load[:], joints.pull[:], joints.value[:] = joints.old_load, joints.old_pull, joints.old_value
+        for name in BEFORE_STEP:
+            getattr(joints, name)[:] = getattr(joints, f"old_{name}")
 
 
 def _stacked(record: Record) -> list[str]:

@@ -12,6 +12,7 @@ from ...framework.plugins.joints import Placed, numbers_of, rows_of
 from ...systems.contacts.solving.joints import DRIVE, GIVEN, HOLD, LIMIT, POINT, SERVO, SPRING, TURN
 from ...systems.contacts.solving.linked_joint import linked_joint
 from ...systems.contacts.solving.records import JOINTS
+from ...systems.tracking import BEFORE_STEP
 from .arms import arm_of, moment
 from .joint import WORLD, Changes, Driven, Joint, Place, Row
 from .kinds import KINDS, Ball, Cone, Distance, Hinge, Motor, MousePull, Slider, Weld
@@ -278,7 +279,8 @@ class Joints(Plugin):
         for j, key in enumerate(now):
             for name, value in zip((*KEPT, *OF_PLUGINS), wanted.get(key, ()), strict=False):
                 getattr(record, name)[j] = value
-        record.old_load[:], record.old_pull[:], record.old_value[:] = record.load, record.pull, record.value
+        for name in BEFORE_STEP:
+            getattr(record, f"old_{name}")[:] = getattr(record, name)
         self._connected = {entity: joint.collide_connected for entity, joint in joints.items()}
         self._keep_apart(joints)
         self._finish_changes({body for key in wanted.keys() ^ now.keys() for body in key[3:5]})

@@ -9,7 +9,19 @@ import numpy as np
 import pytest
 from helpers_joints import G, at, chain, disc, joint_world, plank, run
 
-from carom import Phase, Physics, Plugin, PluginError, RigidBody, StepError, System, Transform, World, column
+from carom import (
+    Phase,
+    Physics,
+    Plugin,
+    PluginError,
+    RigidBody,
+    SphereCollider,
+    StepError,
+    System,
+    Transform,
+    World,
+    column,
+)
 from carom.framework.typing import Vector
 from carom.framework.vectors import add, divided, dot, length, replace, scale, sub
 from carom.plugins.joints import (
@@ -365,6 +377,32 @@ def test_step_that_fails_leaves_forces_and_values_as_they_were():
                 world.step()
         found.append((world.state_hash(), joints.state(gear).value))
     assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("kind", [Distance, Pulley])
+def test_step_that_fails_while_balls_bounce_on_a_body_leaves_the_directions_of_forces(kind):
+    hashes = []
+    for due in (-1, 27, 31, 45):
+        world, _ = machine_world()
+        board = plank(world, (0.3, -1))
+        for (x, y), end in (((0.0, 0.0), (-0.4, 0.0)), ((1.0, 0.2), (0.4, 0.0))):
+            if kind is Distance:
+                world.create_entity(Distance(None, board, (x, y), end))
+            else:
+                world.create_entity(Pulley(None, board, (0, -1), (x, y), anchor_b=end))
+        for k in range(3):
+            place, ball = Transform((0.3 + 0.1 * k, 0.2 + 0.6 * k)), SphereCollider(0.1, restitution=0.8)
+            world.create_entity(place, RigidBody(), ball, Spin())
+        system = Fails()
+        system.due = due
+        world.add_system(system)
+        for _ in range(60):
+            try:
+                world.step()
+            except StepError:
+                world.step()
+        hashes.append(world.state_hash())
+    assert len(set(hashes)) == 1
 
 
 def test_they_break_and_are_lost_as_others():

@@ -41,6 +41,7 @@ def find_active(state):
     for j in range(joints.count):
         a, b = joints.row_a[j], joints.row_b[j]
         joints.old_load[j], joints.old_pull[j], joints.old_value[j] = joints.load[j], joints.pull[j], joints.value[j]
+        joints.old_normal[j], joints.old_along_a[j] = joints.normal[j], joints.along_a[j]
         joints.total[j], joints.thrust[j] = 0.0, zero_of(state)
         gone = (a < 0 and joints.entity_a[j] > 0) or (b < 0 and joints.entity_b[j] > 0)
         if not (gone or left_out(state, a) or left_out(state, b)) and (may_move(state, a) or may_move(state, b)):

@@ -29,20 +29,22 @@ JOINTS = Schema(
     # what is kept from step to step
     load=floats(),  # N or N m in the last substep,
     pull=vectors(),  # and N of a POINT
-    old_load=floats(),  # the same before the step
-    old_pull=vectors(),
     total=floats(),  # N s or N m s in the step
     thrust=vectors(),
     normal=vectors(),  # along which it acts, or about which
     along_a=vectors(),  # of a GIVEN: the same for the first body
-    value=floats(),  # m or rad of a GIVEN, after the last substep,
-    old_value=floats(),  # and before the step
+    value=floats(),  # m or rad of a GIVEN, after the last substep
+    old_load=floats(),  # the same before the step
+    old_pull=vectors(),
+    old_normal=vectors(),
+    old_along_a=vectors(),
+    old_value=floats(),
     # pairs of bodies that joints keep from touching, the smaller id first, in order
     apart=integer(),
     apart_a=ints(),
     apart_b=ints(),
     # in a step
-    kept_in=integer(),  # 1 + the number of the step that old_load and old_pull were kept in
+    kept_in=integer(),  # 1 + the number of the step that these were kept in
     rows_version=integer(),  # of the rows of bodies
     row_a=ints("int32"),  # -1: the world, or a body that is gone
     row_b=ints("int32"),
