@@ -61,13 +61,14 @@ def first_touch(state, a, b, path, since, until, limits):
     from a, between two times; touching at ``since`` and parting is none unless the path leads back.
 
     AT_CORNER: they touch at a corner only, also a slop further on; what comes after it is not looked at.
-    limits: (slop; stride, seconds between looks at concave shapes; approach speed below which these have no touch).
+    limits: (slop; stride, seconds between looks at concave shapes; approach speed below which these have no touch; by
+    how many grazes what turns has to sink in, see touch_of_turning).
     """
     shape_a, shape_b = state.bodies.shape[a], state.bodies.shape[b]
     if state.spinning and is_turning(state, until, a, b):
         spins, near = (state.bodies.spin[a], state.bodies.spin[b]), NEAR * smaller_extent(state.bodies, a, b)
         found, (t, normal, point, at), _ = touch_of_turning(
-            state, a, b, path, spins, (since, until), (limits[0], near, limits[2])
+            state, a, b, path, spins, (since, until), (limits[0], near, limits[2], limits[3])
         )
         # Offsets of colliders stand as where the step ends: seen from there, so that arms are right.
         shift_a = turn_of_arm(scale(spins[0], t - until), state.bodies.offset[a])
@@ -94,7 +95,7 @@ def first_touch(state, a, b, path, since, until, limits):
 @part
 def march(state, a, b, path, since, until, limits):
     """The same for concave shapes; the time is bisected between the look that finds an approach and the one before."""
-    _, stride, threshold = limits
+    _, stride, threshold, _ = limits
     shape_a, shape_b = state.bodies.shape[a], state.bodies.shape[b]
     low, high, t, looks = since, math.inf, since, 0
     normal, point, at = zero_of(state), zero_of(state), zero_of(state)

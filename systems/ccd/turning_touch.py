@@ -50,8 +50,9 @@ def closing_point(state, a, b, d, met, near, velocity):
 def touch_of_turning(state, a, b, path, spins, times, limits):
     """(whether they touch; (time, normal, point, from a's centre to b's); gap then) between two times, while they turn
     with those spins; shapes stand as at the second of these. limits: (slop; gap of a touch; speed of approach of the
-    point below which a touch is one only if no faster one follows; -inf: any is one, at corners too)."""
-    bodies, (spin_a, spin_b), (since, until), (slop, near, threshold) = state.bodies, spins, times, limits
+    point below which a touch is one only if no faster one follows; -inf: any is one, at corners too; by how many grazes
+    they have to be deeper than at the first time; -inf: by none)."""
+    bodies, (spin_a, spin_b), (since, until), (slop, near, threshold, grazes) = state.bodies, spins, times, limits
     shape_a, shape_b = bodies.shape[a], bodies.shape[b]
     turning = way_of_turning(bodies, a, spin_a) + way_of_turning(bodies, b, spin_b)
     graze = max(GRAZE * slop, (turning * (until - since) + travel_of(path, until)) / (LOOKS - EXACT_LOOKS))
@@ -59,7 +60,7 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
     corners = threshold < 0.0 or (is_turned(bodies, a) and is_turned(bodies, b))  # of others, too
     convex, ends = both_convex(state, shape_a, shape_b), sub(bodies.offset[b], bodies.offset[a])
     touch, found, gap = (until, zero_of(state), zero_of(state), zero_of(state)), False, 0.0
-    t, posed = since, until
+    t, posed, least = since, until, 0.0
     for look in range(LOOKS):
         turn_shape(state, a, scale(spin_a, t - posed))
         turn_shape(state, b, scale(spin_b, t - posed))
@@ -67,12 +68,14 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
         d = add(along(path, t), sub(sub(bodies.offset[b], bodies.offset[a]), ends))
         _, depth, normal, point = evaluate(state, shape_a, a, shape_b, b, d)
         w = rate_along(path, t)
+        least = max(0.0, depth + grazes * graze) if look == 0 else least
+        depth -= least
         near = max(near, graze) if look == EXACT_LOOKS else near
         fastest, touches = turning + length(w) + bend * (until - t), -depth <= near
         if touches:
             rate = 0.0
             if threshold > -math.inf:
-                rate, point = closing_point(state, a, b, d, (depth, normal, point), near, w)
+                rate, point = closing_point(state, a, b, d, (depth + least, normal, point), near - least, w)
             closes = rate < -threshold or (rate < 0.0 and not found)
             if closes and (corners or not is_corner_touch(state, shape_a, a, shape_b, b, d, slop)):
                 touch, found, gap = (t, normal, point, d), True, -depth
@@ -97,6 +100,6 @@ def first_touch_of_turn(state, a, b):
     start = sub(bodies.previous_position[b], bodies.previous_position[a])
     travel = sub(sub(bodies.position[b], bodies.position[a]), start)
     path = add(start, sub(bodies.offset[b], bodies.offset[a])), travel, still, still
-    spins, limits = (bodies.turn[a], bodies.turn[b]), (slop, BESIDE * slop, -math.inf)
+    spins, limits = (bodies.turn[a], bodies.turn[b]), (slop, BESIDE * slop, -math.inf, -math.inf)
     found, (share, normal, point, _), gap = touch_of_turning(state, a, b, path, spins, (0.0, 1.0), limits)
     return found, share, gap, normal, point

@@ -98,7 +98,8 @@ def still_bounces(state, dt, c, depth, normal):
         d = centre_offset(bodies, a, b)
         _, _, _, point = evaluate_pair(state, a, b, d)
         speed += closing_by_spin(bodies, a, b, arms_to(bodies, a, b, normal, point, d), normal)
-        if depth <= slop and abs(speed) > threshold and is_turning(state, dt, a, b) and not is_beyond_cap(state, a, b):
+        known = depth <= slop and not is_beyond_cap(state, a, b)
+        if (known or (e == 1.0 and depth <= FAST * extent)) and abs(speed) > threshold and is_turning(state, dt, a, b):
             return True  # its next impact is searched with the shapes as they are turned then
     touches = depth > (SAME_PLACE * extent if pairs.impulse[c] == 0.0 else 0.0)
     if not touches and speed < -threshold:

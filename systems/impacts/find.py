@@ -42,6 +42,7 @@ from .impulses import (
 from .turning import respond
 
 QUICK = 1e-3  # of the step: inelastic impacts closer than this in time are treated as inelastic collapse
+GRAZES, SINKS = 4, 4.0  # impacts of two bodies in a step after which they sink in by so many grazes, and at 8, 16 ...
 MOST_PLASTIC = 1000  # impacts of a body in a step after which those beyond the cap are none any more
 
 NO_TOUCH, OVERLAPS_AT_END, SWEPT = range(3)
@@ -69,13 +70,26 @@ def leaves_touch_at(state, c, path, since, t):
 
 
 @part
+def sinks_before_touch(state, a, b):
+    """By how many grazes two elastic bodies that turn are deeper at their next touch; -inf: at any depth. After GRAZES
+    impacts of both in a step it is one of those that follow each other at once: a corner that slides along a face parts
+    slowly, and is turned back into it. Where they may sink in first they part faster, fly for longer, and lose nothing.
+    """
+    count, inverse_mass = state.bodies.impact_count, state.bodies.inverse_mass
+    fewest = min(count[a] if inverse_mass[a] > 0.0 else STOPPED, count[b] if inverse_mass[b] > 0.0 else STOPPED)
+    if fewest < GRAZES:
+        return -math.inf
+    return SINKS if fewest & (fewest - 1) == 0 else 0.0
+
+
+@part
 def find_touch(state, c, a, b, path, since, restitution, dt):
     """(NO_TOUCH, OVERLAPS_AT_END or SWEPT; (time, normal, point, from a's centre to b's)) of the pair's next touch from
     a time on. What is not swept, or touches at a corner, has none unless it overlaps where the step ends."""
     impacts, bodies, zero = state.impacts, state.bodies, zero_of(state)
     swept, overlaps, end_normal, nothing = False, False, zero, (dt, zero, zero, zero)
     turning = state.spinning and is_turning(state, dt, a, b)
-    limits = slop_of(state, a, b), dt, bounce_threshold(state, a, b) if turning else -math.inf
+    limits = slop_of(state, a, b), dt, bounce_threshold(state, a, b) if turning else -math.inf, -math.inf
     if impacts.sweeps:
         since = max(since, bodies.last_impact[a], bodies.last_impact[b])
         passive, travel = not state.pairs.is_solid[c], travel_of(path, dt) + turning_travel(state, dt, a, b)
@@ -84,6 +98,8 @@ def find_touch(state, c, a, b, path, since, restitution, dt):
             return NO_TOUCH, nothing
         if swept:
             limits = limits_of_sweep(state, a, b, travel, bounce_threshold(state, a, b), dt)
+    if turning and restitution == 1.0:
+        limits = limits[0], limits[1], limits[2], sinks_before_touch(state, a, b)
     if not swept:
         if state.spinning and turns_far(state, a, b):  # contacts at rest know what a mill meets on its way
             return NO_TOUCH, nothing

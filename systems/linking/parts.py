@@ -28,7 +28,7 @@ def _first_touch(dimensions: int) -> Any:
     vector, i, f = vector_type(dimensions), types.int64, types.float64
     path = types.UniTuple(vector, 4)  # (x0, x1, x2, x3), see trajectory
     found = types.Tuple((i, f, vector, vector, vector))
-    return found(record_type(STATE, dimensions), i, i, path, f, f, types.UniTuple(f, 3))
+    return found(record_type(STATE, dimensions), i, i, path, f, f, types.UniTuple(f, 4))
 
 
 @cache

@@ -290,13 +290,13 @@ def test_energy_never_rises_with_friction(e, mode):
     assert last < 0.9 * first
 
 
+@pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("seed", [4, 6])
-def test_a_smooth_elastic_gas_of_boxes_in_space_keeps_energy_as_free_turns_do(seed):
-    """These let it swing by dt^2: within 0.5 %, and 2e-3 in a step, over more than 300 impacts at their times."""
+def test_a_smooth_elastic_gas_of_boxes_in_space_keeps_energy(seed, mode):
+    """To rounding, over more than 300 impacts; among them corners that slide along faces, and would graze them more
+    often than the cap allows."""
     random = np.random.default_rng(seed)
-    with World(
-        Physics(3, gravity=0), Rotation(), settings=Settings(collision="event_driven", max_impacts_per_step=64)
-    ) as world:
+    with World(Physics(3, gravity=0), Rotation(), settings=Settings(collision=mode, max_impacts_per_step=64)) as world:
         for k in range(6):
             place, half = np.zeros(3), np.full(3, 4.0)
             place[k // 2], half[k // 2] = 3.5 * (-1) ** k, 0.5
@@ -320,8 +320,7 @@ def test_a_smooth_elastic_gas_of_boxes_in_space_keeps_energy_as_free_turns_do(se
             world.step()
         assert world.stats().counters["impacts"] > 300
         assert np.abs(bodies.position).max() < 3.0
-    assert np.allclose(energies, energies[0], rtol=5e-3)
-    assert np.abs(np.diff(energies)).max() < 2e-3 * energies[0]
+    assert np.allclose(energies, energies[0], rtol=1e-12)
 
 
 # -- with gravity ---------------------------------------------------------------------------------
