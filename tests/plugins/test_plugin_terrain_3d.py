@@ -76,7 +76,7 @@ def test_what_slides_over_a_floor_of_triangles_keeps_height_speed_and_angle(mode
 
 
 @each_mode
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_nobody_passes_the_hills(mode, seed):
     heights, random, world = hills(seed), np.random.default_rng(seed), make_world(collision=mode)
     create_height_field(world, heights, 1.0, friction=0.6)

@@ -7,17 +7,19 @@ import pytest
 from helpers_queries import GRAZE, Bodies, directions, scene
 from worlds import both_dimensions
 
+ASKED = 10  # places, each time
+
 
 def compare(world, bodies, rng):
     """Answers around random bodies with those of brute force."""
     d = world.dimensions
     bodies.centre[np.searchsorted(bodies.entity, world.bodies.entity)] = world.bodies.position
-    centres = bodies.centre[rng.integers(0, len(bodies.entity), 20)] + rng.standard_normal((20, d))
-    ways, radii = directions(rng, 20, d), 2 * rng.random(20)
+    centres = bodies.centre[rng.integers(0, len(bodies.entity), ASKED)] + rng.standard_normal((ASKED, d))
+    ways, radii = directions(rng, ASKED, d), 2 * rng.random(ASKED)
     spheres, nearest = world.query_spheres(centres, radii), world.query_nearests(centres)
     boxes = world.query_aabbs(centres - radii[:, None], centres + radii[:, None])
     rays = world.ray_casts(centres, ways, 3.0)
-    for i in range(20):
+    for i in range(ASKED):
         for found, half, sphere in ((spheres[i], radii[i : i + 1], True), (boxes[i], np.full(d, radii[i]), False)):
             gap = bodies.gap(centres[i], half, sphere)
             clear = np.abs(gap) > GRAZE
