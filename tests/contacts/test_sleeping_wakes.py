@@ -295,18 +295,6 @@ def test_the_same_force_in_every_step_lets_sleep():
     assert not any(is_asleep(world, *boxes))
 
 
-def test_a_tower_whose_bottom_goes_falls():
-    world = sleepy_world()
-    boxes = tower(world, 0.0)
-    sleep(world, *boxes)
-    world.delete_entity(boxes[0])
-    for _ in range(60):
-        world.step()
-    assert world.component_for_entity(boxes[1], Transform).position[1] == pytest.approx(0.5, abs=0.02)
-    assert world.component_for_entity(boxes[2], Transform).position[1] == pytest.approx(1.5, abs=0.02)
-    sleep(world, *boxes[1:])
-
-
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("speed", [5.0, 400.0])
 def test_a_ball_thrown_at_a_sleeping_pile_wakes_that_island_alone(mode, speed):

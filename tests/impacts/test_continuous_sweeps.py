@@ -144,65 +144,6 @@ def test_b15_beyond_the_cap(mode, e, d):
     assert any("impacts beyond 8 of a body in one step" in fault for fault in world.faults)
 
 
-def meet(rng, d, shapes):
-    """Position of b relative to a at the touch, and the normal from a to b. Balls of 0.1, boxes of half extent 0.1."""
-    normal = rng.normal(size=d)
-    normal /= np.linalg.norm(normal)
-    if shapes == "ball, ball":
-        return 0.2 * normal, normal
-    axis, side = rng.integers(d), rng.choice([-1.0, 1.0])
-    face = side * np.eye(d)[axis]
-    slide = rng.uniform(-0.08, 0.08, d) * (np.arange(d) != axis)
-    if shapes == "box, box":
-        return 0.2 * face + 2 * slide, face
-    if shapes == "box, ball: face":
-        return 0.2 * face + slide, face
-    signs, normal = rng.choice([-1.0, 1.0], d), rng.uniform(0.3, 1.0, d)
-    normal *= signs / np.linalg.norm(normal)
-    return 0.1 * signs + 0.1 * normal, normal
-
-
-@both_dimensions
-@each_sweep
-@pytest.mark.parametrize("shapes", ["ball, ball", "box, box", "box, ball: face", "box, ball: corner"])
-def test_two_bullets_meet(mode, d, shapes):
-    """40 pairs, traced back from a touch within the step, at up to 1e5 m/s; rounding over size and cosine."""
-    rng = np.random.default_rng(d)
-    world = mode_world(mode, d)
-    make = {"ball": {"radius": 0.1}, "box": {"half": 0.1}}
-    first, second = (make[name.split(":")[0]] for name in shapes.split(", "))
-    expected = []
-    for lane in range(40):
-        offset, normal = meet(rng, d, shapes)
-        toi, speed = rng.uniform(0, DT), 10 ** rng.uniform(3, 5)
-        e, mass = rng.choice([1.0, 0.5]), 10 ** rng.uniform(-1, 1)
-        across = rng.normal(size=d)
-        across -= (across @ normal) * normal
-        cosine = rng.uniform(0.3, 1.0)
-        w = speed * (math.sqrt(1 - cosine**2) * across / np.linalg.norm(across) - cosine * normal)  # of b seen from a
-        wind = rng.normal(size=d) * 10
-        va, vb = wind - w / 2, wind + w / 2
-        where = along(d, 0.0, 1e4 * lane)
-        a = bullet(world, where - va * toi, va, restitution=e, **first)
-        b = bullet(world, where + offset - vb * toi, vb, mass=mass, restitution=e, **second)
-        impulse = -(1 + e) * (w @ normal) / (1 + 1 / mass)
-        after = va - impulse * normal, vb + impulse / mass * normal
-        places = where + after[0] * (DT - toi), where + offset + after[1] * (DT - toi)
-        expected.append((a, b, toi, normal, impulse, after, places, speed))
-    hits = strikes(world, 1)
-    assert len(hits) == 40
-    for a, b, toi, normal, impulse, after, places, speed in expected:
-        (k,) = np.flatnonzero(hits.entity_a == a)
-        rounding = 1e-15 * (4e5 + speed * DT)  # of the places, lanes being up to 4e5 m away
-        assert hits.entity_b[k] == b
-        assert hits.time[k] == pytest.approx(toi, abs=10 * rounding / speed)
-        np.testing.assert_allclose(hits.normal[k], normal, atol=100 * rounding)
-        assert hits.impulse[k] == pytest.approx(impulse, rel=200 * rounding)
-        for entity, v, x in zip((a, b), after, places, strict=True):
-            np.testing.assert_allclose(velocity(world, entity), v, atol=200 * rounding * speed)
-            np.testing.assert_allclose(position(world, entity), x, atol=200 * rounding * (1 + speed * DT))
-
-
 def field(with_bullets):
     """A discrete world: slow balls and boxes that bounce about, thin plates, and two bullets at the plates."""
     world = make_world()

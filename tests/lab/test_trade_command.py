@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import re
 import sys
@@ -62,26 +61,6 @@ def test_the_files_it_writes_are_there_and_named(made):
     assert {path.name for path in folder.iterdir()} == expected
     for name in expected:
         assert f"written: {folder / name}" in result.stderr
-
-
-def test_json_and_csv_hold_every_point(made):
-    folder, _ = made
-    found = trade_in(folder)
-    [case] = found.cases
-    points = [point for curve in case.curves for point in curve.points]
-    assert {curve.points[0].cell.engine for curve in case.curves} == {"carom", "pymunk"}
-    assert any(point.milliseconds for point in points)
-    with (folder / "trade.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert len(rows) == len(points) * len(case.norms)
-    by_key = {(row["method"], float(row["dt"]), row["norm"]): row for row in rows}
-    for curve in case.curves:
-        for point in curve.points:
-            row = by_key[curve.label, point.cell.dt, case.norm]
-            bar = point.errors.get(case.norm)
-            assert row["error"] == (repr(bar.mean) if bar else "")
-            assert bool(row["failed"]) == point.failed
-            assert float(row["work"]) == point.work
 
 
 def test_failures_are_in_the_table_and_on_the_chart(made):
@@ -233,14 +212,6 @@ def test_without_pymunk(carom, monkeypatch):
     result = carom("spring", "--against", "pymunk")
     assert result.exit_code == 2
     assert "pymunk is missing" in result.stderr
-
-
-def test_the_chaotic_file_is_refused_with_the_reason(carom, tmp_path):
-    scene_file(tmp_path, CROWD, "chaos.py")
-    result = carom("chaos.py", "--norm", "position", *SHORT)
-    assert result.exit_code == 2
-    assert "chaos.py is chaotic: two starts" in result.stderr
-    assert "position would measure chance" in result.stderr
 
 
 def test_the_manual_has_every_option_and_norm():

@@ -95,23 +95,6 @@ def test_quick_runs_are_the_same_each_time_and_leave_out_what_is_clearly_worse()
     assert repeats() == every
 
 
-def test_an_interrupted_run_keeps_what_is_finished(ball, whole, monkeypatch, tmp_path):
-    ran = []
-
-    def interrupted(task):
-        if len(ran) == 5:
-            raise KeyboardInterrupt
-        ran.append(task.key)
-        return perform(task)
-
-    with monkeypatch.context() as patched:
-        patched.setattr(trade_runs, "perform", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            measured(ball, tmp_path)
-    assert keys(tmp_path) == ran
-    assert measured(ball, tmp_path) == whole
-
-
 def test_results_of_another_scene_time_or_step_are_not_taken(ball, performed, tmp_path):
     only = {"only": Only(("velocity_verlet",), ("continuous",)), "steps": (1 / 30,), "repeats": 1}
     measured(ball, tmp_path, **only)

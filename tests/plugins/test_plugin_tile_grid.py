@@ -244,25 +244,3 @@ def test_where_tiles_border_on_each_other_are_no_faces():
             depths, normals, _, _ = meet(cells, 1.0, vertices, np.full(len(x), radius), offsets)
             np.testing.assert_array_equal(normals, np.tile((0.0, 1.0), (len(x), 1)))
             np.testing.assert_allclose(depths, sunk, atol=1e-14)
-
-
-def test_moving_polygons_touch_when_the_first_cell_says_so():
-    """Against steps of a thousandth of the path: apart before, and touching at the time given."""
-    rng = np.random.default_rng(5)
-    cells = rng.random((9, 9)) < 0.25
-    count = 500
-    turns = rng.uniform(0, 2 * np.pi, (count, 1)) + np.array((0.0, 2.0, 4.2))
-    vertices = rng.uniform(0.1, 1.2, (count, 1, 1)) * np.stack((np.cos(turns), np.sin(turns)), 2)
-    offsets, ways = rng.uniform(-7, 7, (count, 2)), rng.normal(size=(count, 2)) * 6
-    radii = rng.uniform(0, 0.2, count)
-    start, _, _, times = meet(cells, 1.0, vertices, radii, offsets, ways)
-    assert (times[start >= 0] == 0.0).all()
-    met = np.isfinite(times)
-    assert 100 < met.sum() < 480
-    for share in np.linspace(0, 1, 101):
-        before = np.where(met, np.minimum(times, 1.0), 1.0) * share
-        depths = meet(cells, 1.0, vertices, radii, offsets + before[:, None] * ways)[0]
-        if share == 1.0:
-            assert abs(depths[met & (start < 0)]).max() < 1e-13
-        assert depths[~met].max() < 0
-        assert depths[met & (start < 0)].max() < 1e-13

@@ -255,20 +255,6 @@ def test_nothing_gets_in_between_the_tiles(faces):
     assert ((ends > 2) & (ends < 28)).all()
 
 
-def test_a_tile_dug_away_lets_them_fall():
-    world = make_world()
-    grid = world.create_entity(Transform((0, 0)), TileGridCollider(np.ones((1, 9), bool), 1.0, lower=(0, 0)))
-    ball = world.create_entity(Transform((4.5, 1.4)), RigidBody(), SphereCollider(0.4))
-    run(world, 30)
-    assert world.component_for_entity(ball, Transform).y == pytest.approx(1.4, abs=1e-3)
-    tiles = world.component_for_entity(grid, TileGridCollider)
-    cells = tiles.cells
-    cells[0, 4] = False
-    tiles.cells = cells
-    run(world, 60)
-    assert world.component_for_entity(ball, Transform).y < -1
-
-
 def test_the_example_runs_to_the_end_of_the_map(capsys):
     path = np.array(runpy.run_path(str(ROOT / "examples" / "tile_map.py"))["main"]())
     assert path[-1, 0] == pytest.approx(58.65, abs=0.01)  # 59 m less half its width
