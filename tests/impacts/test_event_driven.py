@@ -71,39 +71,6 @@ def test_b17_galperin_3141592(digits):
     check_galperin(Settings(collision="event_driven"), digits, 6.0)
 
 
-@both_dimensions
-@each_mode
-def test_impacts_are_reported_in_the_order_of_time(mode, d):
-    """In a step ordered by (time, a, b); impulses positive, normals of length 1, times within the step."""
-    world = mode_world(mode, d, max_impacts_per_step=1000)
-    for axis in range(d):
-        for side in (-1, 1):
-            half = np.full(d, 7.0)
-            half[axis] = 1.0
-            box(world, side * 6.0 * np.eye(d)[axis], half=half, kind="static", restitution=1.0)
-    rng = np.random.default_rng(1)
-    cells = np.stack(np.meshgrid(*[np.arange(-2, 3) * 2.0] * d), axis=-1).reshape(-1, d)[:50]
-    for k, place in enumerate(cells):
-        size = {"radius": 0.5} if k % 3 else {"half": 0.5}
-        bullet(world, place, rng.normal(size=d) * 100, mass=rng.uniform(1, 3), restitution=1.0, **size)
-    kept, most, pairs = Conserved(world), 0, 0
-    for _ in range(30):
-        world.step()
-        rows = world.contacts.impacts
-        order = np.lexsort((rows.entity_b, rows.entity_a, rows.time_of_impact))
-        assert (order == np.arange(len(rows))).all()
-        assert (rows.time_of_impact >= 0).all()
-        assert (rows.time_of_impact <= DT).all()
-        assert (rows.normal_impulse > 0).all()
-        np.testing.assert_allclose(np.linalg.norm(rows.normal, axis=1), 1, rtol=1e-14)
-        most = max(most, len(rows))
-        pairs += len(rows) - len(set(zip(rows.entity_a.tolist(), rows.entity_b.tolist(), strict=True)))
-    assert most > 50
-    assert pairs > 0  # several of one pair in one step
-    kept.check(momentum=False)
-    assert world.kinetic_energy() == pytest.approx(kept.energy, rel=1e-12)
-
-
 @each_mode
 @pytest.mark.parametrize("speed", [1.0, 100.0])
 def test_inelastic_collapse_ends(mode, speed):

@@ -245,26 +245,6 @@ def test_a_failed_step_puts_back_what_stages_have_written(anchor, systems, colli
         assert world.state_hash() == hashed
 
 
-@pytest.mark.parametrize("mode", MODES)
-def test_snapshots_and_files_go_on_to_the_bit(mode, tmp_path):
-    with bouncing(kicking(("after", "put_back")), collision=mode) as world:
-        for _ in range(10):
-            world.step()
-        snapshot = world.snapshot()
-        world.save(tmp_path / "world")
-        for _ in range(10):
-            world.step()
-        straight = world.state_hash()
-        world.restore(snapshot)
-        for _ in range(10):
-            world.step()
-        assert world.state_hash() == straight
-        with World.load(tmp_path / "world", Physics(dimensions=2), kicking(("after", "put_back"))) as other:
-            for _ in range(10):
-                other.step()
-            assert other.state_hash() == straight
-
-
 def bare(state, dt):
     pass
 

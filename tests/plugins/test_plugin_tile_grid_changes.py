@@ -323,20 +323,6 @@ def test_a_cell_that_is_so_already_wakes_nothing():
     assert asleep(world, balls) == [True] * 4
 
 
-def test_a_step_that_fails_leaves_sleepers_as_they_were():
-    world, ground, balls = sleepers()
-    hashed = world.state_hash()
-    world.add_system(Digs(ground, {90: (HOLE, False)}, fails=90))
-    with pytest.raises(StepError):
-        world.step()
-    assert world.state_hash() == hashed
-    assert asleep(world, balls) == [True] * 4
-    world.step()  # it digs again, and does not fail
-    run(world, 60)
-    assert height(world, balls[0]) < 0
-    assert asleep(world, balls)[1:] == [True] * 3
-
-
 def test_a_far_change_wakes_nothing_for_a_long_time():
     """Every step another cell, and other changes that have all that is watched bound again."""
     world, ground, balls = sleepers()

@@ -146,21 +146,6 @@ def test_c2_coincident_with_relative_velocity(d, w, e):
     kept.check()
 
 
-@makers
-@pytest.mark.parametrize("e", [0.0, 1.0])
-def test_c21_overlapping_with_equal_velocities(maker, e):
-    """No relative velocity: the overlap is corrected, both keep their velocity."""
-    world = make_world()
-    a, b = maker(world, 0.0, (3.0, 1.0), restitution=e), maker(world, 0.7, (3.0, 1.0), restitution=e)
-    kept = Conserved(world)
-    run(world, 240)
-    for entity in (a, b):
-        np.testing.assert_allclose(velocity(world, entity), [3.0, 1.0], rtol=4 * EPS)
-    assert position(world, b)[0] - position(world, a)[0] > 0.99
-    assert not len(world.contacts.impacts)
-    kept.check()
-
-
 @both_dimensions
 @pytest.mark.parametrize("spacing", [1.0, 2.0**-30, 2.0**30])
 def test_c18_on_split_lines_on_edges_and_outside(d, spacing):
