@@ -15,7 +15,7 @@ from ...systems.contacts.solving.records import JOINTS
 from ...systems.tracking import BEFORE_STEP
 from .arms import arm_of, moment
 from .joint import WORLD, Changes, Driven, Joint, Place, Row
-from .kinds import KINDS, Ball, Cone, Distance, Hinge, Motor, MousePull, Slider, Weld
+from .kinds import KINDS, Ball, Cone, Distance, Hinge, Motor, MousePull, Slider, Weld, Wheel
 from .measures import Holds, holds, measure, moving
 
 # What rows are known by, and what they keep from step to step.
@@ -32,8 +32,8 @@ class JointState(NamedTuple):
     torque
         N m s, on b, beside that of the impulse; in 3D (3,)
     value, speed
-        rad of a Hinge, a Weld, a Motor or the twist of a Cone, m of a Slider or a Distance, what the first row of a
-        plugin's joint has, and the change per second; else 0
+        rad of a Hinge, a Weld, a Motor or the twist of a Cone, m of a Slider, a Wheel or a Distance, what the first row
+        of a plugin's joint has, and the change per second; else 0
     """
 
     impulse: np.ndarray
@@ -376,5 +376,6 @@ def _matrix(q: Any) -> np.ndarray:
 
 __all__ = [
     "DRIVE", "GIVEN", "HOLD", "KINDS", "LIMIT", "SERVO", "SPRING", "Ball", "Cone", "Distance", "Driven", "Hinge",
-    "Joint", "JointState", "Joints", "Motor", "MousePull", "Row", "Slider", "Weld", "arm_of", "moment",
+    "Joint", "JointState", "Joints", "Motor", "MousePull", "Row", "Slider", "Weld", "Wheel", "arm_of",
+    "moment",
 ]  # fmt: skip

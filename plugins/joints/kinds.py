@@ -12,6 +12,8 @@ from ...framework.typing import Vector
 from ...systems.contacts.solving.joints import CONE, DRIVE, HOLD, LIMIT, LINE, POINT, SERVO, SLIDE, SPRING
 from .joint import FREE, LEAST, MOST, WORLD, Driven, Joint, Place, Row, optional
 
+SQUARE = 1e-6  # cosine between directions that are at right angles
+
 
 class Distance(Joint):
     """A rod, a rope or a spring between two points.
@@ -188,6 +190,59 @@ class Slider(Driven):
         return [*across, *self.aligned(dimensions), self.turn(dimensions), *moving]
 
 
+class Wheel(Driven):
+    """A wheel b on a car a: its anchor slides along an axis of a, on a spring, and it turns about the anchor.
+
+    anchor
+        the middle of the wheel, where the bodies are when the world takes the joint
+    direction
+        along which the anchor moves, in the world, as the bodies are then
+    axis
+        in space, about which the wheel turns, at right angles to the direction, in the world as the bodies are then
+    limits
+        m along the direction from there, (least, most); also the fields ``lower`` and ``upper``
+    frequency, damping_ratio
+        Hz: a spring that pushes the anchor back to ``rest``, m along the direction
+    motor_speed, max_torque
+        rad/s of b against a, and N m at most; None: no motor, and no limit
+    """
+
+    __slots__ = ()
+    fixed: ClassVar[tuple[str, ...]] = ("a", "b", "anchor", "direction", "axis")
+
+    a: int | None = special_column(dtype=int, minimum=0)
+    b: int | None = special_column(dtype=int, minimum=0)
+    anchor: Vector = special_column(item="vector", largest=MOST)
+    direction: Vector = special_column(item="vector", largest=MOST)
+    axis: Vector = special_column(default=0.0, item="vector", largest=MOST, kw_only=True)
+    max_torque: float | None = optional(minimum=0.0)
+
+    def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:
+        super().__init__(*args, limits=limits, **values)  # stands here for checkers of types
+
+    def check(self) -> None:
+        super().check()
+        along, axis = np.asarray(self.direction), np.asarray(self.axis)
+        if not np.any(np.abs(along) > LEAST):
+            raise ValueError(f"Wheel.direction must not be 0, got {along.tolist()}")
+        if along.shape != (3,) or axis.shape != (3,):
+            return
+        if abs(along @ axis) > SQUARE * np.linalg.norm(along) * np.linalg.norm(axis):
+            raise ValueError(f"Wheel.axis must be at right angles to its direction, got {axis.tolist()}")
+
+    def attach(self, a: Place, b: Place) -> None:
+        self.hold(a, b, self.anchor)
+        self.hold_axis(a, b, self.axis)
+        along = np.asarray(self.direction) / np.linalg.norm(self.direction)
+        self.keep(side_a=a.axes.T @ along, side_b=b.axes.T @ along)
+
+    def rows(self, dimensions: int) -> list[Row]:
+        along = np.asarray(self.side_a)
+        across = [(-along[1], along[0])] if dimensions == 2 else [self.axis_a, np.cross(self.axis_a, along)]
+        moving = self.moving(Row(SLIDE, HOLD, axis=along), self.max_torque, self.turn(dimensions))
+        return [*(Row(SLIDE, HOLD, axis=side) for side in across), *self.aligned(dimensions), *moving]
+
+
 class Motor(Joint):
     """Turns b against a: to an angular velocity, or to an angle.
 
@@ -301,4 +356,4 @@ class MousePull(Joint):
         return [Row(POINT, SPRING, most=most, frequency=self.frequency, damping_ratio=self.damping_ratio)]
 
 
-KINDS: tuple[type[Joint], ...] = (Distance, Hinge, Ball, Cone, Weld, Slider, Motor, MousePull)
+KINDS: tuple[type[Joint], ...] = (Distance, Hinge, Ball, Cone, Weld, Slider, Wheel, Motor, MousePull)

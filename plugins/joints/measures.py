@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .joint import Joint
-from .kinds import Cone, Distance, Hinge, Motor, Slider, Weld
+from .kinds import Cone, Distance, Hinge, Motor, Slider, Weld, Wheel
 
 
 class Holds(NamedTuple):
@@ -90,7 +90,13 @@ def _angle(of: Holds, a: Moving, b: Moving) -> tuple[np.ndarray, np.ndarray]:
     return np.arctan2(_dot(axis, _cross(side_a, side_b)), _dot(side_a, side_b)), _dot(axis, b.spin - a.spin)
 
 
-MEASURES = {Distance: _length, Slider: _way, Hinge: _angle, Weld: _angle, Motor: _angle, Cone: _angle}
+def _travel(of: Holds, a: Moving, b: Moving) -> tuple[np.ndarray, np.ndarray]:
+    return _way(of._replace(axis=of.side_a), a, b)
+
+
+MEASURES = {
+    Distance: _length, Slider: _way, Wheel: _travel, Hinge: _angle, Weld: _angle, Motor: _angle, Cone: _angle,
+}  # fmt: skip
 
 
 def holds(joints: Collection[Joint]) -> list[Holds]:

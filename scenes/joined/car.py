@@ -9,7 +9,7 @@ from ...components import RigidBody, SphereCollider, Transform
 from ...components.spin import Spin
 from ...framework import Settings, World
 from ...plugins import Physics, terrain
-from ...plugins.joints import Hinge, Joints, Motor, Slider
+from ...plugins.joints import Joints, Wheel
 from ...plugins.rotation import BoxCollider, Rotation
 from ...plugins.terrain import create_chain
 from ..protocol import Scene
@@ -23,7 +23,6 @@ SPEED = 30.0  # rad/s of the wheels
 TORQUE = 60.0  # N m
 SPRING, RATIO = 4.0, 0.7  # Hz of the suspension, and its damping ratio
 TRAVEL = 0.25  # m
-ROAD, CAR = 1, 2  # layers: parts of the car do not meet
 SETTINGS = Settings()
 
 
@@ -39,25 +38,16 @@ def build(settings: Settings | None = None, seed: int = 0, *, speed: float = SPE
     physics = Physics(dimensions=2, gravity=(0.0, -9.81))
     world = World(physics, Rotation(), Joints(), terrain.plugin, settings=settings or SETTINGS)
     road = [(k * PIECE, height(k * PIECE)) for k in range(-20, int(LENGTH / PIECE) + 1)]
-    create_chain(world, road, friction=0.9, layer=ROAD)
-    axle = WHEEL
-    own: dict[str, Any] = {"layer": CAR, "mask": ROAD}
+    create_chain(world, road, friction=0.9)
     chassis = world.create_entity(
-        Transform((START, axle + 0.5)), RigidBody(mass=20.0), BoxCollider((1.8, 0.25), friction=0.3, **own), Spin()
+        Transform((START, WHEEL + 0.5)), RigidBody(mass=20.0), BoxCollider((1.8, 0.25), friction=0.3), Spin()
     )
     for side in (-1, 1):
-        wheel = world.create_entity(
-            Transform((START + side * BASE, axle)),
-            RigidBody(mass=2.0),
-            SphereCollider(WHEEL, friction=0.9, **own),
-            Spin(),
-        )
-        hub = world.create_entity(Transform((START + side * BASE, axle)), RigidBody(mass=1.0), Spin(inertia=0.05))
+        axle = START + side * BASE, WHEEL
+        wheel = world.create_entity(Transform(axle), RigidBody(mass=3.0), SphereCollider(WHEEL, friction=0.9), Spin())
+        motor: dict[str, Any] = {"motor_speed": -speed, "max_torque": TORQUE} if side < 0 else {}
         spring = {"frequency": SPRING, "damping_ratio": RATIO, "rest": -0.1}
-        world.create_entity(Slider(chassis, hub, direction=(0.0, 1.0), limits=(-TRAVEL, TRAVEL), **spring))
-        world.create_entity(Hinge(hub, wheel, anchor=(START + side * BASE, axle)))
-        if side < 0:
-            world.create_entity(Motor(chassis, wheel, speed=-speed, max_torque=TORQUE))
+        world.create_entity(Wheel(chassis, wheel, axle, (0.0, 1.0), limits=(-TRAVEL, TRAVEL), **spring, **motor))
     return world
 
 

@@ -1,0 +1,104 @@
+"""Wheels on a spring, which turn freely or are driven, in two and three dimensions."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers_joints import G, at, run
+
+from carom import Physics, RigidBody, Transform, World
+from carom.plugins.joints import Joints, Wheel
+from carom.plugins.rotation import Rotation, Spin
+
+pytestmark = [pytest.mark.plain, pytest.mark.parametrize("d", [2, 3])]
+
+
+def make(d: int, gravity: float = 0.0) -> tuple[World, Joints, dict[str, Any]]:
+    """A world, its joints, and what a wheel about the last axis is given besides."""
+    joints, down = Joints(), [0.0, -gravity, 0.0][:d]
+    axle: dict[str, Any] = {} if d == 2 else {"axis": (0.0, 0.0, 2.0)}
+    return World(Physics(dimensions=d, gravity=down), Rotation(), joints), joints, axle
+
+
+def body(world: World, place: Any, mass: float, inertia: float, spin: Any = 0.0, **moves: Any) -> int:
+    flat = world.dimensions == 2
+    turns = Spin(spin, inertia=inertia) if flat else Spin(spin, inertia=(inertia, 0.7 * inertia, 1.3 * inertia))
+    return world.create_entity(Transform(place), RigidBody(mass=mass, **moves), turns)
+
+
+def test_it_hangs_on_its_spring_on_its_axis_and_turns_as_its_motor_can(d):
+    world, joints, axle = make(d, G)
+    velocity, spin = ((3.0, 0.0), 0.0) if d == 2 else ((3.0, 0.0, 2.0), (1.0, -2.0, 0.0))
+    b = body(world, (1.0, 2.0, 0.5)[:d], 3.0, 0.5, spin, linear_velocity=velocity)
+    about = 0.5 if d == 2 else 0.65
+    motor = {"motor_speed": 4.0, "max_torque": 2.0}
+    wheel = Wheel(None, b, (1.0, 2.0, 0.5)[:d], (0, 1, 0)[:d], frequency=2.0, damping_ratio=1.0, **axle, **motor)
+    entity = world.create_entity(wheel)
+    run(world, 30)
+    turning = float(np.atleast_1d(world.component_for_entity(b, Spin).angular_velocity)[-1])
+    assert turning == pytest.approx(2.0 / about * 0.5, rel=1e-3)
+    run(world, 300)
+    sag = G / (2.0 * math.pi * 2.0) ** 2
+    place = at(world, b).position
+    assert place[1] == pytest.approx(2.0 - sag, abs=1e-3)
+    assert place[::2] == pytest.approx((1.0, 0.5)[: d - 1], abs=1e-3)
+    assert joints.state(entity).value == pytest.approx(-sag, abs=1e-3)
+    spin = np.atleast_1d(world.component_for_entity(b, Spin).angular_velocity)
+    assert spin == pytest.approx([4.0] if d == 2 else [0.0, 0.0, 4.0], abs=1e-3)
+    wheel.lower = -0.5 * sag
+    run(world, 120)
+    assert joints.state(entity).value == pytest.approx(-0.5 * sag, abs=1e-3)
+    assert joints.state(entity).speed == pytest.approx(0.0, abs=1e-6)
+
+
+def test_car_and_wheel_keep_their_momenta(d):
+    """Free in space, while the motor turns one against the other and the spring swings."""
+    world, joints, axle = make(d)
+    spin = 0.5 if d == 2 else (0.2, -0.1, 0.5)
+    car = body(world, (0.0, 0.0, 0.0)[:d], 5.0, 2.0, spin, linear_velocity=(1.0, 0.5, 0.2)[:d])
+    b = body(world, (1.0, -0.5, 0.0)[:d], 1.0, 0.1)
+    motor = {"motor_speed": -20.0, "max_torque": 1.0}
+    entity = world.create_entity(Wheel(car, b, (1.0, -0.5, 0.0)[:d], (0, 1, 0)[:d], frequency=3.0, **axle, **motor))
+
+    def momenta():
+        total, about = np.zeros(d), np.zeros(3)
+        for each, mass in ((car, 5.0), (b, 1.0)):
+            velocity = world.component_for_entity(each, RigidBody).linear_velocity
+            part, place = world.component_for_entity(each, Spin), at(world, each)
+            total = total + mass * velocity
+            arm, push = (np.append(v, np.zeros(3 - d)) for v in (place.position, mass * velocity))
+            about = about + np.cross(arm, push)
+            if d == 2:
+                about[2] += part.moments * part.angular_velocity
+            else:
+                turned = rotated(place.rotation)
+                about += turned @ part.moments @ turned.T @ part.angular_velocity
+        return np.concatenate((total, about))
+
+    world.step()
+    before = momenta()
+    run(world, 60)
+    assert abs(joints.state(entity).value) > 1e-3
+    np.testing.assert_allclose(momenta(), before, atol=3e-3 if d == 3 else 1e-9)
+    assert (at(world, b).rotation != 0.0) if d == 2 else abs(at(world, b).rotation[3]) > 0.1
+
+
+def rotated(q: Any) -> np.ndarray:
+    """The axes of a body, as columns."""
+    w, v = q[0], q[1:]
+    return (w * w - v @ v) * np.eye(3) + 2.0 * np.outer(v, v) + 2.0 * w * np.cross(v, np.eye(3)).T
+
+
+def test_what_no_wheel_can_be_is_refused_at_the_call(d):
+    world, _, axle = make(d)
+    b, anchor = body(world, (0.0,) * d, 1.0, 1.0), (0.0,) * d
+    with pytest.raises(ValueError, match=r"Wheel\.direction must not be 0"):
+        Wheel(None, b, anchor, (0.0,) * d, **axle)
+    if d == 3:
+        with pytest.raises(ValueError, match="at right angles"):
+            Wheel(None, b, anchor, (0, 1, 1), **axle)
+        with pytest.raises(ValueError, match="needs an axis"):
+            world.create_entity(Wheel(None, b, anchor, (0, 1, 0)))
