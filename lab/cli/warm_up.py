@@ -15,15 +15,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import click
+import numpy as np
 from rich.console import Console
 
 from ... import scenes
 from ...components import AABBCollider, RigidBody, SphereCollider, Transform
-from ...framework import Settings, World
+from ...framework import Plugin, Settings, World
 from ...framework.compilation import log
 from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_folder, clear_cache, used
 from ...framework.jit.prebuilt import INDEX, OFF, PORTABLE, write_index
-from ...plugins import Physics, capsule, convex_hull, convex_polygon, half_space, one_way_segment, tile_grid
+from ...plugins import Physics, capsule, convex_hull, convex_polygon, half_space, one_way_segment, terrain, tile_grid
+from ...plugins.joints import Joints
 from ...plugins.rotation import BoxCollider, Rotation, Spin
 from ..reporting.progress import Progress
 from ..reporting.text import TextTable
@@ -115,6 +117,7 @@ def _work(targets: tuple[str, ...], everything: bool, dimensions: set[int]) -> I
             yield f"spheres and boxes, {d}D", lambda d=d: prepare_built_in(d)
             yield f"shapes of the plugins, {d}D", lambda d=d: prepare_shipped_plugins(d)
             yield f"bodies that spin, {d}D", lambda d=d: prepare_rotation(d)
+            yield f"joints, terrain, {d}D", lambda d=d: prepare_joints(d)
     names = [name for name in scenes.names() if scenes.get(name).dimensions in dimensions] if everything else targets
     for loaded in [load(name) for name in names]:  # report missing scenes before anything compiles
         yield loaded.name, lambda loaded=loaded: _prepare_scene(loaded)
@@ -138,9 +141,23 @@ def prepare_shipped_plugins(dimensions: int) -> None:
 
 def prepare_rotation(dimensions: int) -> None:
     """What worlds need in which spheres and boxes spin."""
-    with closing(World(Physics(dimensions=dimensions), Rotation())) as world:
+    _prepare_spinning(dimensions)
+
+
+def prepare_joints(dimensions: int) -> None:
+    """What worlds need in which spheres and boxes spin and have joints, on flat ground and on terrain."""
+    _prepare_spinning(dimensions, Joints())
+    _prepare_spinning(dimensions, Joints(), terrain.plugin)
+
+
+def _prepare_spinning(dimensions: int, *plugins: Plugin) -> None:
+    with closing(World(Physics(dimensions=dimensions), Rotation(), *plugins)) as world:
         for collider in (SphereCollider(0.5), BoxCollider(0.5)):
             world.create_entity(Transform((0.0,) * dimensions), RigidBody(), Spin(), collider)
+        if terrain.plugin in plugins and dimensions == 2:
+            terrain.create_chain(world, [(-1.0, -9.0), (1.0, -9.0)])
+        elif terrain.plugin in plugins:
+            terrain.create_height_field(world, np.zeros((2, 2)), 1.0)
         world.prepare()
 
 

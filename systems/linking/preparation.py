@@ -56,7 +56,7 @@ def kind_of(scene: Scene, integration: Integration, program: Program) -> Kind:
     conditions = frozenset(("", "dynamic bodies", *integration.stages_possible, *extensions))
     if extensions:
         conditions |= {NEEDED}
-    if scene.state.solver.joints.count > 0:
+    if any(plugin.name == "joints" for plugin in registry.plugins):  # which may come at any time
         conditions |= {"joints", "colliders or joints"}
     if scene.state.parts.count > 0:
         conditions |= {"parts"}

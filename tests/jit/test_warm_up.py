@@ -74,6 +74,7 @@ def names_of_work(monkeypatch, *arguments):
     monkeypatch.setattr(warm_up, "prepare_built_in", lambda d: done.append(d))
     monkeypatch.setattr(warm_up, "prepare_shipped_plugins", lambda d: done.append(f"plugins {d}"))
     monkeypatch.setattr(warm_up, "prepare_rotation", lambda d: done.append(f"spins {d}"))
+    monkeypatch.setattr(warm_up, "prepare_joints", lambda d: done.append(f"joints {d}"))
     monkeypatch.setattr(warm_up, "_prepare_scene", lambda loaded: done.append(loaded.name))
     result = CliRunner().invoke(cli, ["warm-up", *arguments])
     assert result.exit_code == 0, result.stderr
@@ -81,12 +82,13 @@ def names_of_work(monkeypatch, *arguments):
 
 
 def test_what_is_to_be_compiled_can_be_chosen(monkeypatch):
-    everything = [2, "plugins 2", "spins 2", 3, "plugins 3", "spins 3"]
+    flat = [2, "plugins 2", "spins 2", "joints 2"]
+    everything = [*flat, 3, "plugins 3", "spins 3", "joints 3"]
     assert names_of_work(monkeypatch) == everything
-    assert names_of_work(monkeypatch, "--dimensions", "3") == [3, "plugins 3", "spins 3"]
+    assert names_of_work(monkeypatch, "--dimensions", "3") == everything[4:]
     assert names_of_work(monkeypatch, "jump", "gas2d") == ["jump", "gas2d"]
-    flat = [name for name in scenes.names() if scenes.get(name).dimensions == 2]
-    assert names_of_work(monkeypatch, "--all", "--dimensions", "2") == [2, "plugins 2", "spins 2", *flat]
+    planar = [name for name in scenes.names() if scenes.get(name).dimensions == 2]
+    assert names_of_work(monkeypatch, "--all", "--dimensions", "2") == [*flat, *planar]
     assert names_of_work(monkeypatch, "--all") == [*everything, *scenes.names()]
 
 
