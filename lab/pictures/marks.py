@@ -94,6 +94,14 @@ def draw_contacts(sheet: Sheet, points: Floats, normals: Floats, diameter: float
     return True
 
 
+def draw_joints(sheet: Sheet, ends: Floats, projection: Projection) -> None:
+    """A line between both anchors (n, 2, d) of each joint, with a dot at either."""
+    places, _, _ = projection.plane(ends)
+    _lines(sheet, list(places), colors=canvas.MUTED, linewidths=1.2, zorder=3.5)
+    dots = places.reshape(-1, 2)
+    sheet.axes.plot(dots[:, 0], dots[:, 1], "o", color=canvas.MUTED, ms=2.0, mew=0, zorder=3.5)
+
+
 def draw_arrows(sheet: Sheet, bodies: Shapes, velocity: Floats, projection: Projection, top_speed: float) -> float:
     """Velocity arrows of the visible bodies; returns how many seconds an arrow stands for (0: none)."""
     start, _, depth = projection.plane(bodies.centre)

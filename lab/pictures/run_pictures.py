@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import to_rgba_array
 
+from ...plugins.joints import Joints
 from ..measure.body_shapes import QUIET, Floats, Shapes, shapes_of
 from ..measure.paths import Traces
 from ..measure.run import Run
 from ..reporting.text import counted
 from . import canvas
 from .canvas import Sheet
-from .marks import draw_arrows, draw_bodies, draw_contacts, draw_paths, draw_walls
+from .marks import draw_arrows, draw_bodies, draw_contacts, draw_joints, draw_paths, draw_walls
 from .projection import Projection
 
 CROWD_3D = 500  # untraced bodies that would hide the paths behind them
@@ -27,12 +28,14 @@ HUGE = 5.0  # times the extent of everything smaller: such static bodies are cli
 
 @dataclass(frozen=True)
 class Still:
-    """What is drawn, as arrays: all colliders, their velocities (n, d), contact points and normals (m, d)."""
+    """What is drawn, as arrays: all colliders, their velocities (n, d), contact points, normals (m, d), and both ends
+    of the joints (k, 2, d)."""
 
     shapes: Shapes
     velocity: Floats
     points: Floats
     normals: Floats
+    joints: Floats
 
     @classmethod
     def of(cls, run: Run) -> Still:
@@ -45,7 +48,8 @@ class Still:
         velocity = np.asarray(world.bodies.linear_velocity)[row] if len(ids) else np.zeros((0, d))
         contacts = world.contacts
         points, normals = (np.array(c, float).reshape(-1, d) for c in (contacts.point, contacts.normal))
-        return cls(shapes, velocity, points, normals)
+        ends = [np.stack(one.anchors(), axis=1) for one in world.plugins if isinstance(one, Joints)]
+        return cls(shapes, velocity, points, normals, np.concatenate([np.zeros((0, 2, d)), *ends]))
 
     @property
     def moving(self) -> np.ndarray:
@@ -121,6 +125,7 @@ def draw_final(run: Run, still: Still, projection: Projection, frame: canvas.Vie
     sheet = Sheet.new(report.scene, subtitle, frame, numbered=projection.flat)
     draw_walls(sheet, shapes.where(shapes.static), projection)
     draw_bodies(sheet, bodies, canvas.SPEED(norm(bodies.speed)), projection)
+    draw_joints(sheet, still.joints, projection)
     drawn = draw_contacts(sheet, still.points, still.normals, bodies.typical_diameter, projection)
     seconds = draw_arrows(sheet, bodies, velocity, projection, float(norm.vmax or 1.0))
     legend = [(r"$\rightarrow$", canvas.TEXT, f"the way in {seconds:.2g} s")] if seconds else []
@@ -153,6 +158,7 @@ def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.Vi
     if 0 < count <= FEW or (count and traces.impacts is not None):
         _draw_ghosts(sheet, traces, followed, own, projection)
     draw_bodies(sheet, followed, own, projection)
+    draw_joints(sheet, still.joints, projection)
     if traces.impacts:
         points, normals = (np.array([getattr(one, name) for one in traces.impacts]) for name in ("point", "normal"))
         draw_contacts(sheet, points, normals, followed.typical_diameter, projection)

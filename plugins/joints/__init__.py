@@ -16,7 +16,7 @@ from ...systems.tracking import BEFORE_STEP
 from .arms import arm_of, moment
 from .joint import WORLD, Changes, Driven, Joint, Place, Row
 from .kinds import KINDS, Ball, Cone, Distance, Hinge, Motor, MousePull, Slider, Weld, Wheel
-from .measures import Holds, holds, measure, moving
+from .measures import Holds, anchors, holds, measure, moving
 
 # What rows are known by, and what they keep from step to step.
 KEY = ("joint", "kind", "rule", "entity_a", "entity_b")
@@ -107,6 +107,10 @@ class Joints(Plugin):
             self._holds = holds(self._joints.values())
         value, speed = self._measure(list(self._joints), self._holds)
         return columns | {"value": value, "speed": speed}
+
+    def anchors(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n, d) where the anchors of all joints are, on each a and on each b: to draw ropes and hinges."""
+        return anchors(self._physics.table, self._joints.values())
 
     def _done(self) -> dict[str, np.ndarray]:
         """What the joints have done in the last step."""

@@ -109,6 +109,16 @@ def holds(joints: Collection[Joint]) -> list[Holds]:
     return [Holds(function, *map(np.array, zip(*rows, strict=True))) for function, rows in kinds.items()]
 
 
+def anchors(table: Any, joints: Collection[Joint]) -> tuple[np.ndarray, np.ndarray]:
+    """(n, d) where the anchors of these joints are, on each a and on each b."""
+    ends = []
+    for body, at in (("a", "at_a"), ("b", "at_b")):
+        bodies = moving(table, np.array([getattr(joint, body) for joint in joints], np.int64))
+        local = np.array([getattr(joint, at) for joint in joints]).reshape(-1, table.dimensions)
+        ends.append(bodies.position + bodies.turned(local))
+    return ends[0], ends[1]
+
+
 def measure(table: Any, found: list[Holds], count: int) -> tuple[np.ndarray, np.ndarray]:
     """(count,) values, in m or rad, 0 of what has none, and their changes per second."""
     value, speed = np.zeros(count), np.zeros(count)

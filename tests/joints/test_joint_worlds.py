@@ -543,6 +543,11 @@ def test_columns_have_values_and_the_speeds_at_which_these_change(d):
     assert after["entity"].tolist() == entities
     for key in ("value", "speed"):
         np.testing.assert_array_equal(after[key], [getattr(joints.state(entity), key) for entity in entities])
+    ends_a, ends_b = joints.anchors()
+    apart = np.linalg.norm(ends_b - ends_a, axis=1)
+    np.testing.assert_allclose(apart[[0, 6]], after["value"][[0, 6]], rtol=1e-12)
+    held = [k for k, joint in enumerate(made) if isinstance(joint, Hinge | Weld | Ball | Cone)]
+    assert apart[held].max() < 1e-3
     exact = np.array([isinstance(joint, Distance | Hinge | Slider) for joint in made])  # others let their axis go
     change = (after["value"] - before["value"]) / 1e-4
     np.testing.assert_allclose(change[exact], after["speed"][exact], rtol=1e-3, atol=1e-3)
