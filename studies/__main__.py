@@ -16,7 +16,7 @@ from carom.lab.cli.usage_errors import Problem, did_you_mean
 from carom.lab.reporting.progress import Progress
 from carom.lab.reporting.text import TextTable
 
-from . import ladder, scaling, settings, spins, startup
+from . import joints, ladder, scaling, settings, spins, startup
 from .accuracy import accuracy_command
 from .limits import tables as limits
 from .page import between_marks, into_option, show
@@ -59,6 +59,7 @@ def _draw_limits(result: Result, folder: Path) -> Path:
 
 
 STUDIES = {
+    "joints": Study("What substeps and shorter steps buy joints, and what they cost.", joints.axes, joints.report, 5),
     "ladder": Study("What each feature costs, switched on alone.", ladder.axes, ladder.report, 5),
     "limits": Study(
         "Where carom fails: one quantity at a time, until the error passes 1 % and 10 %, and until it breaks.",
