@@ -347,13 +347,13 @@ def scenarios() -> Iterator[tuple[str, Callable[[], list[str]]]]:
         yield f"thrown {method}", lambda k=k, method=method: play(mixed(3 - k % 2, "discrete", 4, integrator=method), 5)
     for d, mode in ((2, MODES[0]), (3, MODES[2])):
         yield f"break shot {d}D {mode}", lambda d=d, mode=mode: play(break_shot(d, mode), 5)
-    for d in (2, 3):
+    for d in (2, 3):  # fewer steps in space, where each costs Python much more
         yield f"buried {d}D", lambda d=d: play(buried(d), 3)
         yield f"heavy on light {d}D", lambda d=d: play(heavy_on_light(d), 2)
         yield f"asked {d}D", lambda d=d: asked(d)
-        yield f"tumbling {d}D", lambda d=d: play(tumbling(d, MODES[d - 2]), 9)
-        yield f"joined {d}D", lambda d=d: play(joined(d, MODES[0]), 8)
-        yield f"ground {d}D", lambda d=d: play(ground(d, MODES[d - 2]), 5)
+        yield f"tumbling {d}D", lambda d=d: play(tumbling(d, MODES[d - 2]), 15 - 3 * d)
+        yield f"joined {d}D", lambda d=d: play(joined(d, MODES[0]), 14 - 3 * d)
+        yield f"ground {d}D", lambda d=d: play(ground(d, MODES[d - 2]), 9 - 2 * d)
     for d, mode in zip((2, 3, 2), MODES, strict=True):
         yield f"sleepers {d}D {mode}", lambda d=d, mode=mode: sleepers(d, mode)
 

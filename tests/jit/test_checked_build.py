@@ -21,10 +21,8 @@ from carom.framework.compilation import log
 print(world.state_hash(), len(log.compiled), log.loaded)
 """
 POISON = "import runpy; runpy.run_module('tests.helpers_poison', run_name='__main__')"
-EXTREMES = (
-    "laws/test_bounded.py", "laws/test_containment.py::test_nothing_leaves_a_room_at_any_speed",
-    "contacts/test_caught.py", "impacts/test_continuous_extremes.py", "world/test_extremes.py",
-)  # fmt: skip
+EXTREMES = "contacts/test_caught.py", "impacts/test_continuous_extremes.py", "world/test_extremes.py"
+LAWS = "laws/test_bounded.py", "laws/test_containment.py::test_nothing_leaves_a_room_at_any_speed"
 TESTS = """
 import pytest, sys
 class Flat:
@@ -64,7 +62,8 @@ def test_no_kernel_leaves_its_arrays(folder):
     assert run_checked(folder, POISON, 8, "2D") == ""
 
 
-def test_extremes_and_random_worlds_stay_in_their_arrays(folder):
+@pytest.mark.parametrize("names", [EXTREMES, pytest.param(LAWS, marks=pytest.mark.long)], ids=["extremes", "laws"])
+def test_extremes_and_random_worlds_stay_in_their_arrays(folder, names):
     """Gravity, masses, sizes and speeds far apart, caught bodies, bodies that come and go, scattered shapes."""
-    files = [Path(__file__).parents[1] / name for name in EXTREMES]
+    files = [Path(__file__).parents[1] / name for name in names]
     assert " passed" in run_checked(folder, TESTS, *files)
