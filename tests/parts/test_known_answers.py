@@ -124,6 +124,47 @@ def test_free_collisions_keep_momentum_and_energy(mode):
     assert angular_momentum(world, bodies) == pytest.approx(turning, rel=1e-11)
 
 
+@pytest.mark.plain
+def test_exact_flights_do_not_depend_on_the_step():
+    """Also where parts of one body are struck one after the other within a step, which turns all of it each time."""
+    ends = []
+    for rate in (4, 120):
+        world, parts = parts_world(collision="event_driven", dt=1 / rate)
+        body = piece(world, parts, (0, 0), U, spin=1.5, restitution=1.0)[0]
+        balls = [
+            world.create_entity(Transform(place), RigidBody(0.3, velocity), SphereCollider(0.1, restitution=1.0))
+            for place, velocity in (
+                ((-2.0, 0.4), (5.0, 0.0)), ((1.9, 0.3), (-4.0, 0.0)),
+                ((0.2, -2.0), (0.0, 6.0)), ((0.1, 3.0), (0.0, -8.0)),
+            )
+        ]  # fmt: skip
+        run(world, rate // 2)
+        spin = world.component_for_entity(body, Spin).angular_velocity
+        ends.append([*at(world, body).position, spin, *(body_of(world, ball).linear_velocity[1] for ball in balls)])
+        assert np.abs(ends[-1][3:]).min() > 0.1  # each has struck it
+    assert ends[0] == pytest.approx(ends[1], abs=1e-5)
+
+
+@pytest.mark.plain
+def test_what_bounces_on_a_part_of_what_rests_finds_it_at_rest():
+    world, parts = parts_world((0, -G))
+    floor(world, friction=0.5)
+    boxes = ((0, 1.0), (1.0, 0.1), 1e6), ((-0.8, 0.45), (0.1, 0.45), 1e6), ((0.8, 0.45), (0.1, 0.45), 1e6)
+    legs = (boxes[1], boxes[2], boxes[0])  # the top is a part
+    own = ((0.0, 0.0), legs[0][1], 1e6)
+    table = piece(
+        world, parts, legs[0][0], (own, *(((x + 0.8, y - 0.45), half, m) for (x, y), half, m in legs[1:])), friction=0.5
+    )  # fmt: skip
+    run(world, 30)
+    ball = world.create_entity(Transform((0.3, 2.0)), RigidBody(), SphereCollider(0.1, restitution=1.0))
+    fell = 2.0 - 1.2
+    while body_of(world, ball).linear_velocity[1] <= 0.0:
+        world.step()
+    now = body_of(world, ball).linear_velocity[1] ** 2 / 2 + G * (at(world, ball).y - 1.2)
+    assert now == pytest.approx(G * fell, rel=0.02)
+    assert at(world, table[0]).rotation == pytest.approx(0.0, abs=1e-4)
+
+
 @pytest.mark.parametrize("mode", MODES)
 def test_free_collisions_in_space(mode):
     random = np.random.default_rng(7)
