@@ -46,10 +46,11 @@ class Parts(Plugin):
         self._record: Any = physics.record(PARTS)
         self._contents = world._contents()
         self._physics.adoption.register((PartOf,))
-        self._seen: Any = None  # what the record depends on,
-        self._followed: Any = None  # and what of that concerns more than the order of rows
-        self._known: dict[int, tuple[int, float]] = {}  # of the parts: their body, and what they have added to its mass
-        self._any_static = False
+        self._seen: Any = None  # what all of this depends on
+        self._followed: Any = None  # of the parts when they were followed last: entities, fields, and what all share
+        self._places: dict[int, Place] = {}
+        self._added: dict[int, tuple[int, float]] = {}  # to which body, and how much of its mass
+        self._generation, self._any_static = self._table.generation, False
         self._rows: Any = ()  # of the parts and of their bodies
         world.events.define("part_lost")
         self._physics.extensions.adopters.append(self._follow)
@@ -95,13 +96,13 @@ class Parts(Plugin):
 
     def saved(self, world: Any) -> Any:
         """The parts that have been followed, and what they have added to their bodies."""
-        holders, added = zip(*self._known.values(), strict=True) if self._known else ((), ())
-        return {"entity": list(self._known), "holder": list(holders), "added": list(added)}
+        holders, added = zip(*self._added.values(), strict=True) if self._added else ((), ())
+        return {"entity": list(self._added), "holder": list(holders), "added": list(added)}
 
     def take_back(self, world: Any, saved: Any) -> None:
         """Go on from there."""
-        known = zip(saved["holder"], saved["added"], strict=True)
-        self._known, self._seen = dict(zip(saved["entity"], known, strict=True)), None
+        added = zip(saved["holder"], saved["added"], strict=True)
+        self._added, self._places, self._seen = dict(zip(saved["entity"], added, strict=True)), {}, None
 
     # -- what has changed -------------------------------------------------------------------------
 
@@ -112,46 +113,56 @@ class Parts(Plugin):
         statics = table.static_version if self._any_static else 0
         return self._contents.log.rounds, table.version, table.members_version, statics, Changes.count, inside
 
-    def _look(self) -> tuple[Any, list[int], list[int]]:
-        """(another value whenever parts may have to be followed, their entities in order, what they are parts of)."""
+    def _look(self) -> tuple[Any, Any, Any]:
+        """(the entities of the parts in order, their fields (n, k) as bits, what all depend on)."""
         table = self._table
         rows = np.flatnonzero(table.has_mask(PartOf)[: table.count])
         rows = rows[np.argsort(table.column("entity")[rows])]
-        ids, columns = table.column("entity")[rows], [table.column(f"part_of.{name}")[rows] for name in FIELDS]
-        bodies = columns[0]
-        of = table.rows_of(bodies)
+        fields = [table.column(f"part_of.{name}")[rows] for name in (*FIELDS, "added", "holder")]
+        of = table.rows_of(fields[0])
         kinds = np.where(of < 0, -1, np.searchsorted(table.stops, of, side="right"))
-        values = *(column.tobytes() for column in (ids, kinds, *columns)), table.members_version
         statics = table.static_version if self._any_static else 0
-        return (*values, statics), ids.tolist(), bodies.tolist()
+        bits = np.column_stack((*fields, kinds)).astype(float).view(np.int64)
+        return table.column("entity")[rows], bits, (table.members_version, statics)
+
+    def _find_changed(self) -> tuple[list[int], list[int], dict[int, int]]:
+        """(parts to be followed, parts that are none any more, the body of each as it is given)."""
+        ids, bits, shared = self._look()
+        bodies = self._table.column("part_of.body")[self._table.rows_of(ids)]
+        same = np.zeros(len(ids), bool)
+        if self._seen is not None and shared == self._followed[2] and len(self._followed[0]):
+            before, known, _ = self._followed
+            at = np.minimum(before.searchsorted(ids), len(before) - 1)
+            same = (before[at] == ids) & (known[at] == bits).all(axis=1) & ~np.isin(bodies, ids)
+        gone = np.setdiff1d(np.fromiter(self._added, np.int64, len(self._added)), ids)
+        return ids[~same].tolist(), gone.tolist(), dict(zip(ids.tolist(), bodies.tolist(), strict=True))
 
     def _follow(self, world: Any) -> None:
         """Which parts there are, where they belong, and what they add to their bodies."""
-        now = self._now()
-        if now == self._seen:
+        if self._now() == self._seen:
             self._place_moved()
             return
-        found, ids, bodies = self._look()
-        if self._seen is not None and found == self._followed:  # rows have moved, no more
-            self._find_rows()
-            self._seen = now
-            self._place_moved()
-            return
-        body_of = dict(zip(ids, bodies, strict=True))
-        places = {entity: self._place(entity, body_of) for entity in ids}
+        if self._generation != self._table.generation:  # ids mean other entities
+            self._generation, self._added, self._places, self._seen = self._table.generation, {}, {}, None
+        changed, gone, body_of = self._find_changed()
+        places = {entity: self._place(entity, body_of) for entity in changed}
         lost = [entity for entity, place in places.items() if self._table.row_of(place.holder) < 0]
-        gone = [(entity, self._contents.entities[entity][PartOf]) for entity in lost]
-        places = {entity: place for entity, place in places.items() if entity not in lost}
+        told = [(entity, self._contents.entities[entity][PartOf]) for entity in lost]
+        for entity in lost:
+            del places[entity]
         for entity, place in places.items():
             self._check(entity, place.holder)
-        self._add_masses(places)
+        self._add_masses(places, [*gone, *lost])
         for entity, place in places.items():
             self._put(entity, place)
-        self._contents.delete(lost)
-        self._physics.adoption.synchronize()
-        self._write(places)
-        self._seen, self._followed = self._now(), self._look()[0]
-        for entity, part in gone:
+        if changed or gone or self._record.count != len(self._places):
+            self._contents.delete(lost)
+            self._physics.adoption.synchronize()
+            self._write(places, [*gone, *lost])
+        self._find_rows()
+        self._place_moved()
+        self._seen, self._followed = self._now(), self._look()
+        for entity, part in told:
             world.events.dispatch("part_lost", entity, part)
 
     def _place(self, entity: int, body_of: dict[int, int]) -> Place:
@@ -181,25 +192,25 @@ class Parts(Plugin):
             if issubclass(component, Collider) and np.any(components[component].offset):
                 raise ValueError(f"entity {entity}: {component.__name__}.offset: give PartOf.position instead")
 
-    def _add_masses(self, places: dict[int, Place]) -> None:
-        """What parts add to the masses of their bodies, and no more what others have added."""
-        before, now = self._known, {}
-        for entity, place in places.items():
-            part = self._contents.entities[entity][PartOf]
+    def _add_masses(self, places: dict[int, Place], gone: list[int]) -> None:
+        """What these add to the masses of their bodies, and no more what others have added."""
+        for entity in gone:
+            holder, mass = self._added.pop(entity, (0, 0.0))
+            self._add(holder, -mass)
+            if entity in self._contents.entities and PartOf not in self._contents.entities[entity]:
+                self._release(entity, holder, mass)
+        for entity, (holder, _) in places.items():
+            part, (before, added) = self._contents.entities[entity][PartOf], self._added.get(entity, (0, 0.0))
             mass = part.mass
-            now[entity] = place.holder, (0.0 if self._is_sensor(entity) else 1.0) if mass is None else mass
-        for entity, (holder, mass) in before.items():
-            if now.get(entity, (0, 0.0))[0] != holder:
-                self._add(holder, -mass)
-                if entity not in now and entity in self._contents.entities:
-                    self._release(entity, holder, mass)
-        for entity, (holder, mass) in now.items():
-            old, added = before.get(entity, (0, 0.0))
-            self._add(holder, mass - added if old == holder else mass)
-            part = self._contents.entities[entity][PartOf]
+            if mass is None:
+                mass = 0.0 if self._is_sensor(entity) else 1.0
+            if before != holder:
+                self._add(before, -added)
+                added = 0.0
+            self._add(holder, mass - added)
             _set(part, "added", mass)
             _set(part, "holder", holder)
-        self._known = now
+            self._added[entity] = holder, mass
 
     def _add(self, body: int, mass: float) -> None:
         """A body becomes heavier or lighter, as long as something is left."""
@@ -260,16 +271,20 @@ class Parts(Plugin):
             if (rotation[rows] != turned).any():
                 rotation[rows] = turned
 
-    def _write(self, places: dict[int, Place]) -> None:
+    def _write(self, places: dict[int, Place], gone: list[int]) -> None:
         """The record of the parts."""
         record, d = self._record, self._physics.dimensions
-        record.reserve(max(len(places), 1), *record.columns())
-        record.count, record.rows_version = len(places), -1
-        for k, (entity, place) in enumerate(places.items()):
-            record.entity[k], record.body[k] = entity, place.holder
-            record.mass[k] = self._known[entity][1]
-            record.turn[k] = (place.pose.rotation, 0.0, 0.0, 0.0) if d == 2 else place.pose.rotation
-        self._find_rows()
+        for entity in gone:
+            self._places.pop(entity, None)
+        self._places = dict(sorted({**self._places, **places}.items()))
+        count = record.count = len(self._places)
+        record.reserve(max(count, 1), *record.columns())
+        record.rows_version = -1
+        record.entity[:count] = list(self._places)
+        record.body[:count] = [place.holder for place in self._places.values()]
+        record.mass[:count] = [self._added[entity][1] for entity in self._places]
+        turns = np.reshape([place.pose.rotation for place in self._places.values()], (count, 1 if d == 2 else 4))
+        record.turn[:count, : turns.shape[1]] = turns
 
     def _find_rows(self) -> None:
         """The rows of the parts and of their bodies."""

@@ -192,6 +192,14 @@ def test_plain_esper_calls_and_bulk_creation_make_parts():
     esper.delete_entity(part)
     world.step()
     assert body_of(world, body).mass == 2.0
+    esper.clear_database()
+    first = esper.create_entity(Transform((0, 0)), RigidBody(5.0), SphereCollider(0.5))
+    assert first == body
+    world.step()
+    assert (body_of(world, first).mass, parts.of(first)) == (5.0, [])
+    esper.create_entity(PartOf(first, (1, 0), mass=2.0), SphereCollider(0.5))
+    world.step()
+    assert body_of(world, first).mass == 7.0
     esper.switch_world("default")
 
 
