@@ -120,6 +120,7 @@ class Simulation:
         self.contacts_before: Any = None  # contacts that no RESPONSE has replaced, at the start of the step
         self._generation = self.table.generation
         self.take_deferred = self.contacts.take_deferred
+        self.settled = lambda: self.adoption.settled() and not self.extensions.adopters  # no plugin moves bodies
 
     @property
     def systems(self) -> tuple[System, ...]:
@@ -145,10 +146,6 @@ class Simulation:
         self.state.gravity = self.gravity[None].copy()
 
     # -- a step -----------------------------------------------------------------------------------
-
-    def settled(self) -> bool:
-        """Whether the table is in step with esper, and no plugin moves bodies between steps."""
-        return self.adoption.settled() and not self.extensions.adopters
 
     def synchronize(self) -> None:
         """Bring the table in step with esper."""

@@ -107,7 +107,7 @@ class Adoption:
         """
         if self.settled():
             return False
-        self._complete()
+        self._contents.complete(self.table.dimensions)
         changes = self._find_changes()
         self._check(changes)
         self._apply(changes)
@@ -176,15 +176,6 @@ class Adoption:
         return set().union(*(entities for c, (entities, _) in by_type.items() if self._archetype((c,)).partner))
 
     # -- what has changed -------------------------------------------------------------------------
-
-    def _complete(self) -> None:
-        """Entities get what their components bring with them."""
-        members = self._contents.members
-        for component in [component for component in members if getattr(component, "brings", None)]:
-            for entity in sorted(self._log.touched.intersection(members[component])):
-                for other, values in component.brings.items():
-                    if other not in self._contents.components_of(entity):
-                        self._contents.add(entity, other(**values(self.table.dimensions)))
 
     def _archetype(self, types: tuple[Any, ...]) -> Archetype:
         known = self._archetypes.get(types)

@@ -179,13 +179,18 @@ class Contents:
             self.forget_queries()
         return range(first, first + count)
 
-    def add(self, entity: int, component: Any) -> None:
-        """What esper.add_component does, for a component that the entity does not have."""
-        if type(component) not in self.members:
-            self.members[type(component)] = ()  # type: ignore[index]
-        self.members[type(component)].add(entity)
-        dict.__getitem__(self.entities, entity)[type(component)] = component
-        self.forget_queries()
+    def complete(self, dimensions: int) -> None:
+        """Entities that have changed get what their components bring with them."""
+        members: Any = self.members
+        for component in [component for component in members if getattr(component, "brings", None)]:
+            for entity in sorted(self.log.touched.intersection(members[component])):
+                for other, values in component.brings.items():
+                    if other not in self.components_of(entity):
+                        if other not in members:
+                            members[other] = ()
+                        members[other].add(entity)  # before the dict, which it may replace
+                        dict.__getitem__(self.entities, entity)[other] = other(**values(dimensions))
+                        self.forget_queries()
 
     def delete(self, entities: Iterable[int]) -> None:
         self.forget_queries()

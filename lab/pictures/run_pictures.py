@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import to_rgba_array
 
+from ...components.part_of import PartOf
 from ...plugins.joints import Joints
 from ..measure.body_shapes import QUIET, Floats, Shapes, shapes_of
 from ..measure.paths import Traces
@@ -151,7 +152,10 @@ def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.Vi
         faint = np.tile(to_rgba_array(UNTRACED), (len(others.entity), 1))
         draw_bodies(sheet, others, faint, projection, zorder=2)
     palette = to_rgba_array(canvas.BODY_COLOURS)
-    colours = palette[np.arange(count) * 5 % len(palette)]  # bodies with consecutive ids get different colours
+    bodies = {entity: part.holder for entity, part in run.world.get_component(PartOf)}  # parts have their colours
+    owners = np.array([bodies.get(entity, entity) for entity in traces.entities.tolist()], np.int64)
+    numbers = np.searchsorted(traces.entities, owners)
+    colours = palette[numbers * 5 % len(palette)]  # bodies with consecutive ids get different colours
     if count and len(traces.positions) > 1:
         draw_paths(sheet, traces.corners, colours, projection)
     own = colours[np.searchsorted(traces.entities, followed.entity)] if count else np.zeros((0, 4))
