@@ -41,11 +41,12 @@ def test_it_hangs_on_its_spring_on_its_axis_and_turns_as_its_motor_can(d):
     turning = float(np.atleast_1d(world.component_for_entity(b, Spin).angular_velocity)[-1])
     assert turning == pytest.approx(2.0 / about * 0.5, rel=1e-3)
     run(world, 300)
-    sag = G / (2.0 * math.pi * 2.0) ** 2
-    place = at(world, b).position
-    assert place[1] == pytest.approx(2.0 - sag, abs=1e-3)
+    omega = 2.0 * math.pi * 2.0
+    sag, place = G / omega**2, at(world, b).position
+    less = omega / 240.0  # of the sag: weight and damping act one after the other in a substep
+    assert (1.0 - less - 0.01) * sag < 2.0 - place[1] < sag
     assert place[::2] == pytest.approx((1.0, 0.5)[: d - 1], abs=1e-3)
-    assert joints.state(entity).value == pytest.approx(-sag, abs=1e-3)
+    assert joints.state(entity).value == pytest.approx(place[1] - 2.0, abs=1e-12)
     spin = np.atleast_1d(world.component_for_entity(b, Spin).angular_velocity)
     assert spin == pytest.approx([4.0] if d == 2 else [0.0, 0.0, 4.0], abs=1e-3)
     wheel.lower = -0.5 * sag
