@@ -157,18 +157,15 @@ class Registry:
     def require(self, component: type[Component], entity: int | None = None) -> None:
         """ValueError if the plugin is missing without which a component does nothing."""
         needed = component.plugin
-        if needed and needed not in (plugin.name for plugin in self.plugins):
-            where = "" if entity is None else f"entity {entity}: "
-            raise ValueError(
-                f"{where}{component.__name__} does nothing without its plugin: "
-                f"World(Physics(...), {needed.capitalize()}()), from carom.plugins.{needed}"
-            )
-        if hasattr(component, "constraint") and component not in self.joints:
-            where = "" if entity is None else f"entity {entity}: "
-            raise ValueError(
-                f"{where}{component.__name__} does nothing without the plugin that has registered it with "
-                f"@plugin.joint: World(Physics(...), Joints(), plugin)"
-            )
+        if not needed:
+            return
+        said = f"{'' if entity is None else f'entity {entity}: '}{component.__name__} does nothing without "
+        holder = next((plugin for plugin in self.plugins if plugin.name == needed), None)
+        if holder is None:
+            plugin = f"its plugin: World(Physics(...), {needed.capitalize()}()), from carom.plugins.{needed}"
+            raise ValueError(said + plugin)
+        if holder.components and component not in (*holder.components, *self.joints):
+            raise ValueError(f"{said}the plugin that registers it with @plugin.joint: World(..., Joints(), plugin)")
 
     def add(self, plugin: Any) -> None:
         """PluginError if something of it is registered already; what it registers later is seen too."""
