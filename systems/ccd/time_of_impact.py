@@ -25,9 +25,8 @@ from ..integration.trajectory import ROUNDING, along, bend_of, first_root, is_st
 from ..integration.turning import is_turned, turn_of_arm
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, sweep
 from ..shapes.tolerances import is_turning, smaller_extent
-from .turning_touch import NEAR, closing_point, touch_of_turning
+from .turning_touch import MOST_STRIDES, NEAR, SHORTER, closing_point, touch_of_turning
 
-MOST_STRIDES = 4096  # looks at concave shapes in a step
 LOOKS = 100  # a graze takes about 30; whatever is still closing in after that counts as touching
 SAFETY_FACTOR, FAR_ROUNDING = 1.001, 1e-12  # more than all rounding: of an extent, of a distance
 CLEAR = 64.0 * ROUNDING  # of the distances in a path: farther off a touch rounding does not turn its normal round
@@ -68,7 +67,7 @@ def first_touch(state, a, b, path, since, until, limits):
     if state.spinning and is_turning(state, until, a, b):
         spins, near = (state.bodies.spin[a], state.bodies.spin[b]), NEAR * smaller_extent(state.bodies, a, b)
         found, (t, normal, point, at), _ = touch_of_turning(
-            state, a, b, path, spins, (since, until), (limits[0], near, limits[2], limits[3])
+            state, a, b, path, spins, (since, until), (limits[0], near, limits[2], limits[3], SHORTER * limits[1])
         )
         # Offsets of colliders stand as where the step ends: seen from there, so that arms are right.
         shift_a = turn_of_arm(scale(spins[0], t - until), state.bodies.offset[a])

@@ -17,14 +17,17 @@ from ...framework.vectors import add, dot, length, row, scale, sub
 from ..integration.trajectory import along, rate_along, travel_of
 from ..integration.turning import arms_to, closing_by_spin, is_turned
 from ..shapes.convex.points import MOST_POINTS, contact_points
-from ..shapes.dispatch import both_convex, evaluate, is_corner_touch
+from ..shapes.dispatch import both_convex, evaluate, has_corner_rule, is_corner_touch
 from ..shapes.poses import turn_shape
-from ..shapes.tolerances import slop_of, way_of_turning
+from ..shapes.tolerances import slop_of, smaller_extent, way_of_turning
 
 LOOKS, EXACT_LOOKS = 250, 60
 NEAR = 1e-6  # of the extent: a smaller gap is a touch; of bodies at rest,
 BESIDE = 0.5  # of the slop
 TILT = 0.1  # rad, between faces that may touch in several points
+MOST_STRIDES = 4096  # looks at shapes whose gap does not tell the next one;
+STRIDE, SHORTER = 0.02, 0.1  # extents between these; of the stride of others: that of a thin box which is turned is
+# the extent of the box around it
 GRAZE = 0.125  # slops: as far as points move between looks at a pair that touches and parts, or after EXACT_LOOKS
 
 
@@ -51,17 +54,21 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
     """(whether they touch; (time, normal, point, from a's centre to b's); gap then) between two times, while they turn
     with those spins; shapes stand as at the second of these. limits: (slop; gap of a touch; speed of approach of the
     point below which a touch is one only if no faster one follows; -inf: any is one, at corners too; by how many grazes
-    they have to be deeper than at the first time; -inf: by none)."""
-    bodies, (spin_a, spin_b), (since, until), (slop, near, threshold, grazes) = state.bodies, spins, times, limits
-    shape_a, shape_b = bodies.shape[a], bodies.shape[b]
+    they have to be deeper than at the first time; -inf: by none; time between looks at a pair with a rule for corners,
+    whose gap holds only as they are turned now: there the touch is bisected)."""
+    bodies, (spin_a, spin_b), (since, until) = state.bodies, spins, times
+    (slop, near, threshold, grazes, stride), shape_a, shape_b = limits, bodies.shape[a], bodies.shape[b]
+    holds = not has_corner_rule(state, shape_a, shape_b)  # its gap, however they are turned meanwhile
+    strides = 0 if holds else int(min(MOST_STRIDES, (until - since) / stride))
+    convex, ends = both_convex(state, shape_a, shape_b), sub(bodies.offset[b], bodies.offset[a])
     turning = way_of_turning(bodies, a, spin_a) + way_of_turning(bodies, b, spin_b)
-    graze = max(GRAZE * slop, (turning * (until - since) + travel_of(path, until)) / (LOOKS - EXACT_LOOKS))
+    way = turning * (until - since) + travel_of(path, until)
+    graze = max(GRAZE * slop, way / (LOOKS - EXACT_LOOKS + strides))
     bend = 2.0 * length(path[2]) + 6.0 * length(path[3]) * until
     corners = threshold < 0.0 or (is_turned(bodies, a) and is_turned(bodies, b))  # of others, too
-    convex, ends = both_convex(state, shape_a, shape_b), sub(bodies.offset[b], bodies.offset[a])
     touch, found, gap = (until, zero_of(state), zero_of(state), zero_of(state)), False, 0.0
-    t, posed, least = since, until, 0.0
-    for look in range(LOOKS):
+    t, posed, least, low, high = since, until, 0.0, since, math.inf
+    for look in range(LOOKS + strides):
         turn_shape(state, a, scale(spin_a, t - posed))
         turn_shape(state, b, scale(spin_b, t - posed))
         posed = t
@@ -70,7 +77,7 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
         w = rate_along(path, t)
         least = max(0.0, depth + grazes * graze) if look == 0 else least
         depth -= least
-        near = max(near, graze) if look == EXACT_LOOKS else near
+        near = max(near, graze) if look == EXACT_LOOKS + strides else near
         fastest, touches = turning + length(w) + bend * (until - t), -depth <= near
         if touches:
             rate = 0.0
@@ -79,13 +86,15 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
             closes = rate < -threshold or (rate < 0.0 and not found)
             if closes and (corners or not is_corner_touch(state, shape_a, a, shape_b, b, d, slop)):
                 touch, found, gap = (t, normal, point, d), True, -depth
-                if rate < -threshold:
-                    break
+                high = t if rate < -threshold else high
         elif convex:
             fastest += max(0.0, -dot(w, normal)) - length(w)
-        if t >= until:
+        low = low if high <= t else t
+        if (holds or (high - low) * fastest <= near) if high < math.inf else t >= until:
             break
         further = t + (max(graze, -depth) if touches else max(-depth - 0.5 * near, 0.5 * near)) / fastest
+        if not holds:
+            further = min(further, t + stride) if high == math.inf else 0.5 * (low + high)
         t = further if further < until else until
     turn_shape(state, a, scale(spin_a, until - posed))
     turn_shape(state, b, scale(spin_b, until - posed))
@@ -100,6 +109,8 @@ def first_touch_of_turn(state, a, b):
     start = sub(bodies.previous_position[b], bodies.previous_position[a])
     travel = sub(sub(bodies.position[b], bodies.position[a]), start)
     path = add(start, sub(bodies.offset[b], bodies.offset[a])), travel, still, still
-    spins, limits = (bodies.turn[a], bodies.turn[b]), (slop, BESIDE * slop, -math.inf, -math.inf)
+    way = length(travel) + length(bodies.turn[a]) * reach_of(bodies, a) + length(bodies.turn[b]) * reach_of(bodies, b)
+    stride = STRIDE * smaller_extent(bodies, a, b) / way if way > 0.0 else 1.0
+    spins, limits = (bodies.turn[a], bodies.turn[b]), (slop, BESIDE * slop, -math.inf, -math.inf, stride)
     found, (share, normal, point, _), gap = touch_of_turning(state, a, b, path, spins, (0.0, 1.0), limits)
     return found, share, gap, normal, point

@@ -111,6 +111,33 @@ def test_nothing_fast_passes_in_swept_worlds(mode):
     world.close()
 
 
+@pytest.mark.parametrize("mode", MODES[1:])
+@pytest.mark.parametrize("e", [0.5, 1.0])
+def test_no_thin_bar_that_spins_passes_waves_or_peaks(e, mode):
+    """250 of up to 500 rad/s, 20 mm thick, 30 steps: their centres stay in front of the line."""
+    random, n = np.random.default_rng(10), 250
+    x = np.linspace(-8.0, 8.0, 17)
+    for k, y in enumerate((0.3 * np.sin(2.0 * x), 0.3 * np.abs(np.mod(x, 2.0) - 1.0))):
+        world = make_world(collision=mode, on_fault="ignore")
+        for column in range(n):
+            create_chain(world, np.stack((x, y), 1), position=(40.0 * column, 0.0), restitution=e, friction=0.5 * k)
+        length, angles = random.uniform(0.3, 1.0, n), random.uniform(0, 6, n)
+        aside = random.uniform(-2, 2, n)
+        high = length * np.abs(np.sin(angles)) + 0.33 + random.uniform(0.001, 0.3, n)
+        velocities = np.stack((random.uniform(-5, 5, n), random.uniform(-20, 0, n)), 1)
+        world.create_entities(
+            n, Transform.many(np.stack((aside + 40.0 * np.arange(n), high), 1), angles),
+            RigidBody.many(linear_velocity=velocities), Spin.many(random.uniform(-500, 500, n)),
+            BoxCollider.many(np.stack((length, np.full(n, 0.01)), 1), restitution=e, friction=0.5 * k),
+        )  # fmt: skip
+        for _ in range(30):
+            world.step()
+        places = world.bodies.dynamic.position
+        along = places[:, 0] - 40.0 * np.arange(n)
+        assert (places[:, 1] > np.interp(along, x, y) - 0.03)[np.abs(along) < 7.9].all()
+        world.close()
+
+
 @each_mode
 def test_a_ball_swings_in_a_parabola_of_many_segments(mode):
     """Without friction the speed is that of the height; and it comes up as high on the other side."""
