@@ -109,7 +109,7 @@ def first_touch_of_turn(state, a, b):
     start = sub(bodies.previous_position[b], bodies.previous_position[a])
     travel = sub(sub(bodies.position[b], bodies.position[a]), start)
     path = add(start, sub(bodies.offset[b], bodies.offset[a])), travel, still, still
-    way = length(travel) + length(bodies.turn[a]) * reach_of(bodies, a) + length(bodies.turn[b]) * reach_of(bodies, b)
+    way = length(travel) + way_of_turning(bodies, a, bodies.turn[a]) + way_of_turning(bodies, b, bodies.turn[b])
     stride = STRIDE * smaller_extent(bodies, a, b) / way if way > 0.0 else 1.0
     spins, limits = (bodies.turn[a], bodies.turn[b]), (slop, BESIDE * slop, -math.inf, -math.inf, stride)
     found, (share, normal, point, _), gap = touch_of_turning(state, a, b, path, spins, (0.0, 1.0), limits)

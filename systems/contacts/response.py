@@ -75,8 +75,8 @@ class Response(StagedSystem):
         ),
         Stage(put_back, "where the resting bodies are at the end", ("solver",), MOTION, EITHER, REST),
         Stage(
-            resolve_static_penetration, "what the solver has pushed into or through what cannot be moved is put back",
-            ("pairs",), MOTION, "colliders", REST,
+            resolve_static_penetration, "what is in what cannot be moved, or through it, as that turns or the solver "
+            "has pushed, is put back", ("pairs",), MOTION, "colliders", NEAR,
         ),
         Stage(
             carry_parts, "parts go where contacts have sent and turned their bodies", MOTION, (*MOTION, "rotation"),

@@ -1,6 +1,8 @@
 """What cannot be moved has the last word: where the solver has pushed a body into it, or through it, the body is put
 back, and loses the speed that leads there.
 
+So is what a turning thing has struck and then turned into, within the step.
+
 The solver knows contacts as planes where the step starts, and shares what its passes leave undone among all of them.
 So a light body between two heavy ones may be shot through a wall that is none of its contacts, or pressed into one a
 little deeper in each step, until it is nearer to the other side.
@@ -8,23 +10,43 @@ little deeper in each step, until it is nearer to the other side.
 
 from __future__ import annotations
 
+import math
+
 from ...framework.compilation import part
-from ...framework.vectors import add_scaled, dot, item, length, sub
+from ...framework.vectors import add, add_scaled, dot, item, length, scale, sub
 from ..ccd.search_bounds import FAST, turns_far
+from ..ccd.turning_touch import first_touch_of_turn
 from ..codes import OK
 from ..compounds.rows import next_row, owner_of
 from ..impacts.impulses import STOPPED
 from ..integration.trajectory import along, path_of
+from ..integration.turning import turn_of_arm
 from ..narrow_phase.manifolds import centre_offset, deepest_possible, evaluate_pair
 from ..narrow_phase.stages import is_solid_pair, layers_meet
 from ..shapes.tolerances import SAME_PLACE, smaller_extent
 from .approach import first_touch_on_segment, segment_start
 from .bodies import note_squeezed
 
+QUARTER = 0.5 * math.pi  # rad: what turns farther shows its other side
 ALLOWED = 0.05  # of the extent: overlap with what cannot be moved; what was deeper may stay so
 NO_PAIR = -1
 ROUNDS = 4  # over what a body in a corner touches; the last one is for what stands still alone
 KNOWN = 0.05  # of the extent: so far around its foreseen motion the neighbours of a body are known
+
+
+@part
+def depth_on_side_of_touch(state, a, b, d):
+    """(depth, normal) of a pair of which one body turns far, on the side on which they have first touched: something
+    thin may have turned past the middle of what it pushes."""
+    bodies, out = state.bodies, state.bodies.min_extent[a] + state.bodies.min_extent[b]
+    _, depth, normal, _ = evaluate_pair(state, a, b, d)
+    touches, share, _, way, _ = first_touch_of_turn(state, a, b)
+    left = scale(bodies.turn[a] if bodies.inverse_mass[b] > 0.0 else bodies.turn[b], 1.0 - share)
+    way = add(way, turn_of_arm(left, way))
+    if not touches or length(left) > QUARTER or dot(way, normal) >= 0.0:
+        return depth, normal
+    _, depth, normal, _ = evaluate_pair(state, a, b, add_scaled(d, way, out))
+    return depth + out * dot(way, normal), normal
 
 
 @part
@@ -36,7 +58,7 @@ def how_deep(state, c, a, b):
     way, allowed = length(travel), ALLOWED * extent
     found, depth, normal = False, 0.0, travel
     if state.spinning and turns_far(state, a, b):  # where it started says nothing of the shapes at the end
-        _, depth, normal, _ = evaluate_pair(state, a, b, d)
+        depth, normal = depth_on_side_of_touch(state, a, b, d)
         return depth - allowed, normal
     if way > FAST * extent:
         found, gap, normal = first_touch_on_segment(state, a, b, start, travel, FAST * extent)
@@ -81,6 +103,15 @@ def is_moved_by_solver(state, i):
 
 
 @part
+def may_have_sunk(state, c, i):
+    """Whether body i of pair c may be deeper than it may: the solver has moved it, or what has struck it turns on."""
+    if is_moved_by_solver(state, i):
+        return True
+    struck = state.spinning and state.pairs.impulse[c] > 0.0 and state.bodies.impact_count[i] < STOPPED
+    return struck and turns_far(state, state.pairs.a[c], state.pairs.b[c])
+
+
+@part
 def is_astray(state, i, dt):
     """Whether body i is where its neighbours are not known."""
     bodies = state.bodies
@@ -107,14 +138,14 @@ def keep_out_of_all(state, i):
 def resolve_static_penetration(state, dt):
     """Put the bodies that the solver has moved out of what cannot be moved."""
     pairs, bodies = state.pairs, state.bodies
-    if state.solver.contacts == 0 and not state.any_warm_started:
+    if state.solver.contacts == 0 and not state.any_warm_started and not (state.spinning and state.impacts.logged > 0):
         return OK
     for turn in range(ROUNDS):
         first, moved = state.moving if turn == ROUNDS - 1 else state.dynamic, False
         for c in range(pairs.count):
             a, b = pairs.a[c], pairs.b[c]
             fixed, i = max(a, b), min(a, b)  # dynamic rows come first
-            if not (fixed >= first and i < state.dynamic and pairs.is_solid[c] and is_moved_by_solver(state, i)):
+            if not (fixed >= first and i < state.dynamic and pairs.is_solid[c] and may_have_sunk(state, c, i)):
                 continue
             far = keep_out(state, c, a, b)
             moved |= far > 0.0

@@ -175,6 +175,8 @@ def closing_speed(state, a, b, path, touch, kind, dt):
     if impacts.sweeps:  # else a plastic impact would be one again, by a rounding error
         rounding = ROUNDING * (length(bodies.path_velocity[a]) + length(bodies.path_velocity[b]))
     if not speed < -(threshold + rounding):  # a contact at rest
+        if state.spinning and not speed < -ROUNDING * turning_travel(state, 1.0, a, b):  # it has landed
+            return NONE, speed
         return HAND_OVER if passes_unseen(state, a, b, path, touch, dt) else NONE, speed
     slides = kind == SWEPT and (bodies.warm_started[a] or bodies.warm_started[b])
     if has_corner_rule(state, bodies.shape[a], bodies.shape[b]):  # what turns reaches the edge by that as well

@@ -326,6 +326,35 @@ def test_a_flipper_throws_the_ball_wherever_it_lies(mode, e):
             assert fastest > 0.85 * 15.0 * where
 
 
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize(("half", "r", "w"), [(0.1, 0.2, 15.0), (0.05, 0.1, 25.0), (0.02, 0.05, 20.0)])
+def test_no_flipper_passes_the_ball_that_it_throws(half, r, w, mode):
+    """Wherever that lies, and though it turns in a step by several times their thickness farther out: the ball is on
+    its face, a twentieth of its width deep at most, as long as it is beside it."""
+    c, s, up = math.cos(-0.4), math.sin(-0.4), half + r + 0.01
+    for where in (0.4, 0.8, 1.1, 1.4, 1.8):
+        with World(
+            Physics(2, gravity=(0, -G)), Rotation(), settings=Settings(collision=mode, on_fault="ignore")
+        ) as world:
+            flipper = world.create_entity(
+                Transform((0, 0), -0.4), RigidBody(kind="kinematic"), Spin(0.0), BoxCollider((1, half), offset=(1, 0))
+            )
+            entity = world.create_entity(
+                Transform((where * c - s * up, where * s + c * up)), RigidBody(), SphereCollider(r)
+            )
+            world.step()
+            spin, fastest = world.component_for_entity(flipper, Spin), 0.0
+            spin.angular_velocity = w
+            for _ in range(5):
+                world.step()
+                angle = world.component_for_entity(flipper, Transform).rotation
+                x, y = world.component_for_entity(entity, Transform).position
+                fastest = max(fastest, world.component_for_entity(entity, RigidBody).linear_velocity[1])
+                along, above = math.cos(angle) * x + math.sin(angle) * y, math.cos(angle) * y - math.sin(angle) * x
+                assert above > half + r - 0.11 * r or not 0 < along < 2
+            assert fastest > 0.95 * w * where
+
+
 @pytest.mark.parametrize("e", [0.0, 0.4])
 @pytest.mark.parametrize("seed", range(2))
 def test_a_bin_of_spinning_discs_comes_to_rest_and_never_gains(seed, e):

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from ....framework.compilation import part
 from ....framework.vectors import add, dot, sub
+from ...ccd.search_bounds import turns_far
 from ...integration.turning import is_turned
 from ..approach import centre_offset, centre_offset_at_start
 from ..constants import ALONG, IDLE, LOAD, OPEN, UNREACHED
-from .rows import closing_speed, room_of
+from .rows import closing_speed, room_of, way_by_turns
 
 
 @part
@@ -56,7 +57,10 @@ def choose_hard(state, dt, nothing, arms):
             any_hard |= hard
             any_apart |= hard and solver.apart[k]
             if hard and solver.apart[k]:
-                solver.gap[k] = max(0.0, solver.gap[k])  # faces that meet in the end do not overlap at the start
+                least = 0.0
+                if state.spinning and turns_far(state, solver.body_row[a], solver.body_row[b]):
+                    least = -way_by_turns(solver, k, arms)
+                solver.gap[k] = max(least, solver.gap[k])  # faces that meet in the end do not overlap at the start
                 if closing_speed(solver, k, arms) < 0.0:  # the body has passed the corner
                     solver.impulse[k], solver.tangent[k] = 0.0, nothing
     solver.any_hard = any_hard

@@ -47,6 +47,17 @@ def room_of(solver, k, arms):
 
 
 @inlined
+def way_by_turns(solver, k, arms):
+    """How much farther apart row k is along its normal because its bodies are not turned as where the step ends."""
+    if len(arms) == 0:
+        return 0.0
+    a, b = solver.first[k], solver.second[k]
+    way = end_of_turn(solver.turn[b], (solver.sine[b], solver.versine[b]), solver.core_b[k])
+    way = sub(way, end_of_turn(solver.turn[a], (solver.sine[a], solver.versine[a]), solver.core_a[k]))
+    return dot(way, solver.normal[k])
+
+
+@inlined
 def most_compliance(solver, k, arms):
     """1 / kg that an impulse along the surface at row k moves, in the direction in which that is most."""
     n = solver.normal[k]
