@@ -12,7 +12,7 @@ from ..codes import OK
 from ..integration.turning import size_of_turn
 from ..linking.parts import BOUND_SEARCHES, call_bound_searches
 from ..shapes.dispatch import half_extents, write_rotated
-from ..shapes.tolerances import reach_of
+from ..shapes.tolerances import driven_travel, reach_of
 from .records import HIGHEST, LARGEST, LOWEST
 from .uniform_grid import move_in_grid
 
@@ -134,12 +134,14 @@ def follow_static_places(state):
 
 @part
 def hold_turns(state, start, stop):
-    """Boxes hold what bodies sweep by turning: they are those of shapes as they are turned where the step ends."""
+    """Boxes hold what bodies sweep by turning, and as far as motors may turn them: they are those of shapes as they are
+    turned where the step ends."""
     bodies = state.bodies
     for i in range(start, stop):
-        angle = size_of_turn(bodies.turn[i])
-        if angle > 0.0 and bodies.rolling_radius[i] == 0.0:
-            way = min(angle, 2.0) * bodies.reach[i]
+        angle, driven = size_of_turn(bodies.turn[i]), driven_travel(state, i)
+        turned = angle > 0.0 and bodies.rolling_radius[i] == 0.0
+        if turned or driven > 0.0:
+            way = (min(angle, 2.0) * bodies.reach[i] if turned else 0.0) + driven
             lower, upper = bodies.lower[i], bodies.upper[i]
             for k in range(len(lower)):
                 lower, upper = replace(lower, k, item(lower, k) - way), replace(upper, k, item(upper, k) + way)

@@ -10,11 +10,13 @@ from ..ccd.search_bounds import FAST
 from ..ccd.turning_touch import first_touch_of_turn
 from ..integration.turning import cross_spin, is_turned, size_of_turn, turn_of_arm
 from ..narrow_phase.manifolds import centre_offset_at_start, evaluate_pair, forget_manifold, has_manifold
-from ..shapes.convex.points import MOST_POINTS, contact_points
-from ..shapes.linking.convex_by_address import convex_at, rounding_by_address
+from ..shapes.convex.points import MOST_POINTS, contact_points, is_same
+from ..shapes.linking.convex_by_address import convex_at, rounding_by_address, support_by_address
 from ..shapes.tolerances import reach_of, smaller_extent, turning_margin
 from .constants import UNREACHED
 
+FOLLOWED = 0.5  # rad: so far a face that turns is followed to the end of the step
+INWARDS, LEVEL = 0.2, 1.0 - 1e-6  # extents: that nearer to the middle the normal of a face is the same, to this cosine
 TILT = 0.1  # rad: faces whose normals are so near that of the contact touch along their length, or soon will
 
 
@@ -85,6 +87,30 @@ def slides_past(state, a, b, normal, arm_a, arm_b):
 
 
 @part
+def is_ball(state, i, way):
+    """Whether the shape of body i is a point with a rounding."""
+    shape = convex_at(state.shapes.parameters[state.bodies.shape[i]], i)
+    if shape[0] == 0 or not rounding_of(state, i) > 0.0:
+        return False
+    return is_same(support_by_address(shape, way), support_by_address(shape, scale(way, -1.0)))
+
+
+@part
+def lies_on_face(state, sides, d, turn, normal):
+    """Whether of two bodies, of which one is a ball, the other is touched on a face that turns on by little.
+    d: from a to b at the touch; turn: of the other body, from then to the end of the step, where its shape stands."""
+    bodies, (a, b) = state.bodies, sides
+    if length(turn) > FOLLOWED:
+        return False
+    face = add(normal, turn_of_arm(turn, normal))
+    ends = add(add(d, turn_of_arm(turn, d)), sub(bodies.offset[b], bodies.offset[a]))
+    aside = add_scaled(ends, face, -dot(ends, face))
+    size = length(aside)
+    inwards = min(size, INWARDS * smaller_extent(bodies, a, b)) / size if size > 0.0 else 0.0
+    return dot(evaluate_pair(state, a, b, add_scaled(ends, aside, -inwards))[2], face) > LEVEL
+
+
+@part
 def lay_first_touch(state, r):
     """The rows of a pair of which one body turns far, if it touches on the way: at one point, as they are turned then.
 
@@ -103,6 +129,18 @@ def lay_first_touch(state, r):
     arm_b = sub(add(arm_a, scale(normal, gap)), add_scaled(start, travel, share))
     if share == 0.0 and slides_past(state, a, b, normal, arm_a, arm_b):
         return  # the points of the end of the step are as good, and more
+    ball_a, ball_b = is_ball(state, a, normal), is_ball(state, b, normal)
+    onwards = scale(left_b if ball_a else left_a, -1.0)
+    free = (bodies.inverse_mass[b] if ball_a else bodies.inverse_mass[a]) > 0.0  # else a ball that sinks in is put back
+    led = free and ball_a != ball_b and lies_on_face(state, (a, b), add_scaled(start, travel, share), onwards, normal)
+    if led:  # the face is where the step has turned it
+        arm_a, arm_b = add(arm_a, turn_of_arm(onwards, arm_a)), add(arm_b, turn_of_arm(onwards, arm_b))
+        normal = add(normal, turn_of_arm(onwards, normal))
+        left_a, left_b = scale(left_a, 0.0), scale(left_b, 0.0)
+    if led and ball_a:
+        arm_a = add_scaled(bodies.offset[a], normal, rounding_of(state, a))
+    if led and ball_b:
+        arm_b = add_scaled(bodies.offset[b], normal, -rounding_of(state, b))
     if bodies.rolling_radius[a] > 0.0:
         arm_a = scale(normal, bodies.rolling_radius[a])
     if bodies.rolling_radius[b] > 0.0:
@@ -111,10 +149,11 @@ def lay_first_touch(state, r):
     core_a = add(core_a, turn_of_arm(scale(left_a, -1.0), core_a))
     core_b = add(core_b, turn_of_arm(scale(left_b, -1.0), core_b))
     before = add(scale(travel, share), sub(turn_of_arm(left_b, core_b), turn_of_arm(left_a, core_a)))
+    apart = dot(add(start, sub(arm_b, arm_a)), normal) if led else gap - dot(before, normal)
     for e in range(points_of(state, c)):
         one = solver.slot[r + e]
         solver.normal[one], solver.apart[one], solver.parting[one] = normal, True, False
         solver.arm_a[one], solver.arm_b[one], solver.core_a[one], solver.core_b[one] = arm_a, arm_b, core_a, core_b
-        solver.gap[one] = gap - dot(before, normal) if e == 0 else UNREACHED * solver.extent[one]
+        solver.gap[one] = apart if e == 0 else UNREACHED * solver.extent[one]
     solver.place[k], pairs.normal[c] = point, normal
     forget_manifold(pairs, c)

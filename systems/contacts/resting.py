@@ -28,6 +28,7 @@ from ..shapes.dispatch import both_convex, friction_of, restitution_of
 from ..shapes.tolerances import (
     SAME_PLACE,
     contact_margin,
+    driven_travel,
     is_turning,
     slop_for,
     slop_of,
@@ -102,7 +103,8 @@ def still_bounces(state, dt, c, depth, normal):
         if (known or (e == 1.0 and depth <= FAST * extent)) and abs(speed) > threshold and is_turning(state, dt, a, b):
             return True  # its next impact is searched with the shapes as they are turned then
     touches = depth > (SAME_PLACE * extent if pairs.impulse[c] == 0.0 else 0.0)
-    if not touches and speed < -threshold:
+    driven = driven_travel(state, a) + driven_travel(state, b)  # a motor may bring them together in this step
+    if not touches and speed < -threshold and not (driven > 0.0 and depth >= -driven):
         return True  # the next step's impact
     if speed > 0.0:
         pairs.parting[c] = PARTS if speed > threshold and speed * dt > slop else PARTS_SLOWLY

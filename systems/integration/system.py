@@ -82,7 +82,8 @@ class Integration(StagedSystem):
             (*MOTION, "quarantined"),
         ),
         Stage(
-            begin_joints, "which joints hold a body that may move", ("inverse_mass", "still"), ("solver",), "joints"
+            begin_joints, "which joints hold a body that may move; how far motors may turn these",
+            ("inverse_mass", "still", "spin"), ("solver", "driven"), "joints",
         ),
         Stage(
             note_path, "the path within the step, on which impacts are found", MOTION, ("path_velocity",), "colliders",

@@ -66,6 +66,12 @@ def turning_travel(state, span, a, b):
 
 
 @inlined
+def driven_travel(state, i):
+    """How far motors may move points of body i beyond what its spin does."""
+    return state.bodies.driven[i] if state.solver.joints.active > 0 else 0.0
+
+
+@inlined
 def is_turning(state, dt, a, b):
     """Whether the pair has another shape at other times of the step."""
     return turning_travel(state, dt, a, b) > SAME_PLACE * smaller_extent(state.bodies, a, b)
@@ -73,5 +79,6 @@ def is_turning(state, dt, a, b):
 
 @inlined
 def turning_margin(state, dt, a, b):
-    """How near a pair is looked at before it touches: the same, and how far corners come by turning."""
-    return contact_margin(state, dt, a, b) + turning_travel(state, dt, a, b)
+    """How near a pair is looked at before it touches: the same, and how far corners come by turning, or by motors."""
+    driven = driven_travel(state, a) + driven_travel(state, b)
+    return contact_margin(state, dt, a, b) + (turning_travel(state, dt, a, b) + driven)

@@ -6,11 +6,12 @@ import math
 
 from ....framework.compilation import inlined, part
 from ....framework.jit.records.record_type import zero_of
-from ....framework.vectors import add, add_scaled, item, replace, scale, sub
+from ....framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 from ...codes import NEED_COLUMNS, OK
 from ...compounds.rows import owner_of, place_of
-from ...integration.turning import cross_spin
-from .joints import GIVEN, POINT, SLIDE, TURN
+from ...integration.turning import change_of_spin, cross_spin
+from ...shapes.tolerances import reach_of
+from .joints import DRIVE, GIVEN, POINT, SLIDE, TURN
 from .rows import turn_body
 from .warm_start import row_of
 
@@ -63,7 +64,37 @@ def begin_joints(state, dt):
     if not state.collides:
         state.solver.contacts = state.pairs.count = state.pairs.resting_count = 0
     find_active(state)
+    if state.collides:
+        if len(bodies.driven) < state.count:
+            return NEED_COLUMNS
+        find_driven(state, dt)
     return OK
+
+
+@part
+def find_driven(state, dt):
+    """How far motors, which act in the solver, may move points of each body in the step beyond what its spin does."""
+    joints, bodies = state.solver.joints, state.bodies
+    for i in range(state.count):
+        bodies.driven[i] = 0.0
+    for e in range(joints.active):
+        j = joints.order[e]
+        if not (joints.kind[j] == TURN and joints.rule[j] == DRIVE):
+            continue
+        a, b = joints.row_a[j], joints.row_b[j]
+        axis, missing = turned(state, a, joints.axis[j]) if a >= 0 else joints.axis[j], joints.target[j]
+        missing -= dot(axis, bodies.spin[b]) if b >= 0 else 0.0
+        missing += dot(axis, bodies.spin[a]) if a >= 0 else 0.0
+        hold = j  # the first row of the joint: the point about which they turn
+        while hold > 0 and joints.joint[hold - 1] == joints.joint[j]:
+            hold -= 1
+        for i, anchor in ((a, joints.anchor_a[hold]), (b, joints.anchor_b[hold])):
+            if may_move(state, i):
+                most = joints.most[j] * dt * dot(axis, change_of_spin(bodies, i, axis))
+                reach = length(anchor) if joints.kind[hold] == POINT else 0.0
+                if bodies.rolling_radius[i] == 0.0:
+                    reach += reach_of(bodies.half_extents[i], bodies.offset[i])
+                bodies.driven[i] += min(abs(missing), most) * dt * reach
 
 
 @part
