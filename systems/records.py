@@ -125,6 +125,7 @@ SPINS = Section(
     turn=vectors(),  # rad, in the step
     reach=floats(),  # m: how far turning moves points of the last level that has been measured, per rad, at most
     driven=floats(default=0.0),  # m, by which motors may move its points farther than that
+    joined=flags(default=False),  # by joints, if any are active
 )  # fmt: skip
 FAILS = "the start of the step, for one that fails"
 UNDO = Section("body", "going back", FAILS, kept_previous=vectors(), kept_velocity=vectors())

@@ -29,6 +29,7 @@ from .bodies import note_squeezed
 
 QUARTER = 0.5 * math.pi  # rad: what turns farther shows its other side
 ALLOWED = 0.05  # of the extent: overlap with what cannot be moved; what was deeper may stay so
+JOINED = 0.35  # the same of what joints hold, which moving one part of it out would tear
 NO_PAIR = -1
 ROUNDS = 4  # over what a body in a corner touches; the last one is for what stands still alone
 KNOWN = 0.05  # of the extent: so far around its foreseen motion the neighbours of a body are known
@@ -55,7 +56,9 @@ def how_deep(state, c, a, b):
     bodies, extent = state.bodies, smaller_extent(state.bodies, a, b)
     d, start = centre_offset(bodies, a, b), segment_start(state, a, b)
     travel = sub(d, start)
-    way, allowed = length(travel), ALLOWED * extent
+    way, joined = length(travel), state.solver.joints.active > 0
+    joined = joined and (bodies.joined[owner_of(state, a)] or bodies.joined[owner_of(state, b)])
+    allowed = (JOINED if joined else ALLOWED) * extent
     found, depth, normal = False, 0.0, travel
     if state.spinning and turns_far(state, a, b):  # where it started says nothing of the shapes at the end
         depth, normal = depth_on_side_of_touch(state, a, b, d)

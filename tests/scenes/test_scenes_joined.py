@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 from helpers_joints import gaps
+from worlds import MODES
 
-from carom import Transform
+from carom import Settings, Transform
 from carom.plugins.joints import Hinge, Joints
 from carom.plugins.rotation import Spin
 from carom.scenes import bridge, car, crane, ragdoll
@@ -63,6 +64,53 @@ def test_ragdolls_are_not_torn_and_stay_on_the_stairs(seed):
         ends = np.clip(np.ceil(places[:, 0] / ragdoll.STEP[0]), 1, ragdoll.STEPS) * ragdoll.STEP[1]
         assert (places[:, 1] > -ends - 0.1).all()
         assert world.kinetic_energy() < 50.0
+
+
+def ends_apart(world, joints):
+    """A function that tells by how much the ends of each of these hinges are apart, m, of many at once."""
+    bodies, found = world.bodies, [world.component_for_entity(joint, Hinge) for joint in joints]
+
+    def ends(entities, local):
+        rows, local = [bodies.row_of(entity) for entity in entities], np.array(local)
+        c, s = np.cos(bodies.rotation[rows]), np.sin(bodies.rotation[rows])
+        turned = c * local[:, 0] - s * local[:, 1], s * local[:, 0] + c * local[:, 1]
+        return bodies.position[rows] + np.column_stack(turned)
+
+    def apart():
+        first = ends([joint.a for joint in found], [joint.at_a for joint in found])
+        return np.linalg.norm(ends([joint.b for joint in found], [joint.at_b for joint in found]) - first, axis=1)
+
+    return apart
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize(
+    "seeds", [pytest.param(range(2), marks=pytest.mark.slow), pytest.param(range(2, 40), marks=pytest.mark.long)]
+)
+def test_thrown_ragdolls_are_not_torn_nor_go_through_stairs(seeds, mode):
+    """25 at once, which do not meet each other, from anywhere above the stairs. Few limbs whirl so fast that
+    they are a little apart for a step."""
+    gaps_of_all = []
+    for seed in seeds:
+        random = np.random.default_rng(seed)
+        with ragdoll.build(Settings(collision=mode, on_fault="ignore"), seed, n=1) as world:
+            for _ in range(24):
+                hip = random.uniform((1.0, 1.5), (9.0, 4.0))
+                ragdoll._doll(world, hip, random.uniform((-4.0, -6.0), (6.0, 4.0)))
+            world.step()
+            worst, apart = np.zeros(25), ends_apart(world, hinges(world))
+            for step in range(600):
+                world.step()
+                if step < 200 or step % 20 == 0:
+                    worst = np.maximum(worst, apart().reshape(25, -1).max(axis=1))
+                    places = world.bodies.dynamic.position
+                    ends = np.clip(np.ceil(places[:, 0] / ragdoll.STEP[0]), 1, ragdoll.STEPS) * ragdoll.STEP[1]
+                    assert (places[:, 1] > -ends - 0.1).all(), seed
+                    assert (places[:, 0] > -0.1).all(), seed
+            assert world.kinetic_energy() < 25.0, seed
+            gaps_of_all += worst.tolist()
+    assert max(gaps_of_all) < 0.15
+    assert np.quantile(gaps_of_all, 0.98) < 0.1
 
 
 def test_the_car_drives_over_the_hills():

@@ -151,7 +151,7 @@ def find_unsolved(solver, turn, any_struck, dt, span, islands):
     unsolved, struck, passes, extent = solver.unsolved, solver.struck, solver.passes, solver.extent
     any_gain, most, count = False, 0, 0
     for t in range(islands[0], islands[1]):
-        unsolved[t] = gains(solver, t)
+        unsolved[t] = gains(solver, t) and not solver.jointed[t]  # what joints give passes over contacts do not take
         any_gain |= unsolved[t]
         most = max(most, passes[t] if struck[t] else 0)
     for k in range(span[0], span[1] if any_gain or any_struck else span[0]):

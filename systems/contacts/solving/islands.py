@@ -22,8 +22,10 @@ from ..constants import (
     BEND,
     FURTHER_PASSES,
     FURTHER_WORK,
+    JOLTED_SUBSTEPS,
     LEAST_FURTHER_PASSES,
     LEAST_WORK_SUBSTEPS,
+    LONG_WAY,
     MOST_GIVE,
     MOST_SAG,
     MOST_SUBSTEPS,
@@ -102,12 +104,17 @@ def island_of_joint(state, j):
 
 
 @part
-def weigh_joint(state, j):
-    """How much a row of joints gives way, for its size, under a force on it."""
-    solver, joints, inverse_mass = state.solver, state.solver.joints, state.bodies.inverse_mass
+def weigh_joint(state, j, dt):
+    """How much a row of joints gives way, for its size, under a force on it; and whether its bodies turn so fast that
+    a limit strikes them."""
+    solver, joints, inverse_mass, spin = state.solver, state.solver.joints, state.bodies.inverse_mass, state.bodies.spin
     a, b, t = joints.row_a[j], joints.row_b[j], island_of_joint(state, j)
     solver.jointed[t] = True
     solver.driven[t] |= joints.rule[j] > LIMIT
+    if joints.kind[j] >= TURN and joints.rule[j] == LIMIT:
+        nothing = zero_of(state)
+        turned = sub(spin[b] if b >= 0 else nothing, spin[a] if a >= 0 else nothing)
+        solver.jolted[t] |= length(turned) * dt > LONG_WAY
     w_a, w_b = inverse_mass[a] if a >= 0 else 0.0, inverse_mass[b] if b >= 0 else 0.0
     solver.borne[t] = min(solver.borne[t], w_a if w_a > 0.0 else w_b, w_b if w_b > 0.0 else w_a)
     solver.welds[t] += joints.kind[j] == TURN and joints.rule[j] == HOLD
@@ -119,7 +126,7 @@ def weigh_joint(state, j):
 
 
 @part
-def number_islands(state):
+def number_islands(state, dt):
     """``island`` becomes the number of each body's island, in the order of their first bodies; -1 for what cannot be
     moved. What is known of its bodies is summed up."""
     solver, bodies, island, count = state.solver, state.bodies, state.solver.island, 0
@@ -138,7 +145,7 @@ def number_islands(state):
             solver.lightest[t], solver.most_change[t], solver.mass_of[t], solver.force_of[t] = math.inf, 0.0, 0.0, 0.0
             solver.stiff[t] = solver.own[t] = solver.strike[t] = solver.taken[t] = 0.0
             solver.size_of[t], solver.leader[t] = 0, i
-            solver.driven[t], solver.credit[t] = False, 0.0
+            solver.driven[t], solver.jolted[t], solver.credit[t] = False, False, 0.0
             solver.jointed[t], solver.give[t], solver.borne[t], solver.welds[t] = False, 0.0, math.inf, 0
         solver.number[q] = t
         change = sub(velocity[i], start[i])
@@ -152,7 +159,7 @@ def number_islands(state):
     for q in range(solver.bodies):
         island[q] = solver.number[q]
     for e in range(solver.joints.active):
-        weigh_joint(state, solver.joints.order[e])
+        weigh_joint(state, solver.joints.order[e], dt)
 
 
 @part
@@ -170,6 +177,7 @@ def weigh_rows(state, dt):
         stiff = (w_a + w_b) * inverse_extent
         solver.stiff[t], solver.own[t] = max(solver.stiff[t], stiff), max(solver.own[t], stiff / max(w_a, w_b))
         strike = dot(sub(v_a, v_b), pairs.normal[c]) * dt * inverse_extent
+        solver.jolted[t] |= solver.jointed[t] and length(sub(v_a, v_b)) * dt * inverse_extent > LONG_WAY
         if strike > solver.strike[t]:
             solver.strike[t] = strike
 
@@ -188,6 +196,8 @@ def choose_substeps(solver, t, usual, dt):
     while float(least * least) < pulled and 2 * least <= LEAST_WORK_SUBSTEPS:
         least *= 2
     solver.stiffness_of[t] = least
+    if solver.jolted[t]:
+        least = max(least, JOLTED_SUBSTEPS)
     if solver.size_of[t] == 0:  # it has joints alone
         solver.substeps_of[t], solver.hard_of[t], solver.passes[t], solver.bears[t] = least, False, 0, math.inf
         return least > usual
@@ -276,7 +286,7 @@ def order_rows(state, dt):
     solver = state.solver
     colour_rows(state)
     join_bodies(state)
-    number_islands(state)
+    number_islands(state, dt)
     weigh_rows(state, dt)
     solver.ranges = 1
     for t in range(solver.islands):

@@ -49,12 +49,19 @@ def find_active(state):
             joints.order[found] = j
             found += 1
     joints.active, joints.kept_in = found, state.step_number + 1
+    joined = state.bodies.joined
+    for i in range(state.count):
+        joined[i] = False
+    for e in range(found):
+        for i in (joints.row_a[joints.order[e]], joints.row_b[joints.order[e]]):
+            if i >= 0:
+                joined[owner_of(state, i)] = True
 
 
 def begin_joints(state, dt):
     """Which joints take part; all bodies have the columns of those that spin, also where none does."""
     bodies, zero = state.bodies, zero_of(state)
-    if len(bodies.spin) < state.count or len(bodies.origin) < state.count:
+    if len(bodies.joined) < state.count or len(bodies.origin) < state.count:
         return NEED_COLUMNS
     if not state.spinning:
         state.spinning = True

@@ -186,6 +186,7 @@ SOLVER = Schema(
     leader=ints("int32"),  # row of its first body
     jointed=flags(),
     driven=flags(),  # by motors or springs, which give energy
+    jolted=flags(),  # so fast struck that its joints need more substeps
     credit=floats(),  # J that joints have taken in this step, and may give back
     give=floats(),  # 1 / (kg m): largest inverse mass of a joint over its length
     borne=floats(),  # inverse mass of the heaviest body of joints
