@@ -99,8 +99,10 @@ def test_thrown_ragdolls_are_not_torn_nor_go_through_stairs(seeds, mode):
                 ragdoll._doll(world, hip, random.uniform((-4.0, -6.0), (6.0, 4.0)))
             world.step()
             worst, apart = np.zeros(25), ends_apart(world, hinges(world))
-            for step in range(600):
+            for step in range(1200):
                 world.step()
+                if step >= 600 and world.kinetic_energy() < 25.0:  # some are to fall off a stair late
+                    break
                 if step < 200 or step % 20 == 0:
                     worst = np.maximum(worst, apart().reshape(25, -1).max(axis=1))
                     places = world.bodies.dynamic.position

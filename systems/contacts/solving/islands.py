@@ -110,6 +110,7 @@ def weigh_joint(state, j, dt):
     solver, joints, inverse_mass, spin = state.solver, state.solver.joints, state.bodies.inverse_mass, state.bodies.spin
     a, b, t = joints.row_a[j], joints.row_b[j], island_of_joint(state, j)
     solver.jointed[t] = True
+    solver.links[t] += 1
     solver.driven[t] |= joints.rule[j] > LIMIT
     if joints.kind[j] >= TURN and joints.rule[j] == LIMIT:
         nothing = zero_of(state)
@@ -147,6 +148,7 @@ def number_islands(state, dt):
             solver.size_of[t], solver.leader[t] = 0, i
             solver.driven[t], solver.jolted[t], solver.credit[t] = False, False, 0.0
             solver.jointed[t], solver.give[t], solver.borne[t], solver.welds[t] = False, 0.0, math.inf, 0
+            solver.links[t] = 0
         solver.number[q] = t
         change = sub(velocity[i], start[i])
         if warm_started[i]:
@@ -201,6 +203,7 @@ def choose_substeps(solver, t, usual, dt):
     if solver.size_of[t] == 0:  # it has joints alone
         solver.substeps_of[t], solver.hard_of[t], solver.passes[t], solver.bears[t] = least, False, 0, math.inf
         return least > usual
+    rows = solver.size_of[t] + solver.links[t]
     own = sag * solver.own[t] / OWN_SAG
     need = sag * solver.stiff[t] / (solver.lightest[t] * MOST_SAG)
     hard = own > float(usual * usual)
@@ -209,12 +212,12 @@ def choose_substeps(solver, t, usual, dt):
     strike = solver.strike[t] - 2.0 * solver.most_change[t] * solver.own[t] * dt
     ratio = solver.stiff[t] / (solver.lightest[t] * solver.own[t])
     struck = STRIKE * strike * ratio if strike > STRUCK else 0.0
-    most = max(LEAST_WORK_SUBSTEPS, min(MOST_SUBSTEPS, SUBSTEP_WORK // solver.size_of[t]))
+    most = max(LEAST_WORK_SUBSTEPS, min(MOST_SUBSTEPS, SUBSTEP_WORK // rows))
     asked, substeps = max(need, struck * struck), least
     while float(substeps * substeps) < asked and 2 * substeps <= most:
         substeps *= 2
     solver.substeps_of[t], solver.hard_of[t] = substeps, hard
-    solver.passes[t] = max(LEAST_FURTHER_PASSES, min(FURTHER_PASSES, FURTHER_WORK // solver.size_of[t]))
+    solver.passes[t] = max(LEAST_FURTHER_PASSES, min(FURTHER_PASSES, FURTHER_WORK // rows))
     solver.bears[t] = float(substeps * substeps) / need if need > 0.0 else math.inf
     return substeps > usual or hard
 

@@ -191,6 +191,7 @@ SOLVER = Schema(
     give=floats(),  # 1 / (kg m): largest inverse mass of a joint over its length
     borne=floats(),  # inverse mass of the heaviest body of joints
     welds=ints("int32"),
+    links=ints("int32"),  # rows of joints
     stiffness_of=ints("int32"),  # its joints are as stiff as with so many substeps
     # ranges: the ordinary islands, then each special one
     ranges=integer(),
