@@ -89,6 +89,8 @@ SUITE: tuple[Subject, ...] = (
     Subject("tumbler", (Window("", 60, 360),), "left", sizes=(1000,), quick=False),
     Subject("rubble", (Window("falling", 0, 300), Window("settled", 600, 900)), "left", sizes=(1000,), quick=False),
     Subject("bridge", (Window("", 60, 360),), "left", sizes=(100,), quick=False),
+    Subject("bridge", (Window("", 60, 360),), "left", "a chain", {"crates": 0}, sizes=(200,), quick=False),
+    Subject("ragdoll", (Window("", 0, 300),), "left", sizes=(100,), quick=False),
     Subject("static_world", AFTER_START, sizes=(1000,)),
     Subject("fastgas", AFTER_START, variant="continuous", settings={"collision": "continuous"}, sizes=(1000,)),
     Subject("fastgas", AFTER_START, variant="discrete", sizes=(1000,)),

@@ -24,6 +24,7 @@ from ..measure.outlines import OUTLINES, SIGNS, outlines_of
 
 INDEXES = ("tree", "hash")  # pymunk's two broad phases: a tree of bounding boxes, or a spatial hash
 ITERATIONS = 10
+ALL_LAYERS = 0xFFFFFFFF  # pymunk has 32
 HASH_CELL = 2.0  # cell size over the largest moving body's size; measured: 1.5 times as fast as 1.0 (gas2d 10k)
 HASH_CELLS_PER_BODY = 2  # measured: as fast as the 10 of pymunk's manual
 
@@ -37,7 +38,7 @@ class Bodies(NamedTuple):
 
     ``shaped (n,)`` false without a collider; ``corners``: of each collider (m, 2), about the body's position and along
     its axes, a disc has one; ``rounding (n,)``: how far it goes beyond these; ``restitution`` and ``friction (n,)``,
-    NaN: the other body's; ``moment (n,)``: infinite for what does not spin.
+    NaN: the other body's; ``moment (n,)``: infinite for what does not spin; ``layer`` and ``mask (n,)``.
     """
 
     corners: list[Floats]
@@ -51,6 +52,8 @@ class Bodies(NamedTuple):
     rounding: Floats
     restitution: Floats
     friction: Floats
+    layer: np.ndarray
+    mask: np.ndarray
 
 
 def moving_and_fixed(world: World) -> tuple[Bodies, Bodies, Bodies]:
@@ -67,6 +70,7 @@ def _plain(world: World, bodies: Any) -> Bodies:
     count, angle, moves = len(bodies), np.array(bodies.rotation), np.isin(bodies.entity, world.bodies.dynamic.entity)
     friction, restitution, rounding = np.full(count, np.nan), np.zeros(count), np.zeros(count)
     corners, shaped = [np.zeros((1, 2))] * count, np.zeros(count, bool)
+    layer, mask = np.ones(count, np.int64), np.ones(count, np.int64)
     for collider in (SphereCollider, AABBCollider, *OUTLINES):
         has = np.asarray(bodies.has(collider), bool)
         if not has.any():
@@ -74,7 +78,7 @@ def _plain(world: World, bodies: Any) -> Bodies:
         columns = getattr(bodies, collider.prefix[:-1])
         _refuse("bodies with two colliders", shaped & has)
         _refuse("sensors", columns.sensor[has])
-        _refuse("layers and masks", (columns.layer[has] != 1) | (columns.mask[has] & 1 == 0))
+        layer[has], mask[has] = columns.layer[has] & ALL_LAYERS, columns.mask[has] & ALL_LAYERS
         _refuse("turned boxes", (collider is AABBCollider) * angle[has])
         shaped |= has
         friction[has], restitution[has] = columns.friction[has], columns.restitution[has]
@@ -95,6 +99,7 @@ def _plain(world: World, bodies: Any) -> Bodies:
     order = np.argsort(bodies.entity, kind="stable")
     position, velocity, mass = np.array(bodies.position), np.array(bodies.linear_velocity), np.array(bodies.mass)
     kept: tuple[Any, ...] = position, velocity, angle, spin, mass, moment, shaped, rounding, restitution, friction
+    kept = *kept, layer, mask
     return Bodies([corners[k] for k in order], *(column[order] for column in kept))
 
 
@@ -154,6 +159,7 @@ class PymunkSpace:
             for k in np.flatnonzero(rows.shaped).tolist():
                 shape = _shape(pymunk, bodies[k], rows.corners[k].tolist(), float(rows.rounding[k]))
                 shape.elasticity, shape.friction = restitution, float(friction[k])
+                shape.filter = pymunk.ShapeFilter(categories=int(rows.layer[k]), mask=int(rows.mask[k]))
                 self.space.add(shape)
         self._join(pymunk, world)
         if index == "hash":

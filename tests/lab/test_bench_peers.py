@@ -129,7 +129,6 @@ def test_without_friction_of_its_own_a_floor_takes_the_partners():
         ("gravity scale", (RigidBody(gravity_scale=2),)),
         ("limits of speed", (RigidBody(max_linear_speed=3),)),
         ("kinematic", (RigidBody(kind="kinematic"), SphereCollider(0.5))),
-        ("layers", (RigidBody(), SphereCollider(0.5, layer=2))),
         ("offsets", (RigidBody(), SphereCollider(0.5, offset=(0.1, 0)))),
         ("restitutions", (SphereCollider(0.5, restitution=0.9),)),
     ],
@@ -140,6 +139,18 @@ def test_what_does_not_translate_is_refused(words, parts):
     world.create_entity(Transform((5, 5)), *parts)
     with pytest.raises(NotPlainError, match=words):
         PymunkSpace(world)
+    world.close()
+
+
+@pytest.mark.parametrize(("mask", "apart"), [(1, False), (2, True), (-1, True)])
+def test_layers_and_masks_are_those_of_carom(mask, apart):
+    world = plane()
+    for x, layer in ((0.0, 1), (0.5, 2)):
+        world.create_entity(Transform((x, 0)), RigidBody(), SphereCollider(0.5, layer=layer, mask=mask | layer // 2))
+    space = PymunkSpace(world)
+    space.step(30)
+    (one, _), (other, _) = space.state()[0]
+    assert (other - one > 0.6) == apart
     world.close()
 
 
