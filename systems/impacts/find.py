@@ -12,6 +12,7 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST, is_swept, limits_of_sweep, rest_edge, turns_far
 from ..ccd.time_of_impact import APART, AT_CORNER, TOUCHES, bounds_stay_disjoint, clear_of_rounding
+from ..compounds.rows import owner_of
 from ..integration.trajectory import (
     ROUNDING,
     along,
