@@ -199,12 +199,13 @@ def test_fast_pieces_do_not_pass_walls(mode, restitution):
         velocity, spin = random.normal(0.0, 60.0, 2), random.normal(0.0, 3.0)
         bodies.append(piece(world, parts, place, U, velocity=velocity, spin=spin, restitution=restitution)[0])
     energy = world.kinetic_energy()
+    gain = 1e-9 if restitution else 1e-5  # what does not bounce is pushed out of overlaps
     for _ in range(120):
         world.step()
         places = np.array([at(world, body).position for body in bodies])
         assert (np.abs(places) < 3.0).all()
         now = world.kinetic_energy()
-        assert now <= energy * (1 + 1e-9)
+        assert now <= energy * (1 + gain)
         energy = max(now, 1e-12)
 
 
