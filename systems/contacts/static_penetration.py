@@ -23,7 +23,7 @@ from ..integration.trajectory import along, path_of
 from ..integration.turning import turn_of_arm
 from ..narrow_phase.manifolds import centre_offset, deepest_possible, evaluate_pair
 from ..narrow_phase.stages import is_solid_pair, layers_meet
-from ..shapes.tolerances import SAME_PLACE, smaller_extent
+from ..shapes.tolerances import SAME_PLACE, smaller_extent, way_of_turning
 from .approach import first_touch_on_segment, segment_start
 from .bodies import note_squeezed
 
@@ -41,8 +41,11 @@ def depth_on_side_of_touch(state, a, b, d):
     thin may have turned past the middle of what it pushes."""
     bodies, out = state.bodies, state.bodies.min_extent[a] + state.bodies.min_extent[b]
     _, depth, normal, _ = evaluate_pair(state, a, b, d)
+    turner = a if bodies.inverse_mass[b] > 0.0 else b
+    if way_of_turning(bodies, turner, bodies.turn[turner]) <= 0.5 * bodies.min_extent[turner]:
+        return depth, normal  # its middle has passed nothing
     touches, share, _, way, _ = first_touch_of_turn(state, a, b)
-    left = scale(bodies.turn[a] if bodies.inverse_mass[b] > 0.0 else bodies.turn[b], 1.0 - share)
+    left = scale(bodies.turn[turner], 1.0 - share)
     way = add(way, turn_of_arm(left, way))
     if not touches or length(left) > QUARTER or dot(way, normal) >= 0.0:
         return depth, normal
