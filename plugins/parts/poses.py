@@ -19,7 +19,7 @@ class Pose(NamedTuple):
         place = np.zeros(dimensions) + np.asarray(position, float)
         if dimensions == 2:
             return cls(place, float(rotation))
-        return cls(place, np.asarray(rotation, float) if np.ndim(rotation) else np.array((1.0, 0.0, 0.0, 0.0)))
+        return cls(place, np.array(rotation if np.ndim(rotation) else (1.0, 0.0, 0.0, 0.0), float))  # rows move
 
     def axes(self) -> np.ndarray:
         """(d, d): its axes as columns."""

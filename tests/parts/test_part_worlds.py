@@ -107,6 +107,21 @@ def test_parts_go_with_their_body_and_it_loses_what_they_weigh():
     assert world.get_entities() == []
 
 
+def test_parts_in_space_keep_their_turns_when_another_is_deleted():
+    world, _ = parts_world(dimensions=3)
+    body = world.create_entity(Transform((0, 0, 0)), RigidBody(), BoxCollider((0.2, 0.2, 0.2)))
+    turns = ((1.0, 0.0, 0.0, 0.0), (0.6, 0.8, 0.0, 0.0), (0.6, 0.0, 0.8, 0.0))
+    first, *others = [
+        world.create_entity(PartOf(body, (x, 0.0, 0.0), turn), BoxCollider((0.1, 0.2, 0.3)))
+        for x, turn in enumerate(turns)
+    ]
+    run(world, 2)
+    world.delete_entity(first)
+    run(world, 2)
+    for part, turn in zip(others, turns[1:], strict=True):
+        np.testing.assert_allclose(at(world, part).rotation, turn, atol=1e-15)
+
+
 def test_what_breaks_off_flies_on_by_itself():
     world, parts = parts_world()
     boxes = tuple(((3 * x, 3 * y), half, mass) for (x, y), half, mass in U)  # so that they do not touch
