@@ -248,10 +248,12 @@ class Parts(Plugin):
         _set(own[RigidBody], "mass", WEIGHTLESS)
         if rigid is not None:
             _set(own[RigidBody], "linear_velocity", rigid.linear_velocity)
-        turned = Pose.of(transform.position, transform.rotation, d).then(Pose.of(0.0, place.pose.rotation, d))
+        rotation = Pose.of(0.0, transform.rotation, d).rotation
+        turned = turned_by(np.array([rotation]), np.reshape(place.pose.rotation, (1, -1)))  # others wake it
         _set(own[Transform], "position", transform.position)
-        _set(own[Transform], "rotation", turned.rotation)
-        _set(own[PartOf], "turn", place.pose.rotation)
+        _set(own[Transform], "rotation", turned[0])
+        if np.any(own[PartOf].turn != place.pose.rotation):  # to the bit: a field would make it a unit quaternion anew
+            self._table.make("part_of.turn")[self._table.row_of(entity)] = place.pose.rotation
         for component, handle in own.items():
             if issubclass(component, Collider):
                 _set(handle, "offset", place.pose.local(np.zeros(d)) * -1.0)

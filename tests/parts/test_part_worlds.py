@@ -292,3 +292,25 @@ def test_pieces_sleep_as_one_and_wake_to_the_bit():
     world.create_entity(Transform((3.2, 1.2)), RigidBody(linear_velocity=(0, -2)), SphereCollider(0.1))
     run(world, 15)
     assert not body_of(world, pieces[1][1]).asleep
+
+
+def test_pieces_in_space_sleep_on_where_a_snapshot_is_restored():
+    world, parts = parts_world((0, 0, -G), 3, sleeping=True)
+    world.create_entity(Transform((0, 0, -1)), BoxCollider((50.0, 50.0, 1.0), friction=0.5))
+    turns = np.random.default_rng(1).normal(size=(12, 4))  # some are no unit quaternions to the last bit
+    bodies = []
+    for x, turn in enumerate(turns):
+        box = BoxCollider((0.9, 0.9, 0.3))
+        bodies.append(world.create_entity(Transform((3 * x, 0, 0.3)), RigidBody(), Spin(), box))
+        unit = turn / np.linalg.norm(turn)
+        world.create_entity(PartOf(bodies[-1], (0, 0, 0.4), unit, mass=0.1), BoxCollider((0.1, 0.2, 0.1)))
+        parts.balance(bodies[-1])
+    run(world, 90)
+    assert all(body_of(world, body).asleep for body in bodies)
+    snapshot = world.snapshot()
+    world.step()
+    after = world.state_hash()
+    world.restore(snapshot)
+    world.step()
+    assert all(body_of(world, body).asleep for body in bodies)
+    assert world.state_hash() == after
