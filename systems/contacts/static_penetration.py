@@ -21,7 +21,7 @@ from ..compounds.rows import next_row, owner_of
 from ..impacts.impulses import STOPPED
 from ..integration.trajectory import along, path_of
 from ..integration.turning import turn_of_arm
-from ..narrow_phase.manifolds import centre_offset, deepest_possible, evaluate_pair
+from ..narrow_phase.manifolds import centre_offset, centre_offset_at_start, deepest_possible, evaluate_pair
 from ..narrow_phase.stages import is_solid_pair, layers_meet
 from ..shapes.tolerances import SAME_PLACE, smaller_extent, way_of_turning
 from .approach import first_touch_on_segment, segment_start
@@ -39,11 +39,12 @@ KNOWN = 0.05  # of the extent: so far around its foreseen motion the neighbours 
 def depth_on_side_of_touch(state, a, b, d):
     """(depth, normal) of a pair of which one body turns far, on the side on which they have first touched: something
     thin may have turned past the middle of what it pushes."""
-    bodies, out = state.bodies, state.bodies.min_extent[a] + state.bodies.min_extent[b]
+    bodies, travel = state.bodies, length(sub(d, centre_offset_at_start(state.bodies, a, b)))
     _, depth, normal, _ = evaluate_pair(state, a, b, d)
-    turner = a if bodies.inverse_mass[b] > 0.0 else b
-    if way_of_turning(bodies, turner, bodies.turn[turner]) <= 0.5 * bodies.min_extent[turner]:
-        return depth, normal  # its middle has passed nothing
+    ways = travel + way_of_turning(bodies, a, bodies.turn[a]) + way_of_turning(bodies, b, bodies.turn[b])
+    if ways <= 0.5 * smaller_extent(bodies, a, b):
+        return depth, normal  # no middle has passed another one
+    turner, out = a if bodies.inverse_mass[b] > 0.0 else b, bodies.min_extent[a] + bodies.min_extent[b] + travel
     touches, share, _, way, _ = first_touch_of_turn(state, a, b)
     left = scale(bodies.turn[turner], 1.0 - share)
     way = add(way, turn_of_arm(left, way))
