@@ -225,7 +225,7 @@ class Driven(Joint, abstract=True):
     frequency: float | None = special_column(
         default=None, optional=True, positive=True, largest=MOST, kw_only=True
     )
-    damping_ratio: float = special_column(default=0.0, minimum=0.0, kw_only=True)
+    damping_ratio: float = special_column(default=0.0, minimum=0.0, largest=MOST, kw_only=True)
     rest: float = special_column(default=0.0, kw_only=True, largest=MOST)
 
     def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:

@@ -38,7 +38,7 @@ class Distance(Joint):
     least: float | None = optional(minimum=0.0, largest=MOST)
     most: float | None = optional(minimum=0.0, largest=MOST)
     frequency: float | None = optional(positive=True, largest=MOST)
-    damping_ratio: float = special_column(default=0.0, minimum=0.0, kw_only=True)
+    damping_ratio: float = special_column(default=0.0, minimum=0.0, largest=MOST, kw_only=True)
 
     def __init__(self, *args: Any, length: Any = None, **values: Any) -> None:
         if length is not None:
@@ -344,7 +344,7 @@ class MousePull(Joint):
     target: Vector = special_column(item="vector", largest=MOST)
     max_force: float | None = optional(minimum=0.0)
     frequency: float = special_column(default=5.0, largest=MOST, positive=True, kw_only=True)
-    damping_ratio: float = special_column(default=1.0, minimum=0.0, kw_only=True)
+    damping_ratio: float = special_column(default=1.0, minimum=0.0, largest=MOST, kw_only=True)
     a: int | None = special_column(default=WORLD, init=False, dtype=int)
 
     def attach(self, a: Place, b: Place) -> None:

@@ -8,14 +8,23 @@ from ...framework.jit.records.record_type import zero_of
 from ..shapes.dispatch import second_moments
 from ..shapes.quaternions import turned_tensor
 
+OF_PART = "its PartOf has a mass, and it has no collider that tells its inertia: give it one, or PartOf.mass = 0"
+
+
+@part
+def tells_inertia(state, i):
+    """Whether row i has a shape with second moments."""
+    shape = state.bodies.levels[state.level_count - 1, i] if state.collides else -1
+    return shape >= 0 and state.shapes.moments[shape] != 0
+
 
 @part
 def inertia_of_row(state, i, mass):
     """(xx, yy, zz, xy, xz, yz) of a shape of that mass about the body's position, along the axes of its own row."""
-    shape = state.bodies.levels[state.level_count - 1, i] if state.collides else -1
-    if shape < 0 or state.shapes.moments[shape] == 0:
+    if not tells_inertia(state, i):
         state.blamed = i + 1
         raise ValueError(UNKNOWN)
+    shape = state.bodies.levels[state.level_count - 1, i]
     return inertia_about(second_moments(state, shape, i), state.colliders.offset[state.shapes.slots[shape], i], mass)
 
 
@@ -38,6 +47,9 @@ def inertia_of_compound(state, i):
     while k >= 0:
         p = bodies.part[k]
         if parts.mass[p] > 0.0:
+            if not tells_inertia(state, k):
+                state.blamed = k + 1
+                raise ValueError(OF_PART)
             tensor = inertia_of_row(state, k, share * parts.mass[p])
             if not plane:
                 turn = parts.turn[p, 0], parts.turn[p, 1], parts.turn[p, 2], parts.turn[p, 3]

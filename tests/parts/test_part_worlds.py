@@ -19,6 +19,7 @@ from carom import (
     Transform,
     World,
 )
+from carom.framework.errors import StepError
 from carom.plugins import convex_polygon
 from carom.plugins.joints import Joints, Weld
 from carom.plugins.parts import PartOf, Parts
@@ -314,3 +315,13 @@ def test_pieces_in_space_sleep_on_where_a_snapshot_is_restored():
     world.step()
     assert all(body_of(world, body).asleep for body in bodies)
     assert world.state_hash() == after
+
+
+def test_a_part_with_a_mass_and_no_collider_is_named():
+    world, _ = parts_world()
+    body = world.create_entity(Transform((0, 0)), RigidBody(), Spin(), BoxCollider((0.5, 0.1)))
+    part = world.create_entity(PartOf(body, (1, 0)))
+    with pytest.raises(StepError, match=rf"entity {part}: .*PartOf has a mass, and it has no collider"):
+        world.step()
+    world.component_for_entity(part, PartOf).mass = 0.0
+    world.step()
