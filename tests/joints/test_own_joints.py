@@ -279,7 +279,6 @@ def test_free_bodies_keep_momentum_and_angular_momentum():
     assert world.kinetic_energy() == pytest.approx(energy, rel=0.02)
 
 
-@pytest.mark.plain
 def test_values_obey_every_rule():
     world, joints = machine_world(gravity=0.0)
     rails = {}

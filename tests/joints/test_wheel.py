@@ -29,6 +29,7 @@ def body(world: World, place: Any, mass: float, inertia: float, spin: Any = 0.0,
     return world.create_entity(Transform(place), RigidBody(mass=mass, **moves), turns)
 
 
+@pytest.mark.compiled
 def test_it_hangs_on_its_spring_on_its_axis_and_turns_as_its_motor_can(d):
     world, joints, axle = make(d, G)
     velocity, spin = ((3.0, 0.0), 0.0) if d == 2 else ((3.0, 0.0, 2.0), (1.0, -2.0, 0.0))

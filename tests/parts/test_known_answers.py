@@ -79,7 +79,6 @@ def test_a_box_cut_into_two_is_the_whole_in_space():
     assert ends[0] == pytest.approx(ends[1], abs=5e-3)  # steps split turns by the axes, in another order
 
 
-@pytest.mark.plain
 def test_a_piece_on_a_hinge_has_the_period_of_a_physical_pendulum():
     world, parts = parts_world((0, -G), dt=1 / 120)
     joints = Joints()
@@ -209,7 +208,6 @@ def test_fast_pieces_do_not_pass_walls(mode, restitution):
         energy = max(now, 1e-12)
 
 
-@pytest.mark.plain
 def test_a_heap_of_pieces_comes_to_rest():
     world, parts = parts_world((0, -G))
     floor(world, friction=0.6)

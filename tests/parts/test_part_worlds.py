@@ -237,6 +237,7 @@ def test_forces_and_joints_at_a_part_move_the_body():
     )
 
 
+@pytest.mark.compiled
 def test_snapshots_rollback_and_files_go_on_to_the_bit(tmp_path):
     world, parts = parts_world((0, -G))
     floor(world, friction=0.5)
@@ -295,6 +296,7 @@ def test_pieces_sleep_as_one_and_wake_to_the_bit():
     assert not body_of(world, pieces[1][1]).asleep
 
 
+@pytest.mark.compiled
 def test_pieces_in_space_sleep_on_where_a_snapshot_is_restored():
     world, parts = parts_world((0, 0, -G), 3, sleeping=True)
     world.create_entity(Transform((0, 0, -1)), BoxCollider((50.0, 50.0, 1.0), friction=0.5))
