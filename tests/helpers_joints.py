@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World
+from carom import Phase, Physics, RigidBody, Settings, SphereCollider, StepError, System, Transform, World
 from carom.plugins.joints import Hinge, Joints
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
@@ -41,6 +41,28 @@ def chain(world: World, links: int, way: Any, half: Any, hangs: bool = True) -> 
 def run(world: World, steps: int) -> None:
     for _ in range(steps):
         world.step()
+
+
+def run_failing(world: World, steps: int, due: int) -> None:
+    """The same, where the step of that number, if any, fails at its end once and is taken again."""
+
+    class Fails(System):
+        phase = Phase.END
+        fails = due >= 0
+
+        def process(self, dt: float) -> None:
+            if self.fails and self.world.step_count == due:
+                self.fails = False
+                raise RuntimeError("once")
+
+    system = Fails()
+    world.add_system(system)
+    for _ in range(steps):
+        try:
+            world.step()
+        except StepError:
+            world.step()
+    assert not system.fails
 
 
 def at(world: World, body: int) -> Transform:

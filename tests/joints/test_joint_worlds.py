@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers_joints import G, at, chain, disc, gaps, joint_world, plank, run
+from helpers_joints import G, at, chain, disc, gaps, joint_world, plank, run, run_failing
 
-from carom import Phase, Physics, RigidBody, Settings, SphereCollider, StepError, System, Transform, World
+from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World
 from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Motor, MousePull, Slider, Weld
-from carom.plugins.rotation import Rotation, Spin
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 
 @pytest.mark.parametrize(
@@ -264,31 +264,12 @@ def test_saved_world_goes_on_to_the_bit(tmp_path):
     assert loaded.state_hash() == world.state_hash()
 
 
-class Fails(System):
-    """Raises once."""
-
-    phase = Phase.END
-    due = 5
-
-    def process(self, dt):
-        if self.world.step_count == self.due:
-            self.due = -1
-            raise RuntimeError("once")
-
-
 def test_step_that_fails_leaves_the_forces_as_they_were():
     hashes = []
     for fails in (False, True):
         world, _ = joint_world()
         chain(world, 8, (0.8, 0.6), (0.45, 0.1))
-        system = Fails()
-        system.due = 5 if fails else -1
-        world.add_system(system)
-        for _ in range(20):
-            try:
-                world.step()
-            except StepError:
-                world.step()
+        run_failing(world, 20, 5 if fails else -1)
         hashes.append(world.state_hash())
     assert hashes[0] == hashes[1]
 
@@ -552,3 +533,19 @@ def test_columns_have_values_and_the_speeds_at_which_these_change(d):
     change = (after["value"] - before["value"]) / 1e-4
     np.testing.assert_allclose(change[exact], after["speed"][exact], rtol=1e-3, atol=1e-3)
     assert (abs(after["speed"][exact]) > 0.01).all()
+
+
+@pytest.mark.parametrize("mode", ["continuous", "event_driven"])
+@pytest.mark.parametrize("ropes", [False, True])
+def test_fast_boxes_pass_no_thin_wall_whether_something_holds_them_or_not(mode, ropes):
+    """The touch turns a box far within the step."""
+    for k in range(20):
+        world, _ = joint_world((0.0, 0.0), collision=mode)
+        world.create_entity(Transform((5, 0)), BoxCollider((0.02, 50)))
+        fast = RigidBody(linear_velocity=(100.0 + 3 * k, 40.0))
+        box = world.create_entity(Transform((0, 0), 0.15 * k), fast, BoxCollider((0.2, 0.1)), Spin())
+        if ropes:
+            world.create_entity(Distance(None, box, length=(0.0, 1000.0)))
+        run(world, 8)
+        assert at(world, box).x < 5.02, k
+        world.close()

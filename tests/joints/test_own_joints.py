@@ -7,17 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers_joints import G, at, chain, disc, joint_world, plank, run
+from helpers_joints import G, at, chain, disc, joint_world, plank, run, run_failing
 
 from carom import (
-    Phase,
     Physics,
     Plugin,
     PluginError,
     RigidBody,
     SphereCollider,
     StepError,
-    System,
     Transform,
     World,
     column,
@@ -350,30 +348,11 @@ def test_same_bits_again_from_snapshots_and_files(tmp_path):
     assert (loaded.state_hash(), joints.state(gear).value) == later
 
 
-class Fails(System):
-    """Raises once."""
-
-    phase = Phase.END
-    due = 5
-
-    def process(self, dt):
-        if self.world.step_count == self.due:
-            self.due = -1
-            raise RuntimeError("once")
-
-
 def test_step_that_fails_leaves_forces_and_values_as_they_were():
     found = []
     for fails in (False, True):
         world, joints, (_, gear, *_) = build()
-        system = Fails()
-        system.due = 5 if fails else -1
-        world.add_system(system)
-        for _ in range(20):
-            try:
-                world.step()
-            except StepError:
-                world.step()
+        run_failing(world, 20, 5 if fails else -1)
         found.append((world.state_hash(), joints.state(gear).value))
     assert found[0] == found[1]
 
@@ -392,14 +371,7 @@ def test_step_that_fails_while_balls_bounce_on_a_body_leaves_the_directions_of_f
         for k in range(3):
             place, ball = Transform((0.3 + 0.1 * k, 0.2 + 0.6 * k)), SphereCollider(0.1, restitution=0.8)
             world.create_entity(place, RigidBody(), ball, Spin())
-        system = Fails()
-        system.due = due
-        world.add_system(system)
-        for _ in range(60):
-            try:
-                world.step()
-            except StepError:
-                world.step()
+        run_failing(world, 60, due)
         hashes.append(world.state_hash())
     assert len(set(hashes)) == 1
 
