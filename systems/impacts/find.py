@@ -166,12 +166,12 @@ def passes_unseen(state, a, b, path, touch, dt):
 
 
 @part
-def is_held(state, a, b, speed, dt):
+def is_held(state, a, b):
     """Whether joints are to feel a touch of the two in the substep that brings it, not at the end of the step: nothing
-    bounces, joints hold one of the two, and they are not so fast that the solver would miss it."""
+    bounces, and joints hold one of the two."""
     joined = state.bodies.joined
     held = state.solver.joints.active > 0 and (joined[owner_of(state, a)] or joined[owner_of(state, b)])
-    return held and restitution_of(state, a, b) == 0.0 and -speed * dt <= smaller_extent(state.bodies, a, b)
+    return held and restitution_of(state, a, b) == 0.0
 
 
 @part
@@ -184,7 +184,7 @@ def closing_speed(state, a, b, path, touch, kind, dt):
     threshold, rounding = bounce_threshold(state, a, b), 0.0
     if impacts.sweeps:  # else a plastic impact would be one again, by a rounding error
         rounding = ROUNDING * (length(bodies.path_velocity[a]) + length(bodies.path_velocity[b]))
-    if is_held(state, a, b, speed, dt) or not speed < -(threshold + rounding):  # a contact at rest
+    if is_held(state, a, b) or not speed < -(threshold + rounding):  # a contact at rest
         if state.spinning and not speed < -ROUNDING * turning_travel(state, 1.0, a, b):  # it has landed
             return NONE, speed
         return HAND_OVER if passes_unseen(state, a, b, path, touch, dt) else NONE, speed
