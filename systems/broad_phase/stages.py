@@ -29,8 +29,8 @@ from .uniform_grid import FULL, build_grid, look_around, look_inside, look_near,
 # 8 million candidates: with everything that is kept of a pair about 4 gigabytes. A game has 1 to 50 per body.
 CANDIDATE_LIMIT = 1 << 23
 
-# Moving bodies from which a uniform grid is tried. It is faster from about 32 on (190 bodies: 2 us against 25), but a
-# scene of few bodies starts sooner if its kernels need not be compiled.
+# Moving bodies from which a uniform grid is tried. It is faster from about 32 on, but a scene of few bodies starts
+# sooner if its kernels need not be compiled.
 UNIFORM_GRID_MIN = BRUTE_FORCE_MAX + 1
 
 BLOCK = 64  # boxes that are ruled out together

@@ -145,7 +145,8 @@ def keep_out_of_all(state, i):
 def resolve_static_penetration(state, dt):
     """Put the bodies that the solver has moved out of what cannot be moved."""
     pairs, bodies = state.pairs, state.bodies
-    if state.solver.contacts == 0 and not state.any_warm_started and not (state.spinning and state.impacts.logged > 0):
+    pushed = state.solver.contacts > 0 or state.any_warm_started or (state.spinning and state.impacts.logged > 0)
+    if not pushed or state.count == state.dynamic:
         return OK
     for turn in range(ROUNDS):
         first, moved = state.moving if turn == ROUNDS - 1 else state.dynamic, False

@@ -56,7 +56,7 @@ def test_answers_follow_steps_and_writes(d):
 @pytest.mark.parametrize(
     ("count", "kinds", "grids"),
     [
-        (150, ("dynamic",), (False, False)), (900, ("dynamic",) * 3, (False, True)),
+        (60, ("dynamic",), (False, False)), (900, ("dynamic",) * 3, (False, True)),
         (900, ("dynamic", "dynamic", "kinematic"), (True, True)), (900, ("dynamic", *["kinematic"] * 3), (True, False)),
     ],
 )  # fmt: skip

@@ -24,7 +24,7 @@ from ..constants import (
     SWEEPS,
 )  # fmt: skip
 from .given import rates_of_given
-from .joints import GIVEN, POINT, TURN, relax_struck
+from .joints import GIVEN, POINT, TURN, relax_open
 from .rows import closing_speed, relax_listed, velocity_at
 
 
@@ -43,24 +43,56 @@ def islands_of(solver, span):
 
 
 @part
+def open_all(solver, span):
+    """All islands of a range are open: further passes may go over them."""
+    joints, islands, opened = solver.joints, islands_of(solver, span), 0
+    for t in range(islands[0], islands[1]):
+        solver.listed_of[t] = 1
+    for q in range(span[2], span[3]):
+        solver.open_body[opened] = q
+        opened += solver.island[q] >= 0
+    solver.opened = opened
+    if len(span[4]) > 1:
+        joints.opened = joints.end - joints.begin
+        for e in range(joints.opened):
+            joints.open_row[e] = joints.order[joints.begin + e]
+
+
+@part
+def close_solved(solver, arms):
+    """Islands without rows in ``listed`` are closed: no pass goes over their joints, nor is their energy weighed."""
+    joints, island, opened = solver.joints, solver.island, 0
+    for e in range(solver.opened):
+        q = solver.open_body[e]
+        solver.open_body[opened] = q
+        opened += solver.listed_of[island[q]] > 0
+    solver.opened = opened
+    if len(arms) > 1:
+        opened = 0
+        for e in range(joints.opened):
+            j = joints.open_row[e]
+            joints.open_row[opened] = j
+            opened += solver.listed_of[max(island[joints.first[j]], island[joints.second[j]])] > 0
+        joints.opened = opened
+
+
+@part
 def weigh(solver, span, islands):
-    """What contacts do to the energy of each island if a share s of all that they have changed acts: E(s) = slope s +
-    curvature s^2 / 2, which is exact. What moves by itself gives its work to the island, not the contacts."""
-    start, stop, begin, end, arms = span
+    """What contacts do to the energy of each open island if a share s of all that they have changed acts: E(s) =
+    slope s + curvature s^2 / 2, which is exact. What moves by itself gives its work to the island, not the contacts."""
+    start, stop, _, _, arms = span
     slope, curvature, energy, island = solver.slope, solver.curvature, solver.energy, solver.island
     for t in range(islands[0], islands[1]):
-        slope[t] = curvature[t] = energy[t] = 0.0
-    for q in range(begin, end):
-        t = island[q]
-        if t >= 0:
-            v, m = solver.velocity_before[q], solver.heft[q]
-            change = sub(solver.velocity[q], v)
-            slope[t] += m * dot(v, change)
-            curvature[t] += m * dot(change, change)
-            energy[t] += m * dot(v, v)
-    for q in range(begin, end if len(arms) > 0 else begin):
-        t = island[q]
-        if t >= 0:
+        if solver.listed_of[t] > 0:
+            slope[t] = curvature[t] = energy[t] = 0.0
+    for e in range(solver.opened):
+        q = solver.open_body[e]
+        t, v, m = island[q], solver.velocity_before[q], solver.heft[q]
+        change = sub(solver.velocity[q], v)
+        slope[t] += m * dot(v, change)
+        curvature[t] += m * dot(change, change)
+        energy[t] += m * dot(v, v)
+        if len(arms) > 0:
             before = solver.spin_before[q]
             change = sub(solver.spin[q], before)
             slope[t] += spin_energy(solver, q, before, change)
@@ -68,7 +100,7 @@ def weigh(solver, span, islands):
             energy[t] += spin_energy(solver, q, before, before)
     for k in range(start, stop if solver.movers > 0 else start):
         a, b = solver.first[k], solver.second[k]
-        if island[a] < 0 or island[b] < 0:
+        if (island[a] < 0 or island[b] < 0) and solver.listed_of[island_of(solver, k)] > 0:
             push = scale(solver.normal[k], solver.impulse[k])
             if solver.has_friction:
                 push = add(push, solver.tangent[k])
@@ -87,8 +119,8 @@ def weigh(solver, span, islands):
 def weigh_movers(solver):
     """The work of what moves by itself at the other ends of joints is none of theirs."""
     joints, island = solver.joints, solver.island
-    for e in range(joints.begin, joints.end if solver.movers > 0 else joints.begin):
-        j = joints.order[e]
+    for e in range(joints.opened if solver.movers > 0 else 0):
+        j = joints.open_row[e]
         a, b = joints.first[j], joints.second[j]
         if island[a] < 0 or island[b] < 0:
             q, arm, away = (a, joints.arm_a[j], -1.0) if island[a] < 0 else (b, joints.arm_b[j], 1.0)
@@ -151,6 +183,7 @@ def find_unsolved(solver, turn, any_struck, dt, span, islands):
     unsolved, struck, passes, extent = solver.unsolved, solver.struck, solver.passes, solver.extent
     any_gain, most, count = False, 0, 0
     for t in range(islands[0], islands[1]):
+        solver.listed_of[t] = 0
         unsolved[t] = gains(solver, t) and not solver.jointed[t]  # what joints give passes over contacts do not take
         any_gain |= unsolved[t]
         most = max(most, passes[t] if struck[t] else 0)
@@ -160,7 +193,9 @@ def find_unsolved(solver, turn, any_struck, dt, span, islands):
             t = island_of(solver, k)
             if ((struck[t] and excess * passes[t] > least) or unsolved[t]) and turn < passes[t]:
                 solver.listed[count] = k
+                solver.listed_of[t] += 1
                 count += 1
+    close_solved(solver, span[4])
     return count
 
 
@@ -237,10 +272,11 @@ def finish_substep(solver, bias_rate, any_struck, h, dt, span):
     while count > 0:
         for _ in range(SWEEPS):
             if len(span[4]) > 1:
-                relax_struck(solver, turn)
+                relax_open(solver)
             relax_listed(solver, count, span[4])
         weigh(solver, span, islands)
         turn += SWEEPS
         count = find_unsolved(solver, turn, any_struck, dt, span, islands)
     restrain(solver, span, islands)
     settle(solver, islands)
+    open_all(solver, span)

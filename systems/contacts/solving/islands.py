@@ -268,6 +268,9 @@ def place_rows(state):
 def place_joints(state):
     """The rows of joints by range, those of each in their order."""
     solver, joints, ends = state.solver, state.solver.joints, state.solver.joint_ends
+    ends[0] = joints.active
+    if solver.ranges == 1:
+        return
     for s in range(solver.ranges):
         ends[s] = 0
     for e in range(joints.active):
@@ -277,10 +280,10 @@ def place_joints(state):
         rows, ends[s] = rows + ends[s], rows
     for e in range(joints.active):
         s = solver.range_of[island_of_joint(state, joints.order[e])]
-        joints.sorted[ends[s]] = joints.order[e]
+        joints.open_row[ends[s]] = joints.order[e]
         ends[s] += 1
     for e in range(joints.active):
-        joints.order[e] = joints.sorted[e]
+        joints.order[e] = joints.open_row[e]
 
 
 @part

@@ -347,14 +347,13 @@ def solve_joints(solver, pushes):
 
 
 @part
-def relax_struck(solver, turn):
+def relax_open(solver):
     """A pass without pushing over the joints of islands whose contacts have further passes, as they have."""
     joints, columns = solver.joints, columns_of(solver)
-    for e in range(joints.begin, joints.end):
-        j = joints.order[e]
+    for e in range(joints.opened):
+        j = joints.open_row[e]
         a, b = joints.first[j], joints.second[j]
-        t = max(solver.island[a], solver.island[b])
-        if not solver.struck[t] or turn >= solver.passes[t] or swings(joints, j):
+        if swings(joints, j):
             continue
         if joints.kind[j] != POINT:
             solve_row(solver, j, False)

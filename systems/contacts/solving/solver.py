@@ -37,7 +37,7 @@ from ..constants import (
     TOLD_GAIN,
     VERY_DEEP,
 )  # fmt: skip
-from .guard import excess_speed, finish_substep, island_of, islands_of
+from .guard import excess_speed, finish_substep, island_of, islands_of, open_all
 from .hard import choose_hard, leave_open
 from .joints import add_joints, keep_joints, measure_joints, solve_joints, start_joints, warm_start_joints
 from .rows import (
@@ -321,6 +321,7 @@ def solve_range(solver, substeps, kind, dt, span):
     """The substeps of a range."""
     h, stiff, special = dt / substeps, kind == HARD, kind != ORDINARY
     springs = spring_of(solver, 1.0, substeps, h), spring_of(solver, STIFFER, substeps, h)
+    open_all(solver, span)
     scale_impulses(solver, 1.0 / substeps, span)
     for k in range(span[0], span[1]):
         sag = LOADED * solver.sag * solver.impulse[k] * h / solver.mass[k]
