@@ -43,7 +43,7 @@ SPRING_FREQUENCY = 0.125  # times the rate of the substeps: faster springs hold;
 # The number of substeps of an island.
 MOST_SAG = 0.005  # extents: no contact sags more under the island's heaviest body,
 MOST_GIVE = 0.02  # of its length: no joint gives more under that body
-LONG_WAY = 0.5  # extents per step, or rad of a limit: what strikes the bodies of joints faster would tear them in the
+LONG_WAY = 0.25  # extents per step, or rad of a limit: what strikes the bodies of joints faster would tear them in the
 JOLTED_SUBSTEPS = 32  # usual substeps
 BEND = 4.0  # times the square of the welds of an island: beams of them bend so much more than one
 OWN_SAG = 0.002  # nor a contact under one body alone: grains, whose contacts are hard

@@ -13,10 +13,12 @@ import math
 
 from ....framework.compilation import part
 from ....framework.jit.records.record_type import zero_of
-from ....framework.vectors import dot, length, sub
+from ....framework.vectors import add, dot, length, sub
 from ...bits import lowest_bit
 from ...compounds.rows import owner_of, place_of
+from ...integration.turning import arms_to, velocity_by_spin
 from ...islands import root_of
+from ...narrow_phase.manifolds import centre_offset_at_start
 from ...shapes.tolerances import smaller_extent
 from ..constants import (
     BEND,
@@ -179,7 +181,10 @@ def weigh_rows(state, dt):
         stiff = (w_a + w_b) * inverse_extent
         solver.stiff[t], solver.own[t] = max(solver.stiff[t], stiff), max(solver.own[t], stiff / max(w_a, w_b))
         strike = dot(sub(v_a, v_b), pairs.normal[c]) * dt * inverse_extent
-        solver.jolted[t] |= solver.jointed[t] and length(sub(v_a, v_b)) * dt * inverse_extent > LONG_WAY
+        if solver.jointed[t]:
+            arms = arms_to(bodies, a, b, pairs.normal[c], pairs.point[c], centre_offset_at_start(bodies, a, b))
+            speed = length(add(sub(v_b, v_a), velocity_by_spin(bodies, a, b, arms)))
+            solver.jolted[t] |= speed * dt * inverse_extent > LONG_WAY
         if strike > solver.strike[t]:
             solver.strike[t] = strike
 
