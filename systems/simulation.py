@@ -32,6 +32,7 @@ from .inspection.energies import kinetic_energy, momentum, potential_energy
 from .inspection.planned_columns import planned_columns
 from .inspection.planned_kernels import planned_kernels
 from .integration.system import Integration
+from .integration.turns import TURNS
 from .linking.preparation import evaluate_forces, keep_ready, link_needed
 from .linking.steps import StepLinks
 from .narrow_phase.system import NarrowPhase
@@ -111,6 +112,7 @@ class Simulation:
         )
         self.parts_version = 0
         self.extensions = Extensions(self.state, self.scene, self.adoption, world.registry)
+        self.integration.turns = self.extensions.record(TURNS)
         self.links = StepLinks(self.scene, self.program, self.integration, self.search, self.extensions)
         self.must_check = False  # in every step: sensors among levels, pairs that no plugin has
         self.copies = ColumnCopies(self.table)
@@ -182,7 +184,7 @@ class Simulation:
             self._refresh()
         if self.must_check:
             self._check()
-        if not self.links.follows(len(self._world.force_systems)):
+        if not self.links.follows(self.forces.kind()):
             self.link()
         if others_write or words[self._others_write]:
             self._begin_user_code(others_write)
@@ -249,7 +251,7 @@ class Simulation:
     def link(self) -> None:
         """Compile or load what the step needs."""
         try:
-            self.parts_version += self.links.link(len(self._world.force_systems))
+            self.parts_version += self.links.link(self.forces.kind())
         except Exception as error:
             self.attribute_errors.describe(error)
             raise
@@ -448,6 +450,7 @@ def _make_table(dimensions: int) -> Table:
         table.add_component_type(component)
     table.add_array("previous_position", "vector")
     table.add_array("force", "vector", on_demand=True)
+    table.add_array("torque", "angular", on_demand=True)
     table.add_array("inverse_mass")
     add_columns(table)
     return table

@@ -33,6 +33,7 @@ class Bodies:
         mass: BodiesColumn
         inverse_mass: BodiesColumn
         force: BodiesColumn
+        torque: BodiesColumn
         constant_force: BodiesColumn
         gravity_scale: BodiesColumn
         linear_damping: BodiesColumn
@@ -147,7 +148,7 @@ class Fields:
 
 
 class SelectedBodies:
-    """Some dynamic bodies' columns, as copies; ``force`` is written back by :meth:`scatter_force`.
+    """Some dynamic bodies' columns, as copies; ``force`` and ``torque`` are written back by :meth:`scatter`.
 
     What a force system sees when only some of the bodies have what it requires. The other columns are read-only: what
     is written into a copy would be lost.
@@ -157,6 +158,7 @@ class SelectedBodies:
         self._table = table
         self._rows = rows
         self._force = table.values("force", rows)
+        self._torque: np.ndarray | None = None  # until it is asked for
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -170,6 +172,17 @@ class SelectedBodies:
     def force(self, force: Any) -> None:
         _write(self._force, force, "force")
 
+    @property
+    def torque(self) -> np.ndarray:
+        """N m: (n,) in 2D, (n, 3) in 3D; what is assigned is written into it."""
+        if self._torque is None:
+            self._torque = self._table.values("torque", self._rows)
+        return self._torque
+
+    @torque.setter
+    def torque(self, torque: Any) -> None:
+        _write(self.torque, torque, "torque")
+
     def __getattr__(self, name: str) -> Any:
         if self._table.has_column(name):
             copy = self._table.values(name, self._rows)
@@ -180,8 +193,10 @@ class SelectedBodies:
             return Fields(self, prefix)
         raise _no_column(name, Bodies(self._table).column_names())
 
-    def scatter_force(self) -> None:
+    def scatter(self) -> None:
         self._table.make("force")[self._rows] = self._force
+        if self._torque is not None:
+            self._table.make("torque")[self._rows] = self._torque
 
 
 def _no_column(name: str, known: list[str]) -> AttributeError:

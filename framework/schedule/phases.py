@@ -91,7 +91,8 @@ class ForceSystem(OfOneWorld):
         return type(self).__name__
 
     def add_forces(self, bodies: Any, time: float) -> None:
-        """Add to ``bodies.force`` (n, d), in newtons, from the other columns and the time in seconds."""
+        """Add to ``bodies.force`` (n, d), in newtons, from the other columns and the time in seconds; with a Spin in
+        ``requires`` also to ``bodies.torque``, N m, (n,) in 2D, (n, 3) along the world's axes in 3D."""
         raise NotImplementedError(f"{self.name} has no add_forces(bodies, time)")
 
     # A force system that has a potential may define potential_energy(bodies) -> float, in joules,

@@ -135,7 +135,7 @@ class Extensions:
     def conditions(self, met: dict[str, bool]) -> dict[str, bool]:
         """Which of the stages are needed, by name, where these conditions are met."""
         needed = {
-            stage.name: met[stage.needed] and present
+            stage.name: met.get(stage.needed, False) and present  # "on demand": none of every step
             for stage, present in zip(self.stages, self.present(), strict=True)
         }
         spins = any(needed[stage.name] for stage in self.stages if "spin" in stage.writes)

@@ -12,7 +12,7 @@ from ...framework.names import did_you_mean
 from ...framework.plugins.registry import PluginStage
 from ...framework.schedule.stages import Stage
 from ..broad_phase.system import BroadPhase
-from ..integration.system import Integration
+from ..integration.system import ON_WAY, Integration
 from ..narrow_phase.system import NarrowPhase
 from ..records import BODIES, COLLIDERS, QUARANTINE, SLEEP_COLUMNS, STATE, TABLE_COLUMNS, UNDO, UNDO_FORCE
 from ..stage_list import CONDITIONS, ON_DEMAND, STAGES, SYSTEM_OF_STAGE
@@ -50,10 +50,15 @@ def check_stages(stages: Iterable[PluginStage]) -> None:
     """PluginError for a stage that no step can have."""
     for stage in stages:
         fault = _fault_of_place(stage) or _fault_of_columns(stage)
-        if not fault and stage.needed not in CHOICES:
+        if not fault and stage.needed not in CHOICES and not is_on_way(stage):
             fault = f"needed must be one of {', '.join(CHOICES)}, got {stage.needed!r}"
         if fault:
             raise PluginError(f"plugin {stage.plugin}: stage {stage.name}, {stage.place}: {fault}")
+
+
+def is_on_way(stage: PluginStage) -> bool:
+    """Whether it turns bodies within the step, beside the stages of integrators."""
+    return stage.anchor == ON_WAY and stage.needed == "on demand"
 
 
 def _fault_of_place(stage: PluginStage) -> str:
@@ -62,7 +67,7 @@ def _fault_of_place(stage: PluginStage) -> str:
         return "a built-in stage has that name"
     if anchor not in SYSTEM_OF_STAGE:
         return f"there is no such stage{did_you_mean(anchor, SYSTEM_OF_STAGE)}; docs/architecture.md lists them"
-    if anchor in {each.name for each in ON_DEMAND}:
+    if anchor in {each.name for each in ON_DEMAND} and not is_on_way(stage):
         return "that stage is no part of every step"
     if anchor in INTEGRATORS:
         return "that stage belongs to some integrators: before='end_flight' is after the flight of all"

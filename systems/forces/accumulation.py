@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ...components.spin import Spin
 from ...framework.data.bodies import Bodies, SelectedBodies
 from ...framework.data.table import Table
+from ...framework.errors import CaromError
 from ...framework.jit.records.record import Record
 from ...framework.schedule.phases import ForceSystem, Phase
 from ...framework.schedule.plan import PlannedKernel
@@ -61,8 +63,16 @@ class ForceAccumulation(StagedSystem):
         if self._state.compound:
             self._program.run_one(carry_forces.__name__, self.world.settings.dt)
 
+    def kind(self) -> tuple[int, bool]:
+        """How many force systems there are, and whether some give torques: bodies turn at each evaluation then."""
+        systems = self.world.force_systems
+        return len(systems), any(Spin in system.requires for system in systems)
+
     def add_systems(self, time: float) -> None:
         """Let each force system add to ``force``: in place where all bodies have what it requires, else to copies."""
+        torque = self._table.arrays.get("torque")
+        if torque is not None:
+            torque[...] = 0.0
         for system in self.world.force_systems:
             bodies = required_bodies(self._table, self._bodies, system)
             if bodies is None:
@@ -73,7 +83,12 @@ class ForceAccumulation(StagedSystem):
                 error.add_note(f"in force system {system.name}")
                 raise
             if isinstance(bodies, SelectedBodies):
-                bodies.scatter_force()
+                bodies.scatter()
+
+        torque = self._table.arrays.get("torque")
+        if torque is not None and torque.any() and not self.kind()[1]:
+            names = ", ".join(system.name for system in self.world.force_systems)
+            raise CaromError(f"force systems {names}: what adds to bodies.torque needs requires = (Spin,)")
 
     def nothing_acts(self) -> bool:
         """Whether there is no gravity, no force system and, at the moment, no force given to a dynamic body."""

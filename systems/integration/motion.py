@@ -9,6 +9,7 @@ import numpy as np
 
 from ...framework.jit.records.record import Record
 from ...framework.schedule.stages import Program
+from .turns import BESIDE
 
 
 @dataclass
@@ -27,6 +28,7 @@ class Motion:
     start_velocity: np.ndarray
     evaluator: Callable[[float], None] | None  # None: no force depends on the state
     program: Program | None = None  # with the stages of the built-in integrators
+    turn: Callable[[int, float], None] | None = None  # beside such a stage; None: torques hold throughout the step
 
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
@@ -49,6 +51,8 @@ class Motion:
         return self.program.state
 
     def run(self, stage: str, h: float) -> None:
-        """Run a stage of a built-in integrator over ``h`` seconds."""
+        """Run a stage of a built-in integrator over ``h`` seconds, and turn bodies beside it."""
         assert self.program is not None
+        if self.turn is not None and stage in BESIDE:
+            self.turn(BESIDE[stage], h)
         self.program.run_one(stage, h)

@@ -181,23 +181,38 @@ def verlet_drift(state, h):
     return 0
 
 
-def verlet_kick(state, h):
-    """The second half: the mean of both accelerations instead of the first.
+@part
+def kick_gain(z, h):
+    """By how much the change of the acceleration changes the velocity in a Verlet step.
 
     With damping, z = -c h, the first weighs phi2(z) / phi1(-z) and the second the rest of phi1(z): those alone are
     exact for a constant force and make the step its own adjoint, which keeps it reversible and lets Yoshida's
     composition reach the fourth order (derived; phi2(z) + phi2(-z) = phi1(z) phi1(-z)).
     """
+    return 0.5 * h if z == 0.0 else h * (phi1(z) - phi2(z) / phi1(-z))
+
+
+def verlet_kick(state, h):
+    """The second half: the mean of both accelerations instead of the first."""
     bodies, light_h = state.bodies, h
     velocity, force, damping = bodies.linear_velocity, bodies.force, bodies.linear_damping
     for i in range(state.first, state.dynamic):
         h = light_h if damping[i] <= state.heavy_damping else state.heavy_step
-        z, gain = -damping[i] * h, 0.5 * h
-        if z != 0.0:
-            gain = h * (phi1(z) - phi2(z) / phi1(-z))
+        gain = kick_gain(-damping[i] * h, h)
         change = sub(scale(force[i], bodies.inverse_mass[i]), bodies.acceleration[i])
         velocity[i] = add_scaled(velocity[i], change, gain)
     return 0
+
+
+@part
+def runge_kutta_weights(z):
+    """(those of the accelerations of stages 1, 2 or 3, and 4; of the velocity after the step and after half of it; of
+    an acceleration in half a step) with damping, z = -c h."""
+    if z == 0.0:
+        return 1.0 / 6.0, 1.0 / 6.0, 1.0 / 6.0, 1.0, 1.0, 1.0
+    p1, p2, p3 = phi1(z), phi2(z), phi3(z)
+    f1, f2, f3 = p1 - 3.0 * p2 + 4.0 * p3, p2 - 2.0 * p3, 4.0 * p3 - p2
+    return f1, f2, f3, math.exp(z), math.exp(0.5 * z), phi1(0.5 * z)
 
 
 def runge_kutta_stage(state, h):
@@ -212,13 +227,7 @@ def runge_kutta_stage(state, h):
     x0, v0 = bodies.previous_position, bodies.start_velocity
     first, middle, speeds, kicks = bodies.acceleration, bodies.rk_middle, bodies.rk_speeds, bodies.rk_kicks
     for i in range(state.first, state.dynamic):
-        z = -bodies.linear_damping[i] * h
-        f1 = f2 = f3 = 1.0 / 6.0
-        decay = half_decay = half_gain = 1.0
-        if z != 0.0:
-            p1, p2, p3 = phi1(z), phi2(z), phi3(z)
-            f1, f2, f3 = p1 - 3.0 * p2 + 4.0 * p3, p2 - 2.0 * p3, 4.0 * p3 - p2
-            decay, half_decay, half_gain = math.exp(z), math.exp(0.5 * z), phi1(0.5 * z)
+        f1, f2, f3, decay, half_decay, half_gain = runge_kutta_weights(-bodies.linear_damping[i] * h)
         a, v = scale(bodies.force[i], bodies.inverse_mass[i]), velocity[i]
         if stage == 0:
             first[i], speeds[i], kicks[i] = a, v, scale(a, f1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -38,8 +39,11 @@ from .stages import (
     verlet_drift,
     verlet_kick,
 )
+from .turns import COLUMNS
 
 STANDARD = frozenset((*STANDARD_INTEGRATORS.values(), Flight))
+ON_WAY = "runge_kutta_stage"  # stages of plugins next to it turn bodies beside all that an integrator calls
+TURNS_BESIDE = "turns bodies beside each stage of the integrator: force systems give torques"
 FLIES = "free flight of the bodies that forces move, unless nothing acts and none is damped"
 MOTION = ("position", "linear_velocity")
 FORCED = (*MOTION, "force", "inverse_mass", "linear_damping")
@@ -111,6 +115,7 @@ class Integration(StagedSystem):
         self._scene, self._forces, self._registry, self._settings = scene, forces, registry, settings
         self._made: dict[Any, Integrator] = {}
         self._motion: Motion
+        self.turns: Record  # what turns bodies beside stages of the integrator
         self._viewed: Any = None  # the scene's version and the first row when the views in the motion were taken
 
     # -- which integrator -------------------------------------------------------------------------
@@ -164,6 +169,7 @@ class Integration(StagedSystem):
         self._forces.several_evaluations = integrator.evaluations > 1
         if type(integrator) in STANDARD and (state.flies or state.force_changes):
             self._scene.reserve(*integrator.COLUMNS)
+        self.turns.within, self.turns.torque = False, np.empty(0)
         if integrator.path > LINE and state.collides:
             self._scene.reserve("path_second", "path_third")
 
@@ -186,11 +192,15 @@ class Integration(StagedSystem):
             self._take_views()
         motion = self._motion
         motion.evaluator = self._evaluator(motion.force) if self.world.force_systems else None
+        torque = self._take_torques(motion)
+        at_start = None if torque is None or self.turns.within else torque.copy()
         try:
             integrator.advance(motion, dt)
         except Exception as error:
             error.add_note(f"integrator {self.integrator_name!r}")
             raise
+        if at_start is not None:  # bodies turn after the flight, once
+            torque[...] = at_start
 
     def _take_views(self) -> None:
         """The arrays are the same until the structure changes."""
@@ -202,6 +212,34 @@ class Integration(StagedSystem):
         names += ("previous_position", "start_velocity")
         self._motion = Motion(*(getattr(bodies, name)[first:dynamic] for name in names), None, self._program)
         self._viewed = self._scene.version, first
+
+    def _turning(self) -> list[str]:
+        """Names of the stages that turn bodies beside those of the integrator: of a built-in one that evaluates torques
+        several times, if force systems give any."""
+        integrator = self.integrator
+        if type(integrator) not in STANDARD or integrator.evaluations == 1 or not self._forces.kind()[1]:
+            return []
+        return [stage.name for stage in self._program.stages if stage.plugin and stage.anchor == ON_WAY]
+
+    def _take_torques(self, motion: Motion) -> np.ndarray | None:
+        """The column of those of force systems, if any gives some."""
+        motion.turn = None
+        if not self._forces.kind()[1]:
+            return None
+        turns, torque, turning = self.turns, self._scene.table.make("torque"), self._turning()
+        turns.torque = torque.reshape(-1)
+        turns.within = bool(turning)
+        if turning:
+            turns.reserve(len(torque), *COLUMNS)
+            turns.begins = True
+            motion.turn = functools.partial(self._turn, turning)
+        return torque
+
+    def _turn(self, turning: list[str], part: int, h: float) -> None:
+        self.turns.part = part
+        for name in turning:
+            self._program.run_one(name, h)
+        self.turns.begins = False
 
     def _evaluator(self, force: np.ndarray) -> Callable[[float], None]:
         """Sums the forces at a later moment of the step."""
@@ -229,6 +267,8 @@ class Integration(StagedSystem):
         called: Any = getattr(self.integrator, "kernels", None)  # a plugin's need not say
         for name in called(bool(self.world.force_systems)) if called is not None else ():
             yield PlannedKernel(name, FLIES)
+        for name in self._turning():
+            yield PlannedKernel(name, TURNS_BESIDE)
         if self.world.force_systems and self.integrator.evaluations > 1:
             for kernel in self._forces.kernels_of_systems():
                 yield dataclasses.replace(kernel, reason=f"{kernel.reason}, at each stage")

@@ -32,7 +32,8 @@ class StepLinks:
         self._scene, self._state, self._program = scene, scene.state, program
         self._integration, self._search, self._extensions = integration, search, extensions
         self._state.links = np.zeros(len(PLACES), np.int64)
-        self.version = self._forces = NEVER  # of the scene, and how many force systems there were
+        self.version = NEVER  # of the scene
+        self._forces = NEVER, False  # how many force systems there were, and whether some of them turn
         self._joined = False, False  # there are joints, and parts of bodies
         self._bounces = False  # some collider does, or has
         self._key: Any = None  # what the linked stages depend on
@@ -40,7 +41,7 @@ class StepLinks:
         self._shapes_key: Any = None
         self._kept_key: Any = None
 
-    def follows(self, force_systems: int) -> bool:
+    def follows(self, force_systems: tuple[int, bool]) -> bool:
         """Whether nothing has changed since the last time that makes other functions necessary."""
         joined = self._have_joints_and_parts()
         return self._scene.version == self.version and force_systems == self._forces and joined == self._joined
@@ -58,7 +59,7 @@ class StepLinks:
         """Other settings: link again before the next step."""
         self.version, self._key = NEVER, None
 
-    def link(self, force_systems: int) -> bool:
+    def link(self, force_systems: tuple[int, bool]) -> bool:
         """Compile or load what the step needs, and see to what later steps and queries may need.
 
         True if these are other stages than before; bodies that come and go seldom change that.

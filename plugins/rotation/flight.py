@@ -1,0 +1,161 @@
+"""How bodies turn in a step whose torques hold throughout it.
+
+In a plane the angle is one more coordinate, and is advanced as positions are. In space a body turns under no torque as
+Euler's equations say (see free_rotation), between two halves of what torques and damping do: of order 1, 2 or 4, as the
+integrator of the positions is.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ...components.spin import UNKNOWN, inertia_about
+from ...framework.compilation import part
+from ...framework.jit.records.record_type import zero_of
+from ...systems.compounds.inertia import inertia_of_compound
+from ...systems.compounds.rows import has_parts
+from ...systems.integration.stages import CUBIC, LINE, phi1, phi2
+from ...systems.shapes.dispatch import second_moments
+from ...systems.shapes.quaternions import product, rotate, rotation_in_space, set_rotation
+from .free_rotation import diagonalised, turn_freely, turn_to_energy
+
+TRIPLE = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))  # of the step: the outer two of Yoshida's three
+NOT_POSITIVE = "Spin.inertia must be positive and finite"
+
+
+@part
+def inertia_of(state, spin, i):
+    """(xx, yy, zz, xy, xz, yz) of the inertia of body i about its position, along its own axes; in a plane zz alone."""
+    d, bodies = len(zero_of(state)), state.bodies
+    if spin.inertia[i, 0] == spin.inertia[i, 0]:
+        for k in range(1 if d == 2 else 3):
+            if not 0.0 < spin.inertia[i, k] < math.inf:
+                state.blamed = i + 1
+                raise ValueError(NOT_POSITIVE)
+        if d == 2:
+            return 0.0, 0.0, spin.inertia[i, 0], 0.0, 0.0, 0.0
+        return spin.inertia[i, 0], spin.inertia[i, 1], spin.inertia[i, 2], 0.0, 0.0, 0.0
+    if has_parts(state, i):
+        return inertia_of_compound(state, i)
+    shape = bodies.levels[0, i] if state.collides else -1
+    several = state.collides and state.several_levels and bodies.levels[state.level_count - 1, i] != shape
+    if shape < 0 or several or state.shapes.moments[shape] == 0:
+        state.blamed = i + 1
+        raise ValueError(UNKNOWN)
+    found, offset = second_moments(state, shape, i), state.colliders.offset[state.shapes.slots[shape], i]
+    return inertia_about(found, offset, bodies.mass[i])
+
+
+@part
+def limited(w, most):
+    """An angular velocity, shortened if it exceeds the limit; nan: none."""
+    size = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    by = most / size if size > most else 1.0
+    return w[0] * by, w[1] * by, w[2] * by
+
+
+@part
+def torque_on(state, spin, turns, i, k):
+    """Along one axis."""
+    torque, given = spin.constant_torque[i, k] + spin.applied_torque[i, k] + spin.step_torque[i, k], turns.torque
+    if len(given) == 0:
+        return torque
+    return torque + given[i if is_plane(state) else 3 * i + k]
+
+
+@part
+def is_plane(state):
+    return len(zero_of(state)) == 2
+
+
+@part
+def torques_on(state, spin, turns, i):
+    """Three numbers; in a plane the first."""
+    x = torque_on(state, spin, turns, i, 0)
+    if is_plane(state):
+        return x, 0.0, 0.0
+    return x, torque_on(state, spin, turns, i, 1), torque_on(state, spin, turns, i, 2)
+
+
+@part
+def turn_in_plane(state, spin, turns, i, h):
+    """The angle and the angular velocity of a dynamic body after a step."""
+    moment, damping, w = inertia_of(state, spin, i)[2], spin.angular_damping[i], spin.angular_velocity[i, 0]
+    acceleration = torque_on(state, spin, turns, i, 0) / moment if moment > 0.0 else 0.0
+    w, z, most = limited((w, 0.0, 0.0), spin.max_angular_speed[i])[0], -damping * h, spin.max_angular_speed[i]
+    new = w * math.exp(z) + acceleration * h * phi1(z)
+    turn = h * new
+    if state.usual_path_degree > LINE:
+        turn = h * (w * phi1(z) + acceleration * h * phi2(z))
+    elif state.moves_with_old_velocity:
+        turn = h * w
+    new = limited((new, 0.0, 0.0), most)[0]
+    if abs(turn) > most * h:
+        turn = math.copysign(most * h, turn)
+    spin.angular_velocity[i, 0] = new
+    state.bodies.rotation[i] += turn
+
+
+@part
+def pushed(q, m, inverse, act, h):
+    """The angular momentum along the principal axes after h seconds of torque and damping. act: (torque along the axes
+    of the world, damping)."""
+    along, decay, gain = rotate(q, act[0], True), math.exp(-act[1] * h), h * phi1(-act[1] * h)
+    return (
+        m[0] * decay + along[0] * gain if inverse[0] > 0.0 else 0.0,
+        m[1] * decay + along[1] * gain if inverse[1] > 0.0 else 0.0,
+        m[2] * decay + along[2] * gain if inverse[2] > 0.0 else 0.0,
+    )
+
+
+@part
+def turn_between_pushes(q, m, inverse, act, h):
+    """(q, m, energy gained by splitting) after half of what pushes, the free turn, and the other half: of order 2."""
+    m = pushed(q, m, inverse, act, 0.5 * h)
+    q, m, gained = turn_freely(q, m, inverse, h)
+    return q, pushed(q, m, inverse, act, 0.5 * h), gained
+
+
+@part
+def principal_moments(state, spin, i):
+    """(principal moments of inertia, 1 / these, unit quaternion from these axes to the body's own)."""
+    xx, yy, zz, xy, xz, yz = inertia_of(state, spin, i)
+    principal, own = (xx, yy, zz), (1.0, 0.0, 0.0, 0.0)
+    if xy != 0.0 or xz != 0.0 or yz != 0.0:
+        principal, own = diagonalised(xx, yy, zz, xy, xz, yz)
+    inverse = (
+        1.0 / principal[0] if principal[0] > 0.0 else 0.0,
+        1.0 / principal[1] if principal[1] > 0.0 else 0.0,
+        1.0 / principal[2] if principal[2] > 0.0 else 0.0,
+    )
+    return principal, inverse, own
+
+
+@part
+def turn_in_space(state, spin, turns, i, h):
+    """The rotation and the angular velocity of a dynamic body after a step."""
+    principal, inverse, own = principal_moments(state, spin, i)
+    w, speed = (
+        (spin.angular_velocity[i, 0], spin.angular_velocity[i, 1], spin.angular_velocity[i, 2]),
+        spin.angular_velocity,
+    )
+    torque, most = torques_on(state, spin, turns, i), spin.max_angular_speed[i]
+    act, q = (torque, spin.angular_damping[i]), product(rotation_in_space(state, i), own)
+    along = rotate(q, limited(w, most), True)
+    m, gained = (along[0] * principal[0], along[1] * principal[1], along[2] * principal[2]), 0.0
+    if state.usual_path_degree == CUBIC:
+        for place in range(3):
+            q, m, more = turn_between_pushes(q, m, inverse, act, h * (TRIPLE if place != 1 else 1.0 - 2.0 * TRIPLE))
+            gained += more
+    elif state.usual_path_degree > LINE:
+        q, m, gained = turn_between_pushes(q, m, inverse, act, h)
+    elif state.moves_with_old_velocity:
+        q, m, gained = turn_freely(q, m, inverse, h)
+        m = pushed(q, m, inverse, act, h)
+    else:
+        m = pushed(q, m, inverse, act, h)
+        q, m, gained = turn_freely(q, m, inverse, h)
+    q, m = turn_to_energy(q, m, inverse, gained)
+    w = limited(rotate(q, (m[0] * inverse[0], m[1] * inverse[1], m[2] * inverse[2]), False), most)
+    speed[i, 0], speed[i, 1], speed[i, 2] = w[0], w[1], w[2]
+    set_rotation(state, i, product(q, (own[0], -own[1], -own[2], -own[3])))
