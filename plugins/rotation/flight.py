@@ -159,3 +159,12 @@ def turn_in_space(state, spin, turns, i, h):
     w = limited(rotate(q, (m[0] * inverse[0], m[1] * inverse[1], m[2] * inverse[2]), False), most)
     speed[i, 0], speed[i, 1], speed[i, 2] = w[0], w[1], w[2]
     set_rotation(state, i, product(q, (own[0], -own[1], -own[2], -own[3])))
+
+
+@part
+def turn_alone(state, spin, turns, i, h):
+    """A step of a dynamic body under the torques of this moment."""
+    if is_plane(state):
+        turn_in_plane(state, spin, turns, i, h)
+    else:
+        turn_in_space(state, spin, turns, i, h)

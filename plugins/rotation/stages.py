@@ -25,7 +25,7 @@ from ...systems.shapes.quaternions import (
     turned_tensor,
     write_axes,
 )
-from .flight import inertia_of, principal_moments, torque_on, turn_in_plane, turn_in_space
+from .flight import inertia_of, principal_moments, torque_on, turn_alone
 from .free_rotation import turn_freely, turn_to_energy
 from .torques import begin_turn, drift_of_turn, end_turn, kick_of_turn, put_start_back, runge_kutta_turn
 
@@ -105,10 +105,8 @@ def turn_bodies(state, dt, spin, turns):
             turn_about(state, i, scale(spin_of(state, spin, i), dt))
         elif within:
             end_turn(state, spin, turns, i, dt)
-        elif parts == 1:
-            turn_in_plane(state, spin, turns, i, dt)
         else:
-            turn_in_space(state, spin, turns, i, dt)
+            turn_alone(state, spin, turns, i, dt)
         if not length(spin_of(state, spin, i)) <= FASTEST_TURN:
             state.blamed = i + 1
             raise ValueError(TOO_FAST)

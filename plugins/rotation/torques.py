@@ -12,7 +12,7 @@ import math
 from ...framework.compilation import part
 from ...systems.integration.stages import kick_gain, phi1, phi2, runge_kutta_weights
 from ...systems.shapes.quaternions import product, rotate, rotation_in_space, set_rotation
-from .flight import inertia_of, is_plane, limited, principal_moments, torques_on, turn_between_pushes
+from .flight import inertia_of, is_plane, limited, principal_moments, torques_on, turn_alone, turn_between_pushes
 from .free_rotation import turn_to_energy
 
 
@@ -88,7 +88,7 @@ def begin_turn(state, spin, turns, i):
     for k in range(width):
         turns.start_rotation[i, k] = rotation[width * i + k]
     put(turns.start_spin, i, spin_now(state, spin, i))
-    turns.gained[i] = 0.0
+    turns.gained[i], turns.changed[i] = 0.0, False
 
 
 @part
@@ -145,7 +145,8 @@ def turn_from_start(state, turns, i, turned):
 
 @part
 def runge_kutta_turn(state, spin, turns, i, h):
-    """As ``runge_kutta_stage`` does with places: the vector that a body has turned by, and its angular momentum."""
+    """As ``runge_kutta_stage`` does with places: the vector that a body has turned by, and its angular momentum. Where
+    the torque holds throughout the step there are better ways, which keep the energy of a free top."""
     stage, torque, w = state.rk_stage, torques_on(state, spin, turns, i), spin_now(state, spin, i)
     f1, f2, f3, decay, half_decay, half_gain = runge_kutta_weights(-spin.angular_damping[i] * h)
     half = 0.5 * h * half_gain
@@ -160,6 +161,11 @@ def runge_kutta_turn(state, spin, turns, i, h):
         turn_from_start(state, turns, i, times(w, 0.5 * h))
     else:
         turned, start = triple(turns.turned, i), triple(turns.momentum, i)
+        turns.changed[i] |= torque != triple(turns.pushed, i)
+        if stage == 3 and not turns.changed[i]:
+            put_start_back(state, spin, turns, i)
+            turn_alone(state, spin, turns, i, h)
+            return
         across = cross(turned, w)  # how fast the vector of the turn changes: the series of dexp^-1
         rate = sum_of(sum_of(w, across, -0.5), cross(turned, across), 1.0 / 12.0)
         if stage == 3:

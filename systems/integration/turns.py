@@ -3,7 +3,7 @@ of a plugin works on, and what it is to do beside which stage of an integrator."
 
 from __future__ import annotations
 
-from ...framework.jit.records.schema import Schema, flag, floats, integer, table
+from ...framework.jit.records.schema import Schema, flag, flags, floats, integer, table
 
 DRIFT, KICK, RUNGE_KUTTA = 1, 2, 3
 BESIDE = {
@@ -13,10 +13,11 @@ BESIDE = {
 # part: of these; begins: it is the first of the step; within: bodies turn with these parts; torque: of force systems,
 # N m, one or three numbers for each row, no rows where no force system has a Spin in what it requires. The others have
 # three numbers, of which a plane uses the first: what the step began with, torque and momentum at the start of the
-# part, and sums of RK4.
+# part, sums of RK4, and whether torques have changed within the step.
 TURNS = Schema(
     "Turns", part=integer(), begins=flag(), within=flag(), torque=floats(), start_rotation=table("float64", 4),
-    start_spin=table("float64", 3), pushed=table("float64", 3), gained=floats(), turned=table("float64", 3),
-    momentum=table("float64", 3), middle=table("float64", 3), speeds=table("float64", 3), kicks=table("float64", 3),
+    start_spin=table("float64", 3), pushed=table("float64", 3), gained=floats(), changed=flags(),
+    turned=table("float64", 3), momentum=table("float64", 3), middle=table("float64", 3), speeds=table("float64", 3),
+    kicks=table("float64", 3),
 )  # fmt: skip
 COLUMNS = tuple(name for name in TURNS.fields if name not in ("part", "begins", "within", "torque"))

@@ -14,7 +14,7 @@ from scipy.special import ellipj
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Settings, StepError, System, World
 from carom.plugins import Physics
-from carom.plugins.rotation import Rotation, Spin
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 pytestmark = pytest.mark.plain
 ORDERS = {"explicit_euler": 1, "semi_implicit_euler": 1, "velocity_verlet": 2, "yoshida4": 4, "rk4": 4, "flight": 2}
@@ -169,6 +169,15 @@ def test_the_energy_of_a_heavy_top_stays(method, bound):
     assert abs(along - before) < bound * abs(before)
 
 
+@pytest.mark.parametrize("method", ["velocity_verlet", "yoshida4", "rk4", "flight"])
+def test_a_free_top_beside_a_needle_keeps_its_energy(method):
+    """To rounding, as where no force system gives torques."""
+    w0 = np.array((1.5, -2.0, 0.8))
+    end = end_of(method, 1 / 60, lambda bodies: None, Spin(w0, MOMENTS), seconds=5.0, seen=("rotation", "spin"))
+    own = turned(end[:4] * (1, -1, -1, -1), end[4:])
+    assert own @ (MOMENTS * own) == pytest.approx(w0 @ (MOMENTS * w0), rel=1e-12)
+
+
 @methods
 @pytest.mark.parametrize("d", [2, 3])
 def test_a_failed_step_and_a_snapshot_bring_back_every_bit(d, method):
@@ -241,8 +250,61 @@ def test_torques_end_with_their_system():
         system = Forces(spring)
         world.add_system(system)
         world.step()
+        assert "turn_on_way" in {kernel.kernel for kernel in world.plan().kernels}
         world.remove_system(system)
         spin = world.component_for_entity(entity, Spin)
         before = spin.angular_velocity
         world.step()
         assert spin.angular_velocity == before != 0.5
+        assert "turn_on_way" not in {kernel.kernel for kernel in world.plan().kernels}
+
+
+@methods
+@pytest.mark.parametrize("d", [2, 3])
+def test_limits_of_speed_and_damping_that_no_step_resolves(d, method):
+    """At most 2 rad/s and that turn; and what damps in a thousandth of a step neither swings nor overflows."""
+
+    def push(bodies):
+        bodies.torque += 50.0
+
+    for spin in ({"max_angular_speed": 2.0}, {"angular_damping": 60_000.0}):
+        with space(d, method, 1 / 60) as world:
+            inertia = 0.1 if d == 2 else MOMENTS
+            entity = world.create_entity(Transform((0,) * d), RigidBody(), Spin(inertia=inertia, **spin))
+            world.add_system(Forces(push))
+            for step in range(20):
+                world.step()
+                w = np.linalg.norm(world.component_for_entity(entity, Spin).angular_velocity)
+                assert w <= 2.0 + 1e-15 if "max_angular_speed" in spin else w < 0.02
+                if d == 2:
+                    assert abs(world.component_for_entity(entity, Transform).rotation) <= 2 * (step + 1) / 60 + 1e-12
+
+
+@methods
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_wheel_on_the_ground_goes_as_under_a_constant_torque(d, method):
+    """Contacts take what the torque has made of the spin: places and turns to 1e-6 of each other after a second."""
+
+    def drive(bodies):
+        bodies.torque -= 1.0 if d == 2 else np.array((0.0, 0.0, 1.0))
+
+    ends = []
+    for given in (True, False):
+        chosen = {"collision": "event_driven"} if method == "flight" else {"integrator": method}
+        gravity = (0.0, -10.0, 0.0)[:d]
+        with World(Physics(d, gravity=gravity), Rotation(), settings=Settings(**chosen)) as world:
+            floor = BoxCollider((50.0, 1.0, 50.0)[:d], friction=0.8)
+            world.create_entity(Transform((0.0, -1.0, 0.0)[:d]), RigidBody(kind="static"), floor)
+            torque = -1.0 if d == 2 else (0.0, 0.0, -1.0)
+            spin = Spin(constant_torque=torque) if given else Spin()
+            wheel = world.create_entity(
+                Transform((0.0, 0.5, 0.0)[:d]), RigidBody(), spin, SphereCollider(0.5, friction=0.8)
+            )
+            if not given:
+                world.add_system(Forces(drive))
+            for _ in range(60):
+                world.step()
+            body = world.component_for_entity(wheel, Transform)
+            ends.append(np.concatenate((body.position, np.atleast_1d(spin.angular_velocity))))
+    assert ends[0][0] > 0.4
+    assert np.allclose(*ends, rtol=0, atol=1e-6)
