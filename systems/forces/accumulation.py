@@ -16,6 +16,7 @@ from ...framework.schedule.phases import ForceSystem, Phase
 from ...framework.schedule.plan import PlannedKernel
 from ...framework.schedule.stages import Program, PythonPart, Stage
 from ..compounds.stages import carry_forces
+from ..sleeping.stages import AWAKE
 from ..staged import StagedSystem
 from .stages import limit_velocities, sum_forces
 
@@ -55,6 +56,15 @@ class ForceAccumulation(StagedSystem):
         self.add_systems(self.world.time)
         state = self._state
         self.summed = state.bodies.force[: state.dynamic].copy() if self.several_evaluations else None
+        if state.asleep > 0 and self.kind()[1]:
+            self._disturb_turned()
+
+    def _disturb_turned(self) -> None:
+        """Sleepers that a torque acts on count as pushed by another force than before; see ``look_at_sleepers``."""
+        bodies, rows = self._state.bodies, slice(self._state.dynamic)
+        torque = self._table.column("torque")[rows]
+        turned = torque.any(axis=1) if torque.ndim > 1 else torque != 0.0
+        bodies.rest_force[rows][turned & (bodies.still[rows] > AWAKE)] = np.nan
 
     def evaluate(self, time: float) -> None:
         """Sum all forces at the state in the columns; ``time`` in seconds."""

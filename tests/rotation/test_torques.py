@@ -232,6 +232,33 @@ def test_what_a_flight_takes_out_has_not_turned():
         assert (body.rotation, spin.angular_velocity) == before
 
 
+@pytest.mark.compiled
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_torque_wakes_what_sleeps_and_keeps_it_awake(d):
+    strength = [0.0]
+
+    def twist(bodies):
+        bodies.torque += strength[0] if d == 2 else np.array((0.0, 0.0, strength[0]))
+
+    gravity = (0.0, -10.0, 0.0)[:d]
+    with World(Physics(d, gravity=gravity), Rotation(), settings=Settings(sleeping=True)) as world:
+        floor = BoxCollider((50.0, 1.0, 50.0)[:d], friction=0.8)
+        world.create_entity(Transform((0.0, -1.0, 0.0)[:d]), RigidBody(kind="static"), floor)
+        boxes = [
+            world.create_entity(Transform((x, 0.5, 0.0)[:d]), RigidBody(), *spin, BoxCollider((0.5,) * d))
+            for x, spin in ((0.0, (Spin(),)), (5.0, ()))
+        ]
+        world.add_system(Forces(twist))
+        for _ in range(120):
+            world.step()
+        asleep = [bool(world.bodies.asleep[world.bodies.row_of(box)]) for box in boxes]
+        assert asleep == [True, True]
+        strength[0] = 0.1
+        for _ in range(120):
+            world.step()
+            assert [bool(world.bodies.asleep[world.bodies.row_of(box)]) for box in boxes] == [False, True]
+
+
 def test_a_torque_needs_a_force_system_that_requires_a_spin():
     class Torsion(ForceSystem):
         def add_forces(self, bodies, time):
