@@ -20,6 +20,7 @@ from ...systems.shapes.quaternions import product, rotate, rotation_in_space, se
 from .free_rotation import diagonalised, turn_freely, turn_to_energy
 
 TRIPLE = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))  # of the step: the outer two of Yoshida's three
+HEAVY = 5.0  # damping times the step: above it the middle one, which goes back in time, enlarges rounding too much
 NOT_POSITIVE = "Spin.inertia must be positive and finite"
 
 
@@ -143,7 +144,7 @@ def turn_in_space(state, spin, turns, i, h):
     act, q = (torque, spin.angular_damping[i]), product(rotation_in_space(state, i), own)
     along = rotate(q, limited(w, most), True)
     m, gained = (along[0] * principal[0], along[1] * principal[1], along[2] * principal[2]), 0.0
-    if state.usual_path_degree == CUBIC:
+    if state.usual_path_degree == CUBIC and act[1] * h <= HEAVY:
         for place in range(3):
             q, m, more = turn_between_pushes(q, m, inverse, act, h * (TRIPLE if place != 1 else 1.0 - 2.0 * TRIPLE))
             gained += more

@@ -289,12 +289,12 @@ def test_torques_end_with_their_system():
 @methods
 @pytest.mark.parametrize("d", [2, 3])
 def test_limits_of_speed_and_damping_that_no_step_resolves(d, method):
-    """At most 2 rad/s and that turn; and what damps in a thousandth of a step neither swings nor overflows."""
+    """At most 2 rad/s and that turn; and what damps in a small part of a step neither swings nor overflows."""
 
     def push(bodies):
         bodies.torque += 50.0
 
-    for spin in ({"max_angular_speed": 2.0}, {"angular_damping": 60_000.0}):
+    for spin in ({"max_angular_speed": 2.0}, {"angular_damping": 30_000.0}):
         with space(d, method, 1 / 60) as world:
             inertia = 0.1 if d == 2 else MOMENTS
             entity = world.create_entity(Transform((0,) * d), RigidBody(), Spin(inertia=inertia, **spin))
@@ -302,7 +302,7 @@ def test_limits_of_speed_and_damping_that_no_step_resolves(d, method):
             for step in range(20):
                 world.step()
                 w = np.linalg.norm(world.component_for_entity(entity, Spin).angular_velocity)
-                assert w <= 2.0 + 1e-15 if "max_angular_speed" in spin else w < 0.02
+                assert 1.0 < w <= 2.0 + 1e-15 if "max_angular_speed" in spin else 1e-4 < w < 0.02
                 if d == 2:
                     assert abs(world.component_for_entity(entity, Transform).rotation) <= 2 * (step + 1) / 60 + 1e-12
 
