@@ -15,6 +15,7 @@ from .transform import Transform
 
 # kg, of the RigidBody of a part: what a part weighs is in its body's mass.
 WEIGHTLESS = 1e-200
+FARTHEST = 1e15  # m: further away a body of 1 m has no digits beside the arm
 
 
 class Changes:
@@ -49,7 +50,7 @@ class PartOf(Component):
     }
 
     body: int = special_column(dtype=int, minimum=1, on_write=_note)
-    position: VectorField = special_column(default=0.0, item="vector", on_write=_note)
+    position: VectorField = special_column(default=0.0, item="vector", largest=FARTHEST, on_write=_note)
     rotation: RotationField = special_column(default=0.0, item="rotation", on_write=_note)
     mass: float | None = special_column(default=None, optional=True, minimum=0.0, kw_only=True, on_write=_note)
     # Not for the constructor: what it adds to which body, and its rotation against that; 0: it has no place yet.

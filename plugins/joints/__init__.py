@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...components.part_of import Changes as PartChanges
+from ...components.part_of import PartOf
 from ...framework import NoPhysicsError, Plugin, PluginError, World
 from ...framework.jit.lazy import errors
 from ...framework.plugins.joints import Placed, numbers_of, rows_of
@@ -159,7 +161,10 @@ class Joints(Plugin):
     def _follow(self, world: World) -> None:
         """Which joints there are, and their fields, if anything has changed."""
         now = self._now()
-        if now == self._seen or (self._seen is not None and now[:2] == self._seen[:2] and self._update()):
+        same = self._seen is not None and now[:2] == self._seen[:2]
+        if same and now[2] != self._seen[2]:
+            self._check_apart(self._joints)
+        if now == self._seen or (same and self._update()):
             self._seen = now
             return
         found = self._present()
@@ -169,6 +174,7 @@ class Joints(Plugin):
             joint.fit(self._physics.dimensions, entity)
             if not joint.attached:
                 self._attach(entity, joint)
+        self._check_apart(found)
         self._write(found)
         self._end(ended, "joint_lost")
         self._seen = self._now()
@@ -181,9 +187,14 @@ class Joints(Plugin):
                 found[entity] = contents.components_of(entity)[kind]
         return {entity: found[entity] for entity in sorted(found)}
 
-    def _now(self) -> tuple[int, int, int]:
-        """Another value whenever entities or bodies have come or gone, or a field was set."""
-        return self._contents.log.rounds, self._physics.table.version, Changes.count
+    def _check_apart(self, joints: dict[int, Joint]) -> None:
+        """ValueError for one whose bodies have become parts of one body."""
+        for entity, joint in joints.items() if self._contents.members.get(PartOf) else ():
+            joint.check_apart(self._contents, entity)
+
+    def _now(self) -> tuple[int, int, int, int]:
+        """Another value whenever entities or bodies have come or gone, or a field of joints or of parts was set."""
+        return self._contents.log.rounds, self._physics.table.version, PartChanges.count, Changes.count
 
     def _is_lost(self, joint: Joint) -> bool:
         """Whether one of its bodies is gone; of a joint that has not taken hold yet: whether it was deleted since."""

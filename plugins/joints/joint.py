@@ -151,16 +151,21 @@ class Joint(Component, abstract=True):
         for body in (self.a, self.b):
             if body == WORLD:
                 continue
+            body = body if body in contents.dead else _whole(contents, body)
             types = () if body in contents.dead else contents.entities.types_of(body)
-            while PartOf in types:  # what it is a part of
-                body = contents.entities.handle(body, PartOf).body
-                types = contents.entities.types_of(body)
             if not any(getattr(kind, "makes_body", False) for kind in types):
                 why = "is no body of this world" if types else "does not exist in this world"
                 raise ValueError(f"{name} joins entity {body}, which {why}")
             dynamic |= RigidBody in types and contents.entities.handle(body, RigidBody).kind == "dynamic"
         if not dynamic:
             raise ValueError(f"{name} joins no dynamic body")
+        self.check_apart(contents, entity)
+
+    def check_apart(self, contents: Any, entity: int | None) -> None:
+        """ValueError if both are parts of one body, or one is a part of the other."""
+        if WORLD not in (self.a, self.b) and _whole(contents, self.a) == (body := _whole(contents, self.b)):
+            name = f"{'' if entity is None else f'entity {entity}: '}{type(self).__name__}"
+            raise ValueError(f"{name} joins entity {self.a} and entity {self.b}, which are both of one body, {body}")
 
     def in_order(self, name: str, low: float | None, high: float | None) -> tuple[float, float]:
         """Two limits, none where they are None; ValueError if the first is the larger."""
@@ -212,6 +217,13 @@ class Joint(Component, abstract=True):
     def keep(self, **values: Any) -> None:
         """Set what is hidden."""
         self._values.update(values)  # type: ignore[union-attr]
+
+
+def _whole(contents: Any, body: Any) -> int:
+    """The body that an entity is a part of; itself, if it is none."""
+    while PartOf in contents.entities.types_of(body):
+        body = contents.entities.handle(body, PartOf).body
+    return body
 
 
 class Driven(Joint, abstract=True):

@@ -50,8 +50,10 @@ class Parts(Plugin):
         self._followed: Any = None  # of the parts when they were followed last: entities, fields, and what all share
         self._places: dict[int, Place] = {}
         self._added: dict[int, tuple[int, float]] = {}  # to which body, and how much of its mass
+        self._weighed: dict[int, tuple[float, float]] = {}  # by body: its mass without parts, and with them
         self._generation, self._any_static = self._table.generation, False
         self._rows: Any = ()  # of the parts and of their bodies
+        self._rows_version = -1
         world.events.define("part_lost")
         self._physics.extensions.adopters.append(self._follow)
         self._physics.extensions.waiting.append(lambda: self._now() != self._seen)
@@ -64,10 +66,14 @@ class Parts(Plugin):
 
     def centre(self, body: int) -> np.ndarray:
         """(d,) m: the centre of mass of a body with its parts, from its position, along its own axes. It should be 0,
-        for a body turns about its position: see :meth:`balance`."""
+        for a body turns about its position: see :meth:`balance`. KeyError if it is no body, ValueError of a part."""
         self._physics.synchronize()
         table, d = self._table, self._physics.dimensions
-        row, parts = table.find(body), rows_of_parts(table, body)
+        row, parts = table.row_of(body), rows_of_parts(table, body)
+        if row < 0:
+            raise KeyError(f"parts: entity {body!r} is no body")
+        if body in self._places:
+            raise ValueError(f"parts: entity {body} is a part of entity {self._places[body].holder}: name that")
         masses, total, moment = table.column("part_of.added")[parts], 0.0, np.zeros(d)
         turns = table.column("part_of.turn")[parts]
         own = max(0.0, float(table.column("mass")[row]) - float(masses.sum()))
@@ -97,12 +103,18 @@ class Parts(Plugin):
     def saved(self, world: Any) -> Any:
         """The parts that have been followed, and what they have added to their bodies."""
         holders, added = zip(*self._added.values(), strict=True) if self._added else ((), ())
-        return {"entity": list(self._added), "holder": list(holders), "added": list(added)}
+        own, whole = zip(*self._weighed.values(), strict=True) if self._weighed else ((), ())
+        return {
+            "entity": list(self._added), "holder": list(holders), "added": list(added),
+            "body": list(self._weighed), "own": list(own), "whole": list(whole),
+        }  # fmt: skip
 
     def take_back(self, world: Any, saved: Any) -> None:
         """Go on from there."""
         added = zip(saved["holder"], saved["added"], strict=True)
+        weighed = zip(saved["own"], saved["whole"], strict=True)
         self._added, self._places, self._seen = dict(zip(saved["entity"], added, strict=True)), {}, None
+        self._weighed = dict(zip(saved["body"], weighed, strict=True))
 
     # -- what has changed -------------------------------------------------------------------------
 
@@ -111,7 +123,14 @@ class Parts(Plugin):
         table = self._table
         inside = tuple(table.column(key).tobytes() for name in FIELDS if (key := f"part_of.{name}") in table.lent)
         statics = table.static_version if self._any_static else 0
-        return self._contents.log.rounds, table.version, table.members_version, statics, Changes.count, inside
+        derived = self._derived(self._rows[0]).tobytes() if self._rows_version == table.version else b""
+        return self._contents.log.rounds, table.version, table.members_version, statics, Changes.count, inside, derived
+
+    def _derived(self, rows: np.ndarray) -> np.ndarray:
+        """(n, k): what parts have from their PartOf in the columns of other components, but for where they move."""
+        arrays = self._table.arrays
+        offsets = [arrays[key] for kind in self._colliders if (key := kind.columns["offset"].key) in arrays]
+        return np.column_stack([arrays["mass"][rows], *(offset[rows] for offset in offsets)])
 
     def _look(self) -> tuple[Any, Any, Any]:
         """(the entities of the parts in order, their fields (n, k) as bits, what all depend on)."""
@@ -120,9 +139,9 @@ class Parts(Plugin):
         rows = rows[np.argsort(table.column("entity")[rows])]
         fields = [table.column(f"part_of.{name}")[rows] for name in (*FIELDS, "added", "holder")]
         of = table.rows_of(fields[0])
-        kinds = np.where(of < 0, -1, np.searchsorted(table.stops, of, side="right"))
+        kinds = [np.where(at < 0, -1, np.searchsorted(table.stops, at, side="right")) for at in (of, rows)]
         statics = table.static_version if self._any_static else 0
-        bits = np.column_stack((*fields, kinds)).astype(float).view(np.int64)
+        bits = np.column_stack((*fields, *kinds, self._derived(rows))).astype(float).view(np.int64)
         return table.column("entity")[rows], bits, (table.members_version, statics)
 
     def _find_changed(self) -> tuple[list[int], list[int], dict[int, int]]:
@@ -130,8 +149,8 @@ class Parts(Plugin):
         ids, bits, shared = self._look()
         bodies = self._table.column("part_of.body")[self._table.rows_of(ids)]
         same = np.zeros(len(ids), bool)
-        if self._seen is not None and shared == self._followed[2] and len(self._followed[0]):
-            before, known, _ = self._followed
+        before, known, then = self._followed if self._seen is not None else (ids[:0], bits[:0], None)
+        if shared == then and len(before) and known.shape[1] == bits.shape[1]:
             at = np.minimum(before.searchsorted(ids), len(before) - 1)
             same = (before[at] == ids) & (known[at] == bits).all(axis=1) & ~np.isin(bodies, ids)
         gone = np.setdiff1d(np.fromiter(self._added, np.int64, len(self._added)), ids)
@@ -143,7 +162,8 @@ class Parts(Plugin):
             self._place_moved()
             return
         if self._generation != self._table.generation:  # ids mean other entities
-            self._generation, self._added, self._places, self._seen = self._table.generation, {}, {}, None
+            self._generation, self._seen = self._table.generation, None
+            self._added, self._weighed, self._places = {}, {}, {}
         changed, gone, body_of = self._find_changed()
         places = {entity: self._place(entity, body_of) for entity in changed}
         lost = [entity for entity, place in places.items() if self._table.row_of(place.holder) < 0]
@@ -167,17 +187,26 @@ class Parts(Plugin):
 
     def _place(self, entity: int, body_of: dict[int, int]) -> Place:
         """The body at the end of the chain of parts, and the pose against it."""
-        d, seen = self._physics.dimensions, [entity]
-        part = self._contents.entities[entity][PartOf]
-        pose = Pose.of(part.position, part.rotation, d)
+        seen = [entity]
+        pose = self._pose(entity)
         while body_of[seen[-1]] in body_of:
             body = body_of[seen[-1]]
             if body in seen:
                 raise ValueError(f"entities {', '.join(map(str, sorted(seen)))} are parts of each other")
             seen.append(body)
-            part = self._contents.entities[body][PartOf]
-            pose = Pose.of(part.position, part.rotation, d).then(pose)
+            pose = self._pose(body).then(pose)
         return Place(body_of[seen[-1]], pose)
+
+    def _pose(self, entity: int) -> Pose:
+        """As the fields say; ValueError if the game has written into them what no field takes."""
+        part, columns = self._contents.entities[entity][PartOf], PartOf.columns
+        for name in FIELDS:
+            columns[name].checked(getattr(part, name), entity)
+        return Pose.of(part.position, part.rotation, self._physics.dimensions)
+
+    @property
+    def _colliders(self) -> list[type[Collider]]:
+        return [kind for kind in self._table.component_types if issubclass(kind, Collider)]
 
     def _check(self, entity: int, holder: int) -> None:
         """ValueError for a part that the body cannot have."""
@@ -194,30 +223,46 @@ class Parts(Plugin):
 
     def _add_masses(self, places: dict[int, Place], gone: list[int]) -> None:
         """What these add to the masses of their bodies, and no more what others have added."""
+        before, changed = self._masses(), set()
         for entity in gone:
             holder, mass = self._added.pop(entity, (0, 0.0))
-            self._add(holder, -mass)
+            changed.add(holder)
             if entity in self._contents.entities and PartOf not in self._contents.entities[entity]:
                 self._release(entity, holder, mass)
         for entity, (holder, _) in places.items():
-            part, (before, added) = self._contents.entities[entity][PartOf], self._added.get(entity, (0, 0.0))
-            mass = part.mass
+            part, mass = self._contents.entities[entity][PartOf], self._contents.entities[entity][PartOf].mass
             if mass is None:
                 mass = 0.0 if self._is_sensor(entity) else 1.0
-            if before != holder:
-                self._add(before, -added)
-                added = 0.0
-            self._add(holder, mass - added)
+            changed |= {holder, self._added.get(entity, (holder, 0.0))[0]}
             _set(part, "added", mass)
             _set(part, "holder", holder)
             self._added[entity] = holder, mass
+        masses = self._masses()
+        for body in changed:
+            self._weigh(body, before.get(body, []), masses.get(body, []))
 
-    def _add(self, body: int, mass: float) -> None:
-        """A body becomes heavier or lighter, as long as something is left."""
-        if mass != 0.0 and self._table.row_of(body) >= 0:
-            handle = self._contents.entities[body].get(RigidBody)
-            if handle is not None and handle.mass + mass > 0.0:
-                handle.mass += mass
+    def _masses(self) -> dict[int, list[float]]:
+        """By body, what its parts add, in the order of these."""
+        found: dict[int, list[float]] = {}
+        for _, (holder, mass) in sorted(self._added.items()):
+            found.setdefault(holder, []).append(mass)
+        return found
+
+    def _weigh(self, body: int, before: list[float], masses: list[float]) -> None:
+        """A body becomes heavier or lighter, as long as something is left. Its own mass is kept, for the sum loses it
+        beside a part that is heavy enough; a mass that the game has given since is of the whole."""
+        own, whole = self._weighed.pop(body, (0.0, 0.0))
+        handle = self._contents.entities[body].get(RigidBody) if self._table.row_of(body) >= 0 else None
+        if handle is None:
+            return
+        if handle.mass != whole:
+            own = handle.mass - sum(before)
+        if masses != before and sum(masses, own) > 0.0:
+            handle.mass = sum(masses, own)
+        elif masses != before:
+            own = handle.mass - sum(masses)
+        if masses:
+            self._weighed[body] = own, handle.mass
 
     def _is_sensor(self, entity: int) -> bool:
         own = self._contents.entities[entity]
@@ -292,6 +337,7 @@ class Parts(Plugin):
         """The rows of the parts and of their bodies."""
         record, count, table = self._record, self._record.count, self._table
         self._rows = table.rows_of(record.entity[:count]), table.rows_of(record.body[:count])
+        self._rows_version = table.version
         self._any_static = bool((self._rows[1] >= table.stops[1]).any())
 
 

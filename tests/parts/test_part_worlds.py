@@ -19,9 +19,10 @@ from carom import (
     Transform,
     World,
 )
+from carom.components.part_of import WEIGHTLESS
 from carom.framework.errors import StepError
 from carom.plugins import convex_polygon
-from carom.plugins.joints import Joints, Weld
+from carom.plugins.joints import Hinge, Joints, Weld
 from carom.plugins.parts import PartOf, Parts
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
@@ -29,7 +30,8 @@ pytestmark = pytest.mark.plain
 
 
 def test_what_no_part_can_be_is_refused_at_the_call():
-    world, _ = parts_world()
+    world, parts = parts_world()
+    world.add_plugin(Joints())
     body = world.create_entity(Transform((0, 0)), RigidBody(), SphereCollider(0.5))
     part = world.create_entity(PartOf(body, (1, 0)), SphereCollider(0.5))
     inner = world.create_entity(PartOf(part, (1, 0)), SphereCollider(0.5))
@@ -44,7 +46,14 @@ def test_what_no_part_can_be_is_refused_at_the_call():
         ("2 components", lambda: world.create_entity(PartOf(body, (1, 0, 0)), SphereCollider(0.5))),
         ("at least 0", lambda: PartOf(body, mass=-1.0)),
         ("at least 1", lambda: PartOf(0)),
-    ):
+        (r"PartOf.position must be at most 1e\+15 .*, got \(1e\+160, 0\)", lambda: PartOf(body, (1e160, 0))),
+        (f"Weld joins entity {part} and entity {body}, .* one body, {body}",
+         lambda: world.create_entity(Weld(part, body, anchor=(0, 0)))),
+        (f"Hinge joins entity {inner} and entity {part}, .* one body, {body}",
+         lambda: world.create_entity(Hinge(inner, part, anchor=(0, 0)))),
+        (f"entity {part} is a part of entity {body}", lambda: parts.centre(part)),
+        (f"entity {part} is a part of entity {body}", lambda: parts.balance(part)),
+    ):  # fmt: skip
         with pytest.raises(ValueError, match=message):
             call()
     world.step()
@@ -54,6 +63,32 @@ def test_what_no_part_can_be_is_refused_at_the_call():
             handle.body = other
     assert handle.body == body
     assert len(world.get_entities()) == 4
+    for call in (parts.centre, parts.balance):
+        with pytest.raises(KeyError, match="entity 99 is no body"):
+            call(99)
+    handle.position[:] = (math.nan, 0)
+    with pytest.raises(ValueError, match=rf"entity {part}: PartOf.position must be finite, got \[nan, 0.0\]"):
+        world.step()
+    handle.position[:] = (1, 0)
+    world.step()
+
+
+def test_a_joint_whose_bodies_become_parts_of_one_body_is_named_until_it_goes():
+    world, _ = parts_world()
+    world.add_plugin(Joints())
+    body, other = (world.create_entity(Transform((x, 0)), RigidBody(), SphereCollider(0.4)) for x in (0, 1))
+    part = world.create_entity(PartOf(other, (1, 0)), SphereCollider(0.4))
+    joint = world.create_entity(Hinge(body, part, anchor=(0.5, 0)))
+    world.step()
+    for become in (lambda: setattr(world.component_for_entity(part, PartOf), "body", body),
+                   lambda: world.add_component(other, PartOf(body, (1, 0)))):  # fmt: skip
+        become()
+        for _ in range(2):
+            with pytest.raises(ValueError, match=f"entity {joint}: Hinge joins entity {body} and entity {part}, which"):
+                world.step()
+        world.component_for_entity(part, PartOf).body = other
+    world.delete_entity(joint)
+    world.step()
 
 
 @pytest.mark.parametrize(
@@ -106,6 +141,45 @@ def test_parts_go_with_their_body_and_it_loses_what_they_weigh():
     world.step()
     assert lost == [(right, 1.5)]
     assert world.get_entities() == []
+
+
+def test_a_body_has_its_own_mass_again_after_a_part_that_is_heavier_than_all_its_digits():
+    world, parts = parts_world()
+    body, left, right = piece(world, parts, (0, 0), U)
+    for heavy in (1e30, 1.0):
+        world.component_for_entity(left, PartOf).mass = heavy
+        world.step()
+        snapshot = world.snapshot()
+    assert body_of(world, body).mass == 3.0
+    world.component_for_entity(left, PartOf).mass = 1e30
+    world.step()
+    world.restore(snapshot)
+    world.delete_entity(right)
+    world.step()
+    assert body_of(world, body).mass == 2.5
+
+
+def test_what_a_part_has_from_its_partof_is_taken_back():
+    world, parts = parts_world()
+    body, left, _ = piece(world, parts, (0, 0), U)
+    world.step()
+    spin, offset = world.component_for_entity(body, Spin), world.component_for_entity(left, BoxCollider).offset.copy()
+    inertia = spin.moments
+    world.component_for_entity(left, BoxCollider).offset = (5, 5)
+    body_of(world, left).mass = 7.0
+    body_of(world, left).kind = "static"
+    body_of(world, left).linear_velocity = (3, 0)
+    at(world, left).position, at(world, left).rotation = (9, 9), 1.0
+    body_of(world, body).linear_velocity = (1, 0)
+    world.step()
+    assert world.component_for_entity(left, BoxCollider).offset.tolist() == offset.tolist()
+    assert (body_of(world, left).mass, body_of(world, left).kind) == (WEIGHTLESS, "dynamic")
+    assert at(world, left).position.tolist() == at(world, body).position.tolist()
+    assert (at(world, left).rotation, body_of(world, left).linear_velocity.tolist()) == (0.0, [1, 0])
+    assert (spin.moments, body_of(world, body).mass) == (inertia, 3.0)
+    world.component_for_entity(left, BoxCollider).offset[:] = 5.0  # in place
+    world.refresh_queries()
+    assert world.query_sphere((5, 5), 1.0) == []
 
 
 def test_parts_in_space_keep_their_turns_when_another_is_deleted():
