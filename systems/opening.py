@@ -94,8 +94,8 @@ def read_bodies(state, dt):
     if state.sweeping and not state.sweeps_ready:
         return NEED_SWEEPS
     state.read_version = state.statics_version
-    rotated = state.collides and any_rotation(state)
-    if rotated != state.rotated or state.rotation_stale or (rotated and (state.several_levels or axes_are_old(state))):
+    rotated = state.collides and (state.rotated or any_rotation(state))
+    if state.rotation_stale or (rotated and (not state.rotated or state.several_levels or axes_are_old(state))):
         return ROTATE
     return OK
 

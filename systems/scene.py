@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..components import AABBCollider, Collider
+from ..components.spin import Spin
 from ..framework.data.row_moves import MovedColumns, RowPlan
 from ..framework.data.table import FEW, Table
 from ..framework.jit.records.record import Record
@@ -199,7 +200,7 @@ class Scene:
             if linked:
                 bodies.collider_slot[arrived] = slots[shapes[arrived]]
         state.collides = collides or bool(moving and shapes[:moving].max() >= 0)
-        if linked and (self.rotated or linked.needs_axes):
+        if linked and (self.rotated or linked.needs_axes or self.spins()):
             state.rotation_stale = True
         return True
 
@@ -340,7 +341,7 @@ class Scene:
             return
         table, bodies = self.table, self.state.bodies
         rotation = self._sound_rotation()
-        before, self.rotated = self.rotated, any_rotated(rotation)
+        before, self.rotated = self.rotated, any_rotated(rotation) or self.spins()
         self.state.rotated, self.state.rotation_stale = self.rotated, False
         count, needed = table.count, self.rotated or self.linked.needs_axes
         fresh = needed and len(self._axes) != table.capacity
@@ -357,6 +358,11 @@ class Scene:
         if self.state.several_levels:  # a box that is stretched may reach out of the level around it
             turned = rotation != 0.0 if self.state.dimensions == 2 else rotation[:, 1:].any(axis=1)
             bodies.level_not_enclosing[:count] = self.stretches & turned
+
+    def spins(self) -> bool:
+        """Whether any body has a Spin, so that it may turn within the step."""
+        table = self.table
+        return Spin in table.component_types and bool(table.has_mask(Spin)[: table.count].any())
 
     def _sound_rotation(self) -> np.ndarray:
         """The column, none for bodies that are taken out."""

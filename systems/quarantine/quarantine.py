@@ -85,7 +85,7 @@ class Quarantine:
 
     def bind(self) -> None:
         """Rows have moved, or columns are others than before."""
-        bound = self._table.columns_version, self._scene.linked, self._spins()
+        bound = self._table.columns_version, self._scene.linked, self._scene.spins()
         if bound != self._bound:
             self._checked = list(self._find_columns())
             self._bound = bound
@@ -114,7 +114,7 @@ class Quarantine:
         for column in RigidBody.columns.values():
             if column.name != "linear_velocity":
                 yield from self._check(column, RigidBody, DYNAMIC_ROWS)
-        if self._spins():
+        if self._scene.spins():
             for column in Spin.columns.values():
                 yield from self._check(column, Spin, ALL_ROWS)
         yield from self._check(Transform.columns["position"], Transform, STATIC_ROWS)
@@ -123,11 +123,6 @@ class Quarantine:
             for shape in self._scene.linked.shapes:
                 for column in shape.component.columns.values():
                     yield from self._check(column, shape.component, ALL_ROWS)
-
-    def _spins(self) -> bool:
-        """Whether any body has a Spin."""
-        table = self._table
-        return Spin in table.component_types and bool(table.has_mask(Spin)[: table.count].any())
 
     def _check(self, column: Column, component: Any, rows: int) -> Iterator[Checked]:
         array, bounds = self._table.arrays.get(column.key), column.bounds()

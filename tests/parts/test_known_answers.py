@@ -144,6 +144,34 @@ def test_exact_flights_do_not_depend_on_the_step():
     assert ends[0] == pytest.approx(ends[1], abs=1e-5)
 
 
+@pytest.mark.parametrize("mode", ["continuous", "event_driven"])
+@pytest.mark.parametrize("cut", [True, False])
+@pytest.mark.parametrize("struck", [False, True])
+def test_what_starts_unrotated_meets_what_it_turns_to_in_its_first_step(mode, cut, struck):
+    """An arm of 2 m that turns, or is struck so that it does, sweeps towards a ball, as in many short steps; balls far
+    away bound what is known of the neighbours."""
+    ends = []
+    for rate in (2, 256):
+        world, _ = parts_world(collision=mode, dt=1 / rate)
+        offset = (0, 0) if cut else (2, 0)
+        arm = BoxCollider((0.2, 0.1), offset=offset, restitution=1.0)
+        hub = [Transform((0, 0)), RigidBody(1.0), Spin(0.0 if struck else 4.0, inertia=2.0)]
+        body = world.create_entity(*hub, *(() if cut else (arm,)))
+        if cut:
+            world.create_entity(PartOf(body, (2, 0), mass=0.0), arm)
+        if struck:
+            world.create_entity(Transform((1.9, -0.5)), RigidBody(1.0, (0, 20.0)), SphereCollider(0.1, restitution=1.0))
+        balls = [
+            world.create_entity(Transform(place), RigidBody(1.0), SphereCollider(0.15, restitution=1.0))
+            for place in ((0.72, 2.7 if struck else 1.86), (-1.6, -1.1), *((50 + 3 * k, 40) for k in range(100)))
+        ]
+        run(world, rate // 2)
+        ends.append([world.component_for_entity(body, Spin).angular_velocity])
+        ends[-1].extend(np.ravel([body_of(world, ball).linear_velocity for ball in balls[:2]]))
+    assert np.abs(ends[1][1:3]).max() > 1.0
+    assert ends[0] == pytest.approx(ends[1], abs=1e-4)
+
+
 @pytest.mark.plain
 def test_what_bounces_on_a_part_of_what_rests_finds_it_at_rest():
     world, parts = parts_world((0, -G))
