@@ -8,6 +8,7 @@ import esper
 import numpy as np
 import pytest
 from helpers_parts import G, U, at, body_of, floor, parts_world, piece, run
+from worlds import MODES
 
 from carom import (
     AABBCollider,
@@ -309,6 +310,24 @@ def test_forces_and_joints_at_a_part_move_the_body():
     assert world.component_for_entity(body, Spin).angular_velocity == pytest.approx(
         world.component_for_entity(other, Spin).angular_velocity, abs=1e-6
     )
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("mode", MODES)
+def test_a_table_that_is_pressed_into_the_floor_is_put_back_once_not_by_each_foot(mode):
+    world, _ = parts_world((0, -G), collision=mode)
+    floor(world)
+    table = world.create_entity(Transform((0, 0.3)), RigidBody(0.1))
+    for x in (-0.5, 0.0, 0.5):
+        world.create_entity(PartOf(table, (x, 0), mass=0.1), BoxCollider((0.1, 0.3)))
+    press = RigidBody(kind="kinematic", linear_velocity=(0, -0.5))
+    world.create_entity(Transform((0, 0.7)), press, BoxCollider((1.0, 0.05)))
+    heights = []
+    for _ in range(20):
+        world.step()
+        heights.append(at(world, table).y - 0.3)
+    assert max(heights) < 1e-9
+    assert -0.0101 < min(heights) < -0.005  # .05 of the smallest extent
 
 
 @pytest.mark.compiled
