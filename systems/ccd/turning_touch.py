@@ -59,7 +59,8 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
     bodies, (spin_a, spin_b), (since, until) = state.bodies, spins, times
     (slop, near, threshold, grazes, stride), shape_a, shape_b = limits, bodies.shape[a], bodies.shape[b]
     holds = not has_corner_rule(state, shape_a, shape_b)  # its gap, however they are turned meanwhile
-    strides = 0 if holds else int(min(MOST_STRIDES, (until - since) / stride))
+    stride = max(stride, (until - since) / MOST_STRIDES)
+    strides = 0 if holds else int((until - since) / stride)
     convex, ends = both_convex(state, shape_a, shape_b), sub(bodies.offset[b], bodies.offset[a])
     turning = way_of_turning(bodies, a, spin_a) + way_of_turning(bodies, b, spin_b)
     way = turning * (until - since) + travel_of(path, until)
