@@ -7,159 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers_joints import G, at, chain, disc, joint_world, plank, run, run_failing
+from helpers_joints import G, at, chain, disc, plank, run, run_failing
+from helpers_machines import Gear, Pulley, Rail, Rod, Stop, body, machine_world, machines
 
-from carom import (
-    Physics,
-    Plugin,
-    PluginError,
-    RigidBody,
-    SphereCollider,
-    StepError,
-    Transform,
-    World,
-    column,
-)
-from carom.framework.typing import Vector
-from carom.framework.vectors import add, divided, dot, length, replace, scale, sub
-from carom.plugins.joints import (
-    DRIVE,
-    GIVEN,
-    HOLD,
-    LIMIT,
-    SERVO,
-    SPRING,
-    Distance,
-    Driven,
-    Joint,
-    Joints,
-    Motor,
-    Row,
-    arm_of,
-    moment,
-)  # fmt: skip
+from carom import Physics, RigidBody, SphereCollider, Transform, World
+from carom.plugins.joints import DRIVE, HOLD, LIMIT, SERVO, SPRING, Distance, Joints, Motor
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
-machines = Plugin("machines", version="1.0")
 
-
-@machines.joint
-class Gear(Joint):
-    a: int | None = column(dtype=int)
-    b: int | None = column(dtype=int)
-    ratio: float = column(default=1.0)
-    axle_a: Vector = column(default=0.0, item="vector", kw_only=True)
-    axle_b: Vector = column(default=0.0, item="vector", kw_only=True)
-
-    @staticmethod
-    def constraint(joint, a, b):
-        nothing = scale(a.position, 0.0)
-        axis_a = axis_b = replace(nothing, 0, 1.0)
-        if len(nothing) == 3:
-            axis_a, axis_b = arm_of(a, joint.axle_a), arm_of(b, joint.axle_b)
-        return None, nothing, axis_a, nothing, scale(axis_b, joint.ratio)
-
-
-@machines.joint
-class Pulley(Joint):
-    a: int | None = column(dtype=int)
-    b: int | None = column(dtype=int)
-    wheel_a: Vector = column(item="vector")
-    wheel_b: Vector = column(item="vector")
-    ratio: float = column(default=1.0, positive=True)
-    anchor_a: Vector = column(default=0.0, item="vector", kw_only=True)
-    anchor_b: Vector = column(default=0.0, item="vector", kw_only=True)
-
-    @staticmethod
-    def constraint(joint, a, b):
-        arm_a, arm_b = arm_of(a, joint.anchor_a), arm_of(b, joint.anchor_b)
-        rope_a, rope_b = sub(add(a.position, arm_a), joint.wheel_a), sub(add(b.position, arm_b), joint.wheel_b)
-        along_a, along_b = divided(rope_a, length(rope_a)), scale(rope_b, joint.ratio / length(rope_b))
-        whole = length(rope_a) + joint.ratio * length(rope_b)
-        return whole, along_a, moment(arm_a, along_a), along_b, moment(arm_b, along_b)
-
-
-@machines.joint
-class Rod(Joint):
-    """As Distance is, written as a function."""
-
-    a: int | None = column(dtype=int)
-    b: int | None = column(dtype=int)
-    anchor_a: Vector = column(default=0.0, item="vector")
-    anchor_b: Vector = column(default=0.0, item="vector")
-
-    @staticmethod
-    def constraint(joint, a, b):
-        arm_a, arm_b = arm_of(a, joint.anchor_a), arm_of(b, joint.anchor_b)
-        way = sub(add(b.position, arm_b), add(a.position, arm_a))
-        along = divided(way, length(way))
-        back = scale(along, -1.0)
-        return length(way), back, moment(arm_a, back), along, moment(arm_b, along)
-
-
-@machines.joint
-class Stop(Joint):
-    """b turns against a by ``most`` at most."""
-
-    a: int | None = column(dtype=int)
-    b: int | None = column(dtype=int)
-    axle: Vector = column(default=0.0, item="vector")
-    most: float = column(default=1.0)
-
-    @staticmethod
-    def constraint(joint, a, b):
-        nothing = scale(a.position, 0.0)
-        axis = replace(nothing, 0, 1.0) if len(nothing) == 2 else arm_of(a, joint.axle)
-        return None, nothing, scale(axis, -1.0), nothing, axis
-
-    def rows(self, dimensions):
-        return [Row(GIVEN, LIMIT, low=-math.inf, high=self.most)]
-
-
-@machines.joint
-class Rail(Driven):
-    """b's way along x, and its height: two values with rules of their own."""
-
-    a: int | None = column(dtype=int)
-    b: int | None = column(dtype=int)
-    rule: int = column(default=-1, dtype=int)
-    to: float = column(default=0.0)
-
-    @staticmethod
-    def constraint(joint, a, b):
-        nothing = scale(b.position, 0.0)
-        x, y = replace(nothing, 0, 1.0), replace(nothing, 1, 1.0)
-        return (
-            (b.position[0], nothing, nothing, x, nothing),
-            (dot(b.position, y), nothing, nothing, y, nothing),
-        )
-
-    def rows(self, dimensions):
-        along = Row(GIVEN, HOLD, 0.0, most=50.0)
-        across = Row(GIVEN, HOLD, 0.0, part=1)
-        if self.rule >= 0:
-            rule = along._replace(rule=self.rule, low=self.to, high=self.to + 1.0, target=self.to)
-            return [rule._replace(frequency=1.0, damping_ratio=0.0), across]
-        return [*self.moving(along, 5.0), across]
-
-
-def machine_world(dimensions=2, gravity=G, **settings):
-    if dimensions == 2:
-        world, joints = joint_world((0.0, -gravity), **settings)
-    else:
-        joints = Joints()
-        world = World(Physics(dimensions=3, gravity=(0, -gravity, 0)), Rotation(), joints)
-    world.add_plugin(machines)
-    return world, joints
-
-
-def body(world, place, inertia=0.0, mass=1.0, **fields):
-    d = world.dimensions
-    spin = [Spin(inertia=inertia if d == 2 else np.full(3, inertia))] if inertia else []
-    return world.create_entity(Transform((*place, 0)[:d]), RigidBody(mass=mass, **fields), *spin)
-
-
-@pytest.mark.plain
 @pytest.mark.parametrize("dimensions", [2, 3])
 def test_gear_keeps_its_ratio_under_a_torque(dimensions):
     world, joints = machine_world(dimensions, gravity=0.0)
@@ -179,7 +34,6 @@ def test_gear_keeps_its_ratio_under_a_torque(dimensions):
         assert abs(joints.state(gear).torque - 2.0 * w_b / 120) < 1e-9
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("dimensions", [2, 3])
 @pytest.mark.parametrize("inertia", [0.0, 0.4])
 @pytest.mark.parametrize("ratio", [1.0, 2.0])
@@ -236,7 +90,6 @@ def test_turns_are_counted_beyond_the_first(dimensions):
     assert share == pytest.approx(15.0 / 2, abs=1e-3)
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("dimensions", [2, 3])
 def test_rod_as_a_function_moves_as_the_built_in_one(dimensions):
     places = []
@@ -252,7 +105,6 @@ def test_rod_as_a_function_moves_as_the_built_in_one(dimensions):
     np.testing.assert_allclose(places[0], places[1], atol=1e-9)
 
 
-@pytest.mark.plain
 def test_free_bodies_keep_momentum_and_angular_momentum():
     world, _ = machine_world(gravity=0.0, dt=1 / 240)
     a, b = body(world, (0, 0), 0.5), body(world, (1, 0.5), 0.3, mass=2.0, linear_velocity=(1, -2))
@@ -394,81 +246,3 @@ def test_they_break_and_are_lost_as_others():
     world.step()
     assert events[1:] == [("joint_lost", again)]
     assert len(joints) == 0
-
-
-# -- errors ----------------------------------------------------------------------------------------
-
-
-def declared(returned):
-    """A joint whose function returns that, registered."""
-
-    def constraint(joint, a, b):
-        return returned(a, b)
-
-    fields = {"a": column(dtype=int), "b": column(dtype=int), "constraint": constraint, "__module__": __name__}
-    return Plugin("wrong").joint(type("Wrong", (Joint,), fields))
-
-
-@pytest.mark.plain
-@pytest.mark.parametrize(
-    ("returned", "message"),
-    [
-        (lambda a, b: 1.0, r"returned 1.0: return \(value, along_a"),
-        (lambda a, b: (1.0, a.position), "or a tuple of such rows"),
-        (lambda a, b: (1.0, a.position, (0.0,), a.position, a.position), r"turn_a.*\(in 2D a turn is \(turn, 0.0\)\)"),
-        (lambda a, b: (math.nan, *(a.position,) * 4), "nan as value: return a number, or None"),
-        (lambda a, b: (1.0 / a.position[0], *(a.position,) * 4), "raised ZeroDivisionError"),
-    ],
-)
-def test_what_no_constraint_returns_is_refused_when_it_is_registered(returned, message):
-    with pytest.raises(PluginError, match=f"plugin wrong: joint Wrong: constraint, tried in 2D, .*{message}"):
-        declared(returned)
-
-
-def test_what_is_no_joint_is_refused():
-    for thing, message in ((Transform, "derive a class from carom.plugins.joints.Joint"), (Distance, "no constraint")):
-        with pytest.raises(PluginError, match=message):
-            Plugin("wrong").joint(thing)
-    with pytest.raises(ValueError, match=r"Gear does nothing without the plugin .* World\(.*, plugin\)"):
-        World(Physics(), Joints()).create_entity(Gear(None, 1))
-    with pytest.raises(ValueError, match=r"Gear does nothing without its plugin: World\(Physics\(...\), Joints\(\)\)"):
-        World(Physics(), machines).create_entity(Gear(None, 1))
-
-
-@pytest.mark.plain
-def test_numbers_that_are_not_finite_name_joint_and_entity():
-    world, _ = machine_world()
-    a = body(world, (0, 0))
-    pulley = Pulley(None, a, (1, 0), (0, 0))
-    entity = world.create_entity(pulley)
-    with pytest.raises(ValueError, match=f"entity {entity}: Pulley: where it takes hold .* not finite"):
-        world.step()
-    pulley.wheel_b = (0, 2)
-    world.step()
-    before = world.state_hash()
-    pulley.wheel_b = at(world, a).position
-    with pytest.raises(StepError, match=f"plugin machines: constraint of Pulley, entity {entity}: .* not finite"):
-        world.step()
-    assert world.state_hash() == before
-
-
-@pytest.mark.plain
-def test_rows_of_a_part_that_there_is_not_are_refused():
-    class Half(Joint):
-        a: int | None = column(dtype=int)
-        b: int | None = column(dtype=int)
-
-        @staticmethod
-        def constraint(joint, a, b):
-            return (None, *(scale(a.position, 0.0),) * 4)
-
-        def rows(self, dimensions):
-            return [Row(GIVEN, HOLD, part=1)]
-
-    half = Plugin("half")
-    half.joint(Half)
-    world, _ = machine_world()
-    world.add_plugin(half)
-    world.create_entity(Half(body(world, (0, 0)), body(world, (1, 0))))
-    with pytest.raises(ValueError, match="speak of part 1, but its constraint returns 1"):
-        world.step()

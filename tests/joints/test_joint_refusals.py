@@ -1,0 +1,165 @@
+"""What joints cannot be or hold: refused at the call, or told by the step and cured."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from helpers_joints import at, disc, joint_world, plank, run
+
+from carom import Physics, RigidBody, SphereCollider, Transform, World
+from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Motor, MousePull, Slider, Weld
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Hinge(1, 1, anchor=(0, 0)), "two bodies"),
+        (lambda: Distance(None, None), "two bodies"),
+        (lambda: MousePull(None, grip=(0, 0), target=(1, 1)), "two bodies"),
+        (lambda: Hinge(1, 2, anchor=(0, math.nan)), "finite"),
+        (lambda: Hinge(1, 2, anchor=(0, 0), limits=(1.0, -1.0)), "least, most"),
+        (lambda: Hinge(1, 2, anchor=(0, 0), limits=1.0), "two numbers"),
+        (lambda: Hinge(1, 2, anchor=(0, 0), max_torque=-1.0), "at least 0"),
+        (lambda: Hinge(1, 2, anchor=(0, 0), frequency=0.0), "positive"),
+        (lambda: Distance(1, 2, length=(2.0, 1.0)), "least, most"),
+        (lambda: Distance(1, 2, length=(1.0, 2.0, 3.0)), "two numbers"),
+        (lambda: Distance(1, 2, length=-1.0), "at least 0"),
+        (lambda: Distance(1, 2, length=(0.0, 1.0), frequency=2.0), "one length"),
+        (lambda: Weld(1, 2, anchor=(0, 0), breaking_force=0.0), "positive"),
+        (lambda: Slider(1, 2, direction=(0, 0)), "not be 0"),
+        (lambda: Slider(1, 2, direction=(0, 1e-200)), "not be 0"),
+        (lambda: Motor(1, 2), "speed or an angle"),
+        (lambda: Motor(1, 2, speed=1.0, angle=1.0), "speed or an angle"),
+    ],
+)
+def test_what_no_joint_can_be_is_refused_at_the_call(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("number", [1e16, 1e29, 1e160, 1e300])
+def test_numbers_that_no_step_can_take_are_refused_with_their_field(number):
+    for make, field in (
+        (lambda: Distance(1, 2, length=number), "Distance.least"),
+        (lambda: Distance(1, 2, length=(0.0, number)), "Distance.most"),
+        (lambda: Distance(1, 2, anchor_b=(0, number)), "Distance.anchor_b"),
+        (lambda: Hinge(1, 2, anchor=(0, number)), "Hinge.anchor"),
+        (lambda: Hinge(1, 2, anchor=(0, 0, 0), axis=(0, 0, number)), "Hinge.axis"),
+        (lambda: Hinge(1, 2, anchor=(0, 0), limits=(-number, 0.0)), "Hinge.lower"),
+        (lambda: Hinge(1, 2, anchor=(0, 0), frequency=number), "Hinge.frequency"),
+        (lambda: Slider(1, 2, direction=(0, number)), "Slider.direction"),
+        (lambda: Slider(1, 2, direction=(0, 1), rest=number), "Slider.rest"),
+        (lambda: Slider(1, 2, direction=(0, 1), motor_speed=number), "Slider.motor_speed"),
+        (lambda: Motor(1, 2, speed=number), "Motor.speed"),
+        (lambda: Motor(1, 2, angle=number), "Motor.angle"),
+        (lambda: MousePull(1, grip=(0, number), target=(0, 0)), "MousePull.grip"),
+        (lambda: Weld(1, 2, anchor=(number, 0)), "Weld.anchor"),
+    ):
+        with pytest.raises(ValueError, match=rf"{field} must be at most 1e\+15 along each axis, got"):
+            make()
+    world, _ = joint_world()
+    pull = MousePull(disc(world, (0, 0)), grip=(0, 0), target=(1, 0), max_force=number)
+    entity = world.create_entity(pull)
+    run(world, 10)
+    with pytest.raises(ValueError, match=rf"entity {entity}: MousePull\.target must be at most"):
+        pull.target = (0, number)
+    run(world, 10)
+    assert np.isfinite(world.bodies.position).all()
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("add", [False, True])
+def test_what_no_world_can_have_is_refused_at_the_call(add):
+    world, _ = joint_world()
+    disc(world, (0, 0))
+    moving = world.create_entities(3, Transform.many((0, 0)), RigidBody.many(), SphereCollider.many(0.1))
+    wall = world.create_entity(Transform((3, 0)), SphereCollider(0.5))
+    lift = world.create_entity(Transform((3, 3)), RigidBody(kind="kinematic"))
+    gone, going, empty = disc(world, (5, 0)), disc(world, (6, 0)), world.create_entity(Transform((0, 0)))
+    world.delete_entity(gone, immediate=True)
+    world.delete_entity(going)
+    for joint, message in (
+        (Hinge(moving[0], gone, anchor=(0, 0)), f"entity {gone}, which does not exist"),
+        (Hinge(going, moving[0], anchor=(0, 0)), f"entity {going}, which does not exist"),
+        (Hinge(moving[0], empty, anchor=(0, 0)), f"entity {empty}, which is no body"),
+        (MousePull(99, grip=(0, 0), target=(0, 0)), "entity 99, which does not exist"),
+        (Hinge(None, wall, anchor=(0, 0)), "no dynamic body"),
+        (Weld(lift, wall, anchor=(0, 0)), "no dynamic body"),
+        (Cone(moving[1], moving[0], anchor=(0, 0), axis=(0, 1)), "2 dimensions"),
+        (Hinge(moving[1], moving[0], anchor=(0, 0, 1)), "must have 2 components"),
+    ):
+        with pytest.raises(ValueError, match=message) as error:
+            world.add_component(empty, joint) if add else world.create_entity(joint)
+        assert str(error.value).startswith(f"entity {empty}: ") == add
+    with pytest.raises(TypeError, match="one by one"):
+        Ball.many(moving[0], moving[1], anchor=(0, 0))
+    world.create_entity(Ball(moving[0], moving[1], anchor=(0, 0)))
+    world.step()
+
+
+@pytest.mark.plain
+def test_what_comes_to_be_wrong_is_told_by_the_step_and_can_be_cured():
+    world, joints = joint_world(gravity=(0, 0))
+    a, b, c = (disc(world, (k, 0)) for k in range(3))
+    joint = Ball(a, b, anchor=(0.5, 0))
+    entity = world.create_entity(joint)
+    joint.b = 99
+    for _ in range(2):
+        with pytest.raises(ValueError, match=rf"entity {entity}: .* 99, which does not exist.*delete_entity"):
+            world.step()
+    joint.b, joint.anchor = c, (0.5, 1e9)
+    with pytest.raises(ValueError, match=rf"entity {entity}: Ball holds entity {a} at .* at most 1e\+08 m away"):
+        world.step()
+    joint.anchor = (0.5, 0)
+    world.step()
+    assert joints.of(c) == [entity]
+    joint.b = 99
+    world.delete_entity(entity)
+    world.step()
+    assert len(joints) == 0
+
+
+@pytest.mark.plain
+def test_joints_belong_to_one_world_with_physics():
+    joints = Joints()
+    with pytest.raises(Exception, match="need physics"):
+        World(Joints())
+    _kept = World(Physics(dimensions=2), joints)
+    with pytest.raises(ValueError, match="belong to world"):
+        World(Physics(dimensions=2), joints)
+    with pytest.raises(KeyError, match="entity 7 has no joint"):
+        joints.state(7)
+    bare = World(Physics(dimensions=2))
+    with pytest.raises(ValueError, match=r"Hinge does nothing without its plugin: World\(Physics\(...\), Joints\(\)\)"):
+        bare.create_entity(Hinge(None, 1, anchor=(0, 0)))
+
+
+def test_fields_that_do_not_fit_leave_the_joint_as_it_is():
+    world, _ = joint_world()
+    leaf = plank(world, (0.5, 0))
+    hinge = Hinge(None, leaf, anchor=(0, 0), limits=(-0.5, 0.5))
+    world.create_entity(hinge)
+    world.step()
+    with pytest.raises(ValueError, match="least, most"):
+        hinge.lower = 1.0
+    assert hinge.lower == -0.5
+    hinge.lower = -1.0
+    run(world, 300)
+    assert at(world, leaf).rotation == pytest.approx(-1.0, abs=2e-3)
+
+
+def test_ends_that_do_not_fit_the_world_are_refused_at_the_call():
+    world, joints = joint_world(gravity=(0, 0))
+    rope = world.create_entity(Distance(disc(world, (0, 0)), disc(world, (2, 0))))
+    world.step()
+    joint = world.component_for_entity(rope, Distance)
+    joint.anchor_b = (0.5, 0.5)
+    world.step()
+    assert joints.state(rope).value == pytest.approx(math.hypot(2.5, 0.5), abs=0.5)
+    with pytest.raises(ValueError, match=r"Distance\.anchor_b must have 2 components"):
+        joint.anchor_b = (0, 0, 1)
+    assert np.array_equal(joint.anchor_b, (0.5, 0.5))
+    world.step()

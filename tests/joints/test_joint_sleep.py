@@ -1,0 +1,110 @@
+"""Joined bodies sleep and wake together, also in worlds that went back or were loaded."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+from helpers_joints import at, disc, joint_world, run
+
+from carom import Physics, RigidBody, SphereCollider, Transform, World
+from carom.plugins.joints import Distance, Joints, MousePull
+from carom.plugins.rotation import Rotation
+
+
+def test_joined_bodies_sleep_and_wake_together():
+    world, _ = joint_world(sleeping=True)
+    world.create_entity(Transform((0, -1)), RigidBody(kind="static"), SphereCollider(0.5))
+    bodies = [disc(world, (k, 0.0), 0.3) for k in range(3)]
+    world.create_entity(Transform((1, -10.3)), SphereCollider(10.0))
+    for a, b in itertools.pairwise(bodies):
+        world.create_entity(Distance(a, b))
+    for body in bodies:
+        world.create_entity(Distance(None, body, anchor_a=(at(world, body).x, 2.0)))
+    run(world, 300)
+    asleep = [world.component_for_entity(body, RigidBody).asleep for body in bodies]
+    assert all(asleep)
+    before = [at(world, body).y for body in bodies]
+    world.component_for_entity(bodies[2], RigidBody).apply_impulse((0.0, 1.0))
+    world.step()
+    assert not any(world.component_for_entity(body, RigidBody).asleep for body in bodies)
+    run(world, 5)
+    assert at(world, bodies[2]).y > before[2]
+
+
+def hanging(world):
+    """A disc on a rope above a ball that holds it, asleep; and its rope."""
+    body = disc(world, (0.0, 0.0), 0.3)
+    world.create_entity(Transform((0, -10.3)), SphereCollider(10.0))
+    rope = world.create_entity(Distance(None, body, anchor_a=(0.0, 2.0), length=(0.0, 2.1)))
+    run(world, 200)
+    assert world.component_for_entity(body, RigidBody).asleep
+    return body, rope
+
+
+def test_a_new_joint_wakes_its_bodies():
+    world, _ = joint_world(sleeping=True)
+    body, _ = hanging(world)
+    world.create_entity(MousePull(body, grip=(0.0, 0.0), target=(0.0, 1.0)))
+    run(world, 120)
+    assert at(world, body).y == pytest.approx(1.0, abs=0.05)
+
+
+def test_going_back_wakes_only_what_was_to_wake():
+    world, _ = joint_world(sleeping=True)
+    body, rope = hanging(world)
+    snapshot = world.snapshot()
+    run(world, 3)
+    later = world.state_hash()
+    world.restore(snapshot)
+    run(world, 3)
+    assert world.state_hash() == later
+    assert world.component_for_entity(body, RigidBody).asleep
+    world.component_for_entity(rope, Distance).most = 1.5
+    snapshot = world.snapshot()
+    run(world, 3)
+    later = world.state_hash()
+    world.restore(snapshot)
+    run(world, 3)
+    assert world.state_hash() == later
+    assert not world.component_for_entity(body, RigidBody).asleep
+
+
+CHANGES = {
+    "field": lambda world, hook, rope: setattr(world.component_for_entity(rope, Distance), "length", (0.0, 3.0)),
+    "body": lambda world, hook, rope: setattr(world.component_for_entity(rope, Distance), "b", disc(world, (1.5, 4))),
+    "end": lambda world, hook, rope: world.delete_entity(rope),
+    "kinematic": lambda world, hook, rope: setattr(
+        world.component_for_entity(hook, RigidBody), "linear_velocity", (0.0, -1.0)
+    ),
+    "static": lambda world, hook, rope: setattr(world.component_for_entity(hook, Transform), "position", (0.0, 4.0)),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_what_hangs_asleep_wakes_when_its_joint_changes_and_not_before(change, tmp_path):
+    """Also in a world that goes back, or is loaded, between the change and the next step."""
+    world, _ = joint_world(sleeping=True)
+    kind = "kinematic" if change == "kinematic" else "static"
+    hook = world.create_entity(Transform((0, 5)), RigidBody(kind=kind), SphereCollider(0.1))
+    lamp = disc(world, (0, 3))
+    rope = world.create_entity(Distance(hook, lamp, length=(0.0, 2.0)))
+    run(world, 300)
+    body, start = world.component_for_entity(lamp, RigidBody), world.snapshot()
+    assert body.asleep
+    for _ in range(2):
+        world.restore(start)
+        run(world, 10)
+        assert body.asleep
+        CHANGES[change](world, hook, rope)
+        changed = world.snapshot()
+        run(world, 60)
+        assert at(world, lamp).y < 2.5
+        after = world.state_hash()
+        world.restore(changed)
+        world.save(tmp_path / "lamp.carom")
+        run(world, 60)
+        assert world.state_hash() == after
+        loaded = World.load(tmp_path / "lamp.carom", Physics(dimensions=2), Rotation(), Joints())
+        run(loaded, 60)
+        assert loaded.state_hash() == after
