@@ -56,6 +56,7 @@ def test_it_hangs_on_its_spring_on_its_axis_and_turns_as_its_motor_can(d):
     assert joints.state(entity).speed == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.compiled
 def test_car_and_wheel_keep_their_momenta(d):
     """Free in space, while the motor turns one against the other and the spring swings."""
     world, joints, axle = make(d)

@@ -16,7 +16,6 @@ from carom.plugins.parts import PartOf
 from carom.plugins.rotation import BoxCollider, Spin
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("beyond", [-0.02, 0.02])
 def test_a_piece_stays_on_an_edge_up_to_its_centre_of_mass(beyond):
     """A plank with a load on its right end, on a table that ends there: the centre of both, of equal mass, is 0.2 from
@@ -102,7 +101,6 @@ def test_a_piece_on_a_hinge_has_the_period_of_a_physical_pendulum():
     assert np.diff(passes).mean() / 120 == pytest.approx(2 * math.pi * swing / m, rel=3e-4)
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("mode", MODES)
 def test_free_collisions_keep_momentum_and_energy(mode):
     random = np.random.default_rng(7)
@@ -172,7 +170,6 @@ def test_what_starts_unrotated_meets_what_it_turns_to_in_its_first_step(mode, cu
     assert ends[0] == pytest.approx(ends[1], abs=1e-4)
 
 
-@pytest.mark.plain
 def test_what_bounces_on_a_part_of_what_rests_finds_it_at_rest():
     world, parts = parts_world((0, -G))
     floor(world, friction=0.5)
@@ -266,7 +263,6 @@ def test_pieces_of_the_scene_start_apart_and_stay_in_their_bin(mode):
         assert world.potential_energy() < 0.6 * energy
 
 
-@pytest.mark.plain
 def test_a_turning_platform_of_parts_carries_what_lies_on_its_arms():
     """A kinematic body and its parts move alike, and are moved by nothing."""
     world, _ = parts_world((0, -G))

@@ -359,6 +359,7 @@ def test_snapshots_rollback_and_files_go_on_to_the_bit(tmp_path):
     assert loaded.state_hash() == world.state_hash()
 
 
+@pytest.mark.compiled
 def test_pieces_sleep_as_one_and_wake_to_the_bit():
     world, parts = parts_world((0, -G), sleeping=True)
     floor(world, friction=0.5)

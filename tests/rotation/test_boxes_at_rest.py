@@ -292,7 +292,6 @@ def test_endless_ground_bears_a_box_that_falls_askew_as_long_ground_does(d, mode
         assert np.abs(world.component_for_entity(entity, Spin).angular_velocity).max() < 1e-9
 
 
-@pytest.mark.plain
 def test_what_rests_does_not_notice_that_another_one_wakes():
     """The impulses of its contacts stay at their points, where those of the other come back among them."""
     ends = []

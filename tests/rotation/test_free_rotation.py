@@ -108,6 +108,7 @@ def spin_top(method, dt, seconds, w0=START, moments=MOMENTS):
     return w, q, np.multiply(moments, w0), turned(q, np.multiply(moments, w))
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("method", METHODS)
 def test_the_free_top_is_that_of_jacobis_functions_at_the_order_of_the_method(method):
     """Three steps of a third each: the slope of the error over dt is the order within .15."""
@@ -149,6 +150,7 @@ def test_the_middle_axis_flips_when_it_should():
     assert np.abs(np.subtract(times, closed)).max() < 0.01
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("seed", range(6))
 def test_axes_that_are_not_the_bodys_own(seed):
     """A sphere beside the body's position has inertia off the diagonal: its momentum stays, and it is that of the

@@ -49,7 +49,6 @@ def run(world, steps):
 # -- closed forms ---------------------------------------------------------------------------------
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("mode", MODES)
 def test_colliders_beside_their_body_bounce_without_loss(mode):
     """They are struck where they are at the time of the impact, not where the step ends."""

@@ -36,7 +36,6 @@ def motion(world, entity):
 # -- rough impacts --------------------------------------------------------------------------------
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize(("d", "part"), [(2, 1 / 2), (3, 2 / 5)])
 def test_a_rough_elastic_ball_leaves_without_slip_and_the_way_it_came_next_time(d, part, mode):

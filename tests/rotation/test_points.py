@@ -123,6 +123,7 @@ def turned(random, d, lay, tilt, yaw=True):
 # -- against it -----------------------------------------------------------------------------------
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("seed", range(4))
 def test_points_are_the_corners_of_what_two_faces_share(seed, d):

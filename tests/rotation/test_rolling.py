@@ -104,7 +104,6 @@ def test_on_a_slope_it_rolls_or_slips_as_newton_says(d, mode):
         assert (abs(slip) < 1e-9) == (times < 1), slip
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("d", [2, 3])
 def test_the_angle_follows_the_way(d):
     """x = r angle while it rolls, to the first step's share."""
@@ -135,7 +134,6 @@ def test_a_ball_that_slides_comes_to_roll_with_the_momentum_about_the_ground(d, 
 # -- impacts --------------------------------------------------------------------------------------
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("seed", range(3))

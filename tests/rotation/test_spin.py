@@ -166,6 +166,7 @@ def test_a_torque_acts_for_the_frame_in_which_it_is_applied_and_in_a_system_for_
 # -- what a world keeps ---------------------------------------------------------------------------
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("d", [2, 3])
 def test_snapshots_files_and_failed_steps_bring_back_every_bit(d, tmp_path):
     class Fails(System):
@@ -216,6 +217,7 @@ def test_snapshots_files_and_failed_steps_bring_back_every_bit(d, tmp_path):
         assert other.state_hash() == later
 
 
+@pytest.mark.compiled
 def test_what_spins_stays_awake_and_what_has_stopped_sleeps():
     with space(gravity=(0, -10), sleeping=True) as world:
         world.create_entity(Transform((0, -1)), RigidBody(kind="static"), AABBCollider((10, 1)))
