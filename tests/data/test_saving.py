@@ -26,7 +26,7 @@ from carom.plugins.springs import Springs
 pytestmark = [pytest.mark.plain, pytest.mark.usefixtures("invariants")]
 
 HERE = Path(__file__).resolve().parents[1]
-STEPS = 90
+STEPS = 45
 ELSEWHERE = """
 import sys
 sys.path[:0] = {here!r}, {here!r} + "/data"

@@ -22,7 +22,7 @@ from carom.plugins.springs import Springs
 pytestmark = pytest.mark.usefixtures("invariants")
 
 ROOT = Path(__file__).resolve().parents[2]
-STEPS = 200
+STEPS = 100
 
 
 def contents(world):
@@ -246,12 +246,12 @@ def test_a_world_is_not_copied(do):
 
 def test_two_peers_with_delayed_inputs_end_with_the_same_world(capsys):
     example = runpy.run_path(str(ROOT / "examples" / "rollback.py"), run_name="example")
-    late, at_once = example["play"](90, 8), example["play"](90, 0)
+    late, at_once = example["play"](45, 8), example["play"](45, 0)
     hashes = {peer.world.state_hash() for peer in (*late, *at_once)}
     assert len(hashes) == 1
-    assert {peer.frame for peer in late} == {90}
+    assert {peer.frame for peer in late} == {45}
     assert [peer.world.get_entities() for peer in late] == [at_once[0].world.get_entities()] * 2
-    assert min(peer.replayed for peer in late) > 8 * 70
+    assert min(peer.replayed for peer in late) > 8 * 25
     runpy.run_path(str(ROOT / "examples" / "rollback.py"), run_name="__main__")
     assert "both worlds" in capsys.readouterr().out
 

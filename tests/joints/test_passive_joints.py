@@ -60,7 +60,7 @@ def random_chain(seed: int, d: int, gravity: float) -> tuple[World, bool]:
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("gravity", [0.0, 9.81])
 def test_no_chain_gains_energy(d, gravity):
-    for seed in range(15):
+    for seed in range(8):
         world, hangs = random_chain(seed, d, gravity)
         start = lowest = energy(world)
         momentum, fastest = world.momentum(), world.kinetic_energy()

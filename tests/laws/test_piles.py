@@ -113,7 +113,7 @@ def test_ten_thousand_discs_come_to_rest(seed):
 # -- without friction, as published -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("e", [0.3, *(pytest.param(e, marks=pytest.mark.slow) for e in (0.0, 0.8))])
+@pytest.mark.parametrize("e", [0.3, 0.8, pytest.param(0.0, marks=pytest.mark.long)])
 def test_a_pile_of_a_thousand(e):
     """After 15 to 20 s all is at rest except single discs: mean overlap 0.2 %, greatest 2 % of a diameter."""
     with scenes.pile2d.build(n=1000) as world:
@@ -130,7 +130,7 @@ def test_a_pile_of_a_thousand(e):
         assert ((x >= 0) & (x <= pile.width(1000, 2)) & (y >= 0)).all()
 
 
-@pytest.mark.parametrize(("dt", "published"), [(1e-2, 0.0161), pytest.param(1e-3, 1.55e-4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("dt", "published"), [(1e-2, 0.0161), pytest.param(1e-3, 1.55e-4, marks=pytest.mark.long)])
 @pytest.mark.parametrize(("shape", "pitch"), [((7, 7, 1), 2.0), ((6, 6, 6), 0.201), ((6, 6, 6), 2.0)])
 def test_published_lattice_666(shape, pitch, dt, published):
     """A3: spheres R = 0.1, 10 kg, e = 0, 10 s, lowest centre at 0.101: mean squared overlap, m^2, below ODE's."""

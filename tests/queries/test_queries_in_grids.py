@@ -52,12 +52,12 @@ def test_answers_follow_steps_and_writes(d):
     world.close()
 
 
-@both_dimensions
 @pytest.mark.parametrize(
-    ("count", "kinds", "grids"),
+    ("d", "count", "kinds", "grids"),
     [
-        (60, ("dynamic",), (False, False)), (900, ("dynamic",) * 3, (False, True)),
-        (900, ("dynamic", "dynamic", "kinematic"), (True, True)), (900, ("dynamic", *["kinematic"] * 3), (True, False)),
+        (3, 60, ("dynamic",), (False, False)), (2, 900, ("dynamic",) * 3, (False, True)),
+        (3, 900, ("dynamic", "dynamic", "kinematic"), (True, True)),
+        (2, 900, ("dynamic", *["kinematic"] * 3), (True, False)),
     ],
 )  # fmt: skip
 def test_answers_while_bodies_sleep(d, count, kinds, grids):

@@ -290,7 +290,7 @@ def test_energy_never_rises_with_friction(e, mode):
 
 
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("seed", [4, 6])
+@pytest.mark.parametrize("seed", [4, pytest.param(6, marks=pytest.mark.long)])
 def test_a_smooth_elastic_gas_of_boxes_in_space_keeps_energy(seed, mode):
     """To rounding, over more than 300 impacts; among them corners that slide along faces, and would graze them more
     often than the cap allows."""
