@@ -111,33 +111,24 @@ main()
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="there are no signals of this kind")
-@pytest.mark.parametrize("where", ["here", "on a cluster"])
-def test_ctrl_c_ends_at_once_with_what_is_known(tmp_path, monkeypatch, where):
+def test_ctrl_c_ends_at_once_with_what_is_known(tmp_path, monkeypatch):
     """The command prints what it knows after the first runs; nothing goes on running."""
+    distributed = pytest.importorskip("distributed")
     monkeypatch.chdir(tmp_path)
     scene_file(tmp_path, BALL)
-    words = ["trade", "mine.py", "--thorough", "--seconds", "3", "--no-timing", "--collisions", "discrete"]
-
-    def stopped(*more):
-        command = [sys.executable, "-c", ENDED, *words, *more]
+    with distributed.LocalCluster(n_workers=2, **PROCESSES) as local:
+        address = local.scheduler_address
+        words = ["trade", "mine.py", "--thorough", "--seconds", "3", "--no-timing", "--cluster", address]
         process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-        )
-        file = tmp_path / "out" / "runs.sqlite"
-        until(lambda: number_kept(file) > 0)
+            [sys.executable, "-c", ENDED, *words, "--collisions", "discrete"],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        )  # fmt: skip
+        until(lambda: number_kept(tmp_path / "out" / "runs.sqlite") > 0)
         os.killpg(process.pid, signal.SIGINT)
         out, err = process.communicate(timeout=DEADLINE)
         assert process.returncode == 130, err
         assert "use Settings(" not in out
         assert "the same command goes on" in err
         until(lambda: not alive(-process.pid))
-
-    if where == "here":
-        stopped("--workers", "2")
-        return
-    distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(n_workers=2, **PROCESSES) as local:
-        address = local.scheduler_address
-        stopped("--cluster", address)
         with distributed.Client(address, set_as_default=False) as client:
             until(lambda: not any(client.processing().values()))

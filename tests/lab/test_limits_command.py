@@ -111,7 +111,7 @@ def build(settings, seed=0):
 
 
 SLIDES = IMPORTS + """
-seconds = 1.0
+seconds = 0.3
 
 def build(settings, seed=0):
     world = World(Physics(dimensions=2, gravity=(0, -10)), settings=settings)

@@ -7,7 +7,7 @@ import sqlite3
 from contextlib import closing
 
 import pytest
-from helpers_trade_scenes import BALL, DEADLY, dies, scene_file
+from helpers_trade_scenes import BALL, dies, scene_file
 
 from carom.lab import Only, Trade, trade
 from carom.lab.cases import case as cases
@@ -105,17 +105,6 @@ def test_results_of_another_scene_time_or_step_are_not_taken(ball, performed, tm
         before = len(performed)
         measured(ball, tmp_path, **{**only, **change})
         assert len(performed) == before + 4, change  # the point and three references
-
-
-@needs_signals
-def test_a_killed_worker_loses_nothing_and_counts_nothing_twice(tmp_path):
-    """The first process of two that builds the scene dies at once; another one repeats its run."""
-    mine = scene_file(tmp_path, DEADLY.format(times=1))
-    found = measured(mine, tmp_path, workers=2)
-    assert len(list((tmp_path / "mine.marks").iterdir())) >= 1  # it happened
-    assert found == measured(mine)
-    listed = keys(tmp_path)
-    assert len(listed) == len(set(listed)) == RUNS
 
 
 @needs_signals

@@ -428,7 +428,7 @@ def play_for(steps):
     """Games until they have made so many steps: each round plays others, as its games are longer by a rule."""
     Game.steps, rules = 0, 50
     while Game.steps < steps:
-        play(100, rules)
+        play(50, rules)
         rules += 1
 
 
