@@ -351,8 +351,8 @@ def scenarios() -> Iterator[tuple[str, Callable[[], list[str]]]]:
         yield f"buried {d}D", lambda d=d: play(buried(d), 3)
         yield f"heavy on light {d}D", lambda d=d: play(heavy_on_light(d), 2)
         yield f"asked {d}D", lambda d=d: asked(d)
-        yield f"tumbling {d}D", lambda d=d: play(tumbling(d, MODES[d - 2]), 15 - 3 * d)
-        yield f"joined {d}D", lambda d=d: play(joined(d, MODES[0]), 14 - 3 * d)
+        yield f"tumbling {d}D", lambda d=d: play(tumbling(d, MODES[d - 2]), 12 - 3 * d)
+        yield f"joined {d}D", lambda d=d: play(joined(d, MODES[0]), 12 - 3 * d)
         yield f"ground {d}D", lambda d=d: play(ground(d, MODES[d - 2]), 9 - 2 * d)
     for d, mode in zip((2, 3, 2), MODES, strict=True):
         yield f"sleepers {d}D {mode}", lambda d=d, mode=mode: sleepers(d, mode)

@@ -121,7 +121,6 @@ def test_free_collisions_keep_momentum_and_energy(mode):
     assert angular_momentum(world, bodies) == pytest.approx(turning, rel=1e-11)
 
 
-@pytest.mark.plain
 def test_exact_flights_do_not_depend_on_the_step():
     """Also where parts of one body are struck one after the other within a step, which turns all of it each time."""
     ends = []

@@ -185,6 +185,7 @@ def test_a_torque_changes_the_angular_momentum_by_itself_times_the_time():
 # -- what turns by itself -------------------------------------------------------------------------
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("collision", ["discrete", "continuous", "event_driven"])
 def test_a_mill_turns_with_its_angular_velocity_and_its_shape_with_it(collision):
     """A kinematic bar of half length 2 passes a point at distance 1.5 once in half a turn: the query there sees it."""

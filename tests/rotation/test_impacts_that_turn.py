@@ -130,6 +130,7 @@ LYING = {
 }
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("mode", [pytest.param("discrete", marks=pytest.mark.plain), "continuous", "event_driven"])
 @pytest.mark.parametrize("shape", LYING)
 def test_what_lands_flat_in_space_does_not_turn(shape, mode):

@@ -248,7 +248,6 @@ def test_a_wheel_that_turns_drives_what_lies_on_it():
     assert np.abs(v).max() < 1e-9
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
 def test_a_bar_that_turns_throws_with_the_speed_of_its_points(d, mode):

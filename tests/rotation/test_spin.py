@@ -62,6 +62,7 @@ def distance_to(corners, x):
     return np.where(inside, 0.0, best)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("seed", range(3))
 def test_inertia_of_uniform_shapes_is_the_sum_over_a_lattice(seed, d):
@@ -259,6 +260,7 @@ def test_what_the_game_does_to_the_spin_of_a_sleeper_wakes_it(way):
         assert body.linear_velocity[0] == pytest.approx(about_ground / (0.5 + 0.125 / 0.5), rel=1e-9)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("collider", [(), (SphereCollider(1),)])
 def test_the_slow_hand_of_a_clock_does_not_fall_asleep(collider):
     hour = math.tau / 43200
