@@ -25,7 +25,7 @@ from carom.framework import Settings, World
 from carom.framework.compilation import log
 from carom.plugins import Physics, capsule, convex_polygon, one_way_segment, tile_grid
 
-STEPS = 600
+STEPS = 200
 
 def platformer(mode):
     plugins = capsule.plugin, convex_polygon.plugin, one_way_segment.plugin, tile_grid.plugin
