@@ -37,7 +37,7 @@ from ..constants import (
     STRUCK,
     SUBSTEP_WORK,
 )  # fmt: skip
-from .joints import HOLD, LIMIT, LINE, TURN
+from .joints import HOLD, LIMIT, LINE, POINT, TURN
 
 COLOURS = 62  # bits of a mask; rows of a body beyond them share the last one
 
@@ -121,11 +121,12 @@ def weigh_joint(state, j, dt):
     w_a, w_b = inverse_mass[a] if a >= 0 else 0.0, inverse_mass[b] if b >= 0 else 0.0
     solver.borne[t] = min(solver.borne[t], w_a if w_a > 0.0 else w_b, w_b if w_b > 0.0 else w_a)
     solver.welds[t] += joints.kind[j] == TURN and joints.rule[j] == HOLD
-    size = max(length(joints.anchor_a[j]) if w_a > 0.0 else 0.0, length(joints.anchor_b[j]) if w_b > 0.0 else 0.0)
-    if joints.kind[j] == LINE:
+    if joints.kind[j] <= LINE and joints.rule[j] <= LIMIT:
         size = joints.low[j] if joints.rule[j] == HOLD else joints.high[j]
-    if joints.kind[j] <= LINE and joints.rule[j] <= LIMIT and size > 0.0:
-        solver.give[t] = max(solver.give[t], (w_a + w_b) / size)
+        if joints.kind[j] == POINT:
+            reach_a = length(joints.anchor_a[j]) if w_a > 0.0 else 0.0
+            size = max(reach_a, length(joints.anchor_b[j]) if w_b > 0.0 else 0.0)
+        solver.give[t] = max(solver.give[t], (w_a + w_b) / size if size > 0.0 else 0.0)
 
 
 @part

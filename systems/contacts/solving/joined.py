@@ -10,6 +10,7 @@ from ....framework.vectors import add, add_scaled, dot, item, length, replace, s
 from ...codes import NEED_COLUMNS, OK
 from ...compounds.rows import owner_of, place_of
 from ...integration.turning import change_of_spin, cross_spin
+from ...narrow_phase.stages import layers_meet
 from ...shapes.tolerances import reach_of
 from .joints import DRIVE, GIVEN, POINT, SLIDE, TURN
 from .rows import turn_body
@@ -128,7 +129,7 @@ def leave_out_joined(state, dt):
         a, b = first[c], second[c]
         first[kept], second[kept] = a, b
         one, other = entity[owner_of(state, a)], entity[owner_of(state, b)]
-        kept += not is_apart(joints, min(one, other), max(one, other))
+        kept += not (layers_meet(state, a, b) and is_apart(joints, min(one, other), max(one, other)))
     candidates.count = kept
     return OK
 
@@ -201,6 +202,12 @@ def lay_joints(state):
         if joints.kind[j] == GIVEN:
             lay_given(state, j)
             continue
+        if joints.kind[j] == TURN and len(zero) == 2:
+            joints.rail[j], joints.angle[j] = joints.axis[j], 0.0
+            if len(bodies.rotation) > 0:
+                angle = bodies.rotation[b] if b >= 0 else 0.0
+                joints.angle[j] = angle - bodies.rotation[a] if a >= 0 else angle
+            continue
         start_a = bodies.previous_position[a] if a >= 0 else zero
         start_b = bodies.previous_position[b] if b >= 0 else zero
         joints.between[j] = sub(start_b, start_a)
@@ -208,8 +215,3 @@ def lay_joints(state):
         joints.base_b[j] = turned(state, b, joints.anchor_b[j]) if b >= 0 else joints.anchor_b[j]
         if joints.kind[j] == SLIDE or len(zero) == 3:
             joints.rail[j] = turned(state, a, joints.axis[j]) if a >= 0 else joints.axis[j]
-        elif joints.kind[j] == TURN:
-            joints.rail[j], joints.angle[j] = joints.axis[j], 0.0
-        if joints.kind[j] == TURN and len(zero) == 2 and len(bodies.rotation) > 0:
-            angle = bodies.rotation[b] if b >= 0 else 0.0
-            joints.angle[j] = angle - bodies.rotation[a] if a >= 0 else angle

@@ -281,7 +281,7 @@ def warm_start_joints(solver):
         j = order[e]
         if kind[j] == POINT:
             push_apart(columns, (first[j], second[j]), (arm_a[j], arm_b[j]), push[j])
-        else:
+        elif joints.impulse[j] != 0.0:
             give_row(solver, j, joints.impulse[j])
 
 
@@ -310,7 +310,8 @@ def solve_row(solver, j, pushes):
         change = joints.mass[j] * ((joints.pushing[j] if pushes else joints.opening[j]) - speed)
     new = min(joints.greatest[j], max(joints.least[j], old + change))
     joints.impulse[j] = new
-    give_row(solver, j, new - old)
+    if new != old:  # most limits are not met
+        give_row(solver, j, new - old)
 
 
 @part
