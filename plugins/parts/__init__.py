@@ -54,6 +54,7 @@ class Parts(Plugin):
         self._generation, self._any_static = self._table.generation, False
         self._rows: Any = ()  # of the parts and of their bodies
         self._rows_version = -1
+        self._offsets: list[str] = []  # columns of their colliders
         world.events.define("part_lost")
         self._physics.extensions.adopters.append(self._follow)
         self._physics.extensions.waiting.append(lambda: self._now() != self._seen)
@@ -123,14 +124,14 @@ class Parts(Plugin):
         table = self._table
         inside = tuple(table.column(key).tobytes() for name in FIELDS if (key := f"part_of.{name}") in table.lent)
         statics = table.static_version if self._any_static else 0
-        derived = self._derived(self._rows[0]).tobytes() if self._rows_version == table.version else b""
+        rows = self._rows[0] if self._rows_version == table.version else ()
+        derived = tuple(column.tobytes() for column in self._derived(rows)) if len(rows) else ()
         return self._contents.log.rounds, table.version, table.members_version, statics, Changes.count, inside, derived
 
-    def _derived(self, rows: np.ndarray) -> np.ndarray:
-        """(n, k): what parts have from their PartOf in the columns of other components, but for where they move."""
+    def _derived(self, rows: np.ndarray) -> list[np.ndarray]:
+        """What parts have from their PartOf in the columns of other components, but for where they move."""
         arrays = self._table.arrays
-        offsets = [arrays[key] for kind in self._colliders if (key := kind.columns["offset"].key) in arrays]
-        return np.column_stack([arrays["mass"][rows], *(offset[rows] for offset in offsets)])
+        return [arrays[key].take(rows, axis=0) for key in ("mass", *self._offsets) if key in arrays]
 
     def _look(self) -> tuple[Any, Any, Any]:
         """(the entities of the parts in order, their fields (n, k) as bits, what all depend on)."""
@@ -141,7 +142,7 @@ class Parts(Plugin):
         of = table.rows_of(fields[0])
         kinds = [np.where(at < 0, -1, np.searchsorted(table.stops, at, side="right")) for at in (of, rows)]
         statics = table.static_version if self._any_static else 0
-        bits = np.column_stack((*fields, *kinds, self._derived(rows))).astype(float).view(np.int64)
+        bits = np.column_stack((*fields, *kinds, *self._derived(rows))).astype(float).view(np.int64)
         return table.column("entity")[rows], bits, (table.members_version, statics)
 
     def _find_changed(self) -> tuple[list[int], list[int], dict[int, int]]:
@@ -203,10 +204,6 @@ class Parts(Plugin):
         for name in FIELDS:
             columns[name].checked(getattr(part, name), entity)
         return Pose.of(part.position, part.rotation, self._physics.dimensions)
-
-    @property
-    def _colliders(self) -> list[type[Collider]]:
-        return [kind for kind in self._table.component_types if issubclass(kind, Collider)]
 
     def _check(self, entity: int, holder: int) -> None:
         """ValueError for a part that the body cannot have."""
@@ -338,6 +335,8 @@ class Parts(Plugin):
         record, count, table = self._record, self._record.count, self._table
         self._rows = table.rows_of(record.entity[:count]), table.rows_of(record.body[:count])
         self._rows_version = table.version
+        colliders = [kind for kind in table.component_types if issubclass(kind, Collider)]
+        self._offsets = [kind.columns["offset"].key for kind in colliders if table.has_mask(kind)[self._rows[0]].any()]
         self._any_static = bool((self._rows[1] >= table.stops[1]).any())
 
 
