@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import math
 
-from ...framework.compilation import part
+from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, dot, length, row, scale, sub
-from ..integration.trajectory import along, rate_along, travel_of
+from ..integration.trajectory import ROUNDING, along, rate_along, travel_of
 from ..integration.turning import arms_to, closing_by_spin, is_turned
 from ..shapes.convex.points import MOST_POINTS, contact_points
 from ..shapes.dispatch import both_convex, evaluate, has_corner_rule, is_corner_touch
@@ -87,7 +87,7 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
             closes = rate < -threshold or (rate < 0.0 and not found)
             if closes and (corners or not is_corner_touch(state, shape_a, a, shape_b, b, d, slop)):
                 touch, found, gap = (t, normal, point, d), True, -depth
-                high = t if rate < -threshold else high
+                high = t if rate < -threshold - ROUNDING * fastest else high
         elif convex:
             fastest += max(0.0, -dot(w, normal)) - length(w)
         low = low if high <= t else t
@@ -102,16 +102,33 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
     return found, touch, gap
 
 
+@inlined
+def is_struck(state, i):
+    """Whether body i has had an impact at a known time of the step."""
+    return state.impacts.sweeps and state.bodies.impact_count[i] > 0
+
+
 @part
-def first_touch_of_turn(state, a, b):
-    """(whether they touch on the way, share of the step before that, gap then, normal, point from a's centre), as the
-    step leads and turns them; they need not approach."""
-    bodies, slop, still = state.bodies, slop_of(state, a, b), zero_of(state)
+def turn_of_path(state, i, dt):
+    """By how much body i turns in the step, as seen from what the last impact has made of its spin."""
+    return scale(state.bodies.spin[i], dt) if is_struck(state, i) else state.bodies.turn[i]
+
+
+@part
+def first_touch_of_turn(state, dt, a, b):
+    """(whether they touch on the way, share of the step before that, gap then, normal, point from a's centre, from a's
+    body to b's where that path starts, and how far that has gone), as the step leads and turns them since their last
+    impacts; they need not approach."""
+    bodies, slop, still, since = state.bodies, slop_of(state, a, b), zero_of(state), 0.0
     start = sub(bodies.previous_position[b], bodies.previous_position[a])
+    for i in (a, b):
+        if is_struck(state, i):
+            start, since = sub(bodies.origin[b], bodies.origin[a]), max(since, bodies.last_impact[i] / dt)
     travel = sub(sub(bodies.position[b], bodies.position[a]), start)
     path = add(start, sub(bodies.offset[b], bodies.offset[a])), travel, still, still
-    way = length(travel) + way_of_turning(bodies, a, bodies.turn[a]) + way_of_turning(bodies, b, bodies.turn[b])
+    spins = turn_of_path(state, a, dt), turn_of_path(state, b, dt)
+    way = length(travel) + way_of_turning(bodies, a, spins[0]) + way_of_turning(bodies, b, spins[1])
     stride = STRIDE * smaller_extent(bodies, a, b) / way if way > 0.0 else 1.0
-    spins, limits = (bodies.turn[a], bodies.turn[b]), (slop, BESIDE * slop, -math.inf, -math.inf, stride)
-    found, (share, normal, point, _), gap = touch_of_turning(state, a, b, path, spins, (0.0, 1.0), limits)
-    return found, share, gap, normal, point
+    limits = (slop, BESIDE * slop, -math.inf, -math.inf, stride)
+    found, (share, normal, point, _), gap = touch_of_turning(state, a, b, path, spins, (since, 1.0), limits)
+    return found, share, gap, normal, point, start, scale(travel, share)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, length, scale, sub
+from ..ccd.turning_touch import turn_of_path
 from ..codes import NEED_COLUMNS, NEED_SOLVER, OK
 from ..compounds.rows import has_parts, next_row, owner_of, place_of
 from ..compounds.stages import share_places
@@ -111,7 +112,7 @@ def gather(state, dt):
     for q in range(solver.bodies if state.spinning else 0):
         i = solver.body_row[q]
         solver.spin[q] = bodies.spin[i]
-        turn_body(solver, q, scale(bodies.turn[i], -1.0))  # to where the step starts
+        turn_body(solver, q, scale(turn_of_path(state, i, dt), -1.0))  # to where the step starts
         solver.reach[q] = reach_from_centre(state, i) if state.collides else 0.0
         solver.inverse_inertia[q] = bodies.inverse_inertia[i]
         solver.inverse_products[q] = bodies.inverse_products[i]

@@ -7,7 +7,7 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, length, row, scale, store, sub
 from ..ccd.search_bounds import FAST
-from ..ccd.turning_touch import first_touch_of_turn
+from ..ccd.turning_touch import first_touch_of_turn, turn_of_path
 from ..integration.turning import cross_spin, is_turned, size_of_turn, turn_of_arm
 from ..narrow_phase.manifolds import centre_offset_at_start, evaluate_pair, forget_manifold, has_manifold
 from ..shapes.convex.points import MOST_POINTS, contact_points, is_same
@@ -111,7 +111,7 @@ def lies_on_face(state, sides, d, turn, normal):
 
 
 @part
-def lay_first_touch(state, r):
+def lay_first_touch(state, dt, r):
     """The rows of a pair of which one body turns far, if it touches on the way: at one point, as they are turned then.
 
     The gap and the arms are those of the moment of touch, led back to where the shapes stand in the other rows.
@@ -119,20 +119,19 @@ def lay_first_touch(state, r):
     solver, pairs, bodies = state.solver, state.pairs, state.bodies
     c, k = solver.pair[r], solver.slot[r]
     a, b = pairs.a[c], pairs.b[c]
-    touches, share, gap, normal, point = first_touch_of_turn(state, a, b)
+    touches, share, gap, normal, point, begin, way = first_touch_of_turn(state, dt, a, b)
     if not touches:
         return
-    start = sub(bodies.previous_position[b], bodies.previous_position[a])
-    travel = sub(sub(bodies.position[b], bodies.position[a]), start)
-    left_a, left_b = scale(bodies.turn[a], share - 1.0), scale(bodies.turn[b], share - 1.0)
+    start, between = sub(bodies.previous_position[b], bodies.previous_position[a]), add(begin, way)
+    left_a, left_b = scale(turn_of_path(state, a, dt), share - 1.0), scale(turn_of_path(state, b, dt), share - 1.0)
     arm_a = add(add(bodies.offset[a], turn_of_arm(left_a, bodies.offset[a])), add_scaled(point, normal, -0.5 * gap))
-    arm_b = sub(add(arm_a, scale(normal, gap)), add_scaled(start, travel, share))
+    arm_b = sub(add(arm_a, scale(normal, gap)), between)
     if share == 0.0 and slides_past(state, a, b, normal, arm_a, arm_b):
         return  # the points of the end of the step are as good, and more
     ball_a, ball_b = is_ball(state, a, normal), is_ball(state, b, normal)
     onwards = scale(left_b if ball_a else left_a, -1.0)
     free = (bodies.inverse_mass[b] if ball_a else bodies.inverse_mass[a]) > 0.0  # else a ball that sinks in is put back
-    led = free and ball_a != ball_b and lies_on_face(state, (a, b), add_scaled(start, travel, share), onwards, normal)
+    led = free and ball_a != ball_b and lies_on_face(state, (a, b), between, onwards, normal)
     if led:  # the face is where the step has turned it
         arm_a, arm_b = add(arm_a, turn_of_arm(onwards, arm_a)), add(arm_b, turn_of_arm(onwards, arm_b))
         normal = add(normal, turn_of_arm(onwards, normal))
@@ -148,7 +147,7 @@ def lay_first_touch(state, r):
     core_a, core_b = add_scaled(arm_a, normal, -rounding_of(state, a)), add_scaled(arm_b, normal, rounding_of(state, b))
     core_a = add(core_a, turn_of_arm(scale(left_a, -1.0), core_a))
     core_b = add(core_b, turn_of_arm(scale(left_b, -1.0), core_b))
-    before = add(scale(travel, share), sub(turn_of_arm(left_b, core_b), turn_of_arm(left_a, core_a)))
+    before = add(add(way, sub(begin, start)), sub(turn_of_arm(left_b, core_b), turn_of_arm(left_a, core_a)))
     apart = dot(add(start, sub(arm_b, arm_a)), normal) if led else gap - dot(before, normal)
     for e in range(points_of(state, c)):
         one = solver.slot[r + e]

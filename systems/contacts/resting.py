@@ -70,7 +70,7 @@ def deepest(state, dt, c, d):
     pairs, bodies = state.pairs, state.bodies
     a, b = pairs.a[c], pairs.b[c]
     if state.spinning and turns_far(state, a, b):
-        touches, _, _, normal, _ = first_touch_of_turn(state, a, b)
+        touches, _, _, normal, _, _, _ = first_touch_of_turn(state, dt, a, b)
         return 2.0 * slop_of(state, a, b) if touches else -math.inf, normal, touches
     far, gap, normal = touch_of_long_way(state, dt, a, b, d)
     if far:
@@ -127,12 +127,15 @@ def is_resting(state, dt, c):
         return False
     margin, d = turning_margin(state, dt, a, b), centre_offset(bodies, a, b)
     turns = state.spinning and turns_far(state, a, b)
-    if turns and state.impacts.sweeps and pairs.impulse[c] > 0.0:  # that was its touch
+    if turns and state.impacts.sweeps and pairs.impulse[c] > 0.0 and restitution_of(state, a, b) > 0.0:  # it has left
         return False
     if pairs.early[c] and not hit and not turns and is_at_manifold(pairs, c, d, smaller_extent(bodies, a, b)):  # usual
         depth, normal, far = depth_by_plane(pairs, c, d), pairs.normal[c], False
     else:
         depth, normal, far = deepest(state, dt, c, d)
+        if state.spinning and depth == -math.inf and not turns:  # a thin bar that lies on terrain is soon behind it
+            _, depth, normal, _ = evaluate_pair(state, a, b, centre_offset_at_start(bodies, a, b))
+            far = depth > -math.inf
     was_near = pairs.near_contact[c] and has_manifold(pairs, c)  # not so pairs that were found within the step
     if depth < -margin and (hit or turns or not was_near):  # the prediction may push too much
         return False
@@ -172,7 +175,10 @@ def entry(state, a, b, d, travel, at_end, slop):
     for look in range(ENTRY_ITERATIONS):
         at = add_scaled(d, travel, t)
         _, depth_now, n, _ = evaluate_pair(state, a, b, at)
-        if meets_at_corner(state, a, b, at, slop):
+        if look == 0 and depth_now == -math.inf:  # behind it there, and not where the step starts
+            t = 0.0
+            _, depth_now, n, _ = evaluate_pair(state, a, b, d)
+        elif meets_at_corner(state, a, b, at, slop):
             depth_now = min(depth_now, -slop)  # so that the search goes on
         if look == 0 or depth_now >= 0.0:  # the end, or a time in touch
             normal, depth, chosen = n, depth_now, t
@@ -246,7 +252,7 @@ def linearise(state, dt):
         if solver.point[r] == 0:
             lay_arms(state, dt, r, solver.gap[solver.slot[r]])
             if turns_far(state, pairs.a[solver.pair[r]], pairs.b[solver.pair[r]]):
-                lay_first_touch(state, r)
+                lay_first_touch(state, dt, r)
     return OK
 
 

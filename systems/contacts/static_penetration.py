@@ -15,7 +15,7 @@ import math
 from ...framework.compilation import part
 from ...framework.vectors import add, add_scaled, dot, item, length, scale, sub
 from ..ccd.search_bounds import FAST, turns_far
-from ..ccd.turning_touch import first_touch_of_turn
+from ..ccd.turning_touch import first_touch_of_turn, turn_of_path
 from ..codes import OK
 from ..compounds.rows import next_row, owner_of
 from ..impacts.impulses import STOPPED
@@ -36,7 +36,7 @@ KNOWN = 0.05  # of the extent: so far around its foreseen motion the neighbours 
 
 
 @part
-def depth_on_side_of_touch(state, a, b, d):
+def depth_on_side_of_touch(state, dt, a, b, d):
     """(depth, normal) of a pair of which one body turns far, on the side on which they have first touched: something
     thin may have turned past the middle of what it pushes."""
     bodies, travel = state.bodies, length(sub(d, centre_offset_at_start(state.bodies, a, b)))
@@ -45,8 +45,8 @@ def depth_on_side_of_touch(state, a, b, d):
     if ways <= 0.5 * smaller_extent(bodies, a, b):
         return depth, normal  # no middle has passed another one
     turner, out = a if bodies.inverse_mass[b] > 0.0 else b, bodies.min_extent[a] + bodies.min_extent[b] + travel
-    touches, share, _, way, _ = first_touch_of_turn(state, a, b)
-    left = scale(bodies.turn[turner], 1.0 - share)
+    touches, share, _, way, _, _, _ = first_touch_of_turn(state, dt, a, b)
+    left = scale(turn_of_path(state, turner, dt), 1.0 - share)
     way = add(way, turn_of_arm(left, way))
     if not touches or length(left) > QUARTER or dot(way, normal) >= 0.0:
         return depth, normal
@@ -55,7 +55,7 @@ def depth_on_side_of_touch(state, a, b, d):
 
 
 @part
-def how_deep(state, c, a, b):
+def how_deep(state, dt, c, a, b):
     """(by how much they overlap more than they may, normal) at the end of the step; c: the pair, or NO_PAIR."""
     bodies, extent = state.bodies, smaller_extent(state.bodies, a, b)
     d, start = centre_offset(bodies, a, b), segment_start(state, a, b)
@@ -65,7 +65,7 @@ def how_deep(state, c, a, b):
     allowed = (JOINED if joined else ALLOWED) * extent
     found, depth, normal = False, 0.0, travel
     if state.spinning and turns_far(state, a, b):  # where it started says nothing of the shapes at the end
-        depth, normal = depth_on_side_of_touch(state, a, b, d)
+        depth, normal = depth_on_side_of_touch(state, dt, a, b, d)
         return depth - allowed, normal
     if way > FAST * extent:
         found, gap, normal = first_touch_on_segment(state, a, b, start, travel, FAST * extent)
@@ -79,11 +79,11 @@ def how_deep(state, c, a, b):
 
 
 @part
-def keep_out(state, c, a, b):
+def keep_out(state, dt, c, a, b):
     """Move the one of a and b that can be moved out of the other, where it is deeper than it may, and take the speed
     that leads there; returns how far it was moved."""
     bodies = state.bodies
-    far, normal = how_deep(state, c, a, b)
+    far, normal = how_deep(state, dt, c, a, b)
     if not far > 0.0:
         return 0.0
     i, fixed, sign = (b, a, 1.0) if bodies.inverse_mass[b] > 0.0 else (a, b, -1.0)
@@ -133,12 +133,12 @@ def is_astray(state, i, dt):
 
 
 @part
-def keep_out_of_all(state, i):
+def keep_out_of_all(state, dt, i):
     """Body i against everything that cannot be moved."""
     bodies, moved = state.bodies, False
     for k in range(state.dynamic, state.count):
         if bodies.shape[k] >= 0 and layers_meet(state, i, k) and is_solid_pair(state, i, k):
-            moved |= keep_out(state, NO_PAIR, i, k) > 0.0
+            moved |= keep_out(state, dt, NO_PAIR, i, k) > 0.0
     return moved
 
 
@@ -155,7 +155,7 @@ def resolve_static_penetration(state, dt):
             fixed, i = max(a, b), min(a, b)  # dynamic rows come first
             if not (fixed >= first and i < state.dynamic and pairs.is_solid[c] and may_have_sunk(state, c, i)):
                 continue
-            far = keep_out(state, c, a, b)
+            far = keep_out(state, dt, c, a, b)
             moved |= far > 0.0
             if turn == ROUNDS - 1 and far > SAME_PLACE * smaller_extent(bodies, a, b):  # more than rounding
                 note_squeezed(state.solver, i)
@@ -164,6 +164,6 @@ def resolve_static_penetration(state, dt):
     for i in range(state.first, state.dynamic if not state.pairs_filtered else 0):
         if bodies.shape[i] >= 0 and is_moved_by_solver(state, i) and is_astray(state, i, dt):
             for _ in range(ROUNDS):
-                if not keep_out_of_all(state, i):
+                if not keep_out_of_all(state, dt, i):
                     break
     return OK

@@ -43,7 +43,8 @@ from .impulses import (
 from .turning import respond
 
 QUICK = 1e-3  # of the step: inelastic impacts closer than this in time are treated as inelastic collapse
-GRAZES, SINKS = 4, 4.0  # impacts of two bodies in a step after which they sink in by so many grazes, and at 8, 16 ...
+GRAZES = 4  # impacts of two bodies in a step after which they sink in before the next one,
+SINKS, PLASTIC_SINKS = 4.0, 1.0  # by so many grazes: elastic ones at 8, 16, ... impacts, others at each
 MOST_PLASTIC = 1000  # impacts of a body in a step after which those beyond the cap are none any more
 
 NO_TOUCH, OVERLAPS_AT_END, SWEPT = range(3)
@@ -71,15 +72,18 @@ def leaves_touch_at(state, c, path, since, t):
 
 
 @part
-def sinks_before_touch(state, a, b):
-    """By how many grazes two elastic bodies that turn are deeper at their next touch; -inf: at any depth. After GRAZES
+def sinks_before_touch(state, a, b, restitution):
+    """By how many grazes two bodies that turn are deeper at their next touch; -inf: at any depth. After GRAZES
     impacts of both in a step it is one of those that follow each other at once: a corner that slides along a face parts
-    slowly, and is turned back into it. Where they may sink in first they part faster, fly for longer, and lose nothing.
+    slowly, and is turned back into it. Where they may sink in first elastic ones part faster, fly for
+    longer, and lose nothing; others come to the end of the step before the cap.
     """
     count, inverse_mass = state.bodies.impact_count, state.bodies.inverse_mass
     fewest = min(count[a] if inverse_mass[a] > 0.0 else STOPPED, count[b] if inverse_mass[b] > 0.0 else STOPPED)
     if fewest < GRAZES:
         return -math.inf
+    if restitution < 1.0:
+        return PLASTIC_SINKS
     return SINKS if fewest & (fewest - 1) == 0 else 0.0
 
 
@@ -99,8 +103,8 @@ def find_touch(state, c, a, b, path, since, restitution, dt):
             return NO_TOUCH, nothing
         if swept:
             limits = limits_of_sweep(state, a, b, travel, bounce_threshold(state, a, b), dt)
-    if turning and restitution == 1.0:
-        limits = limits[0], limits[1], limits[2], sinks_before_touch(state, a, b)
+    if turning:
+        limits = limits[0], limits[1], limits[2], sinks_before_touch(state, a, b, restitution)
     if not swept:
         if state.spinning and turns_far(state, a, b):  # contacts at rest know what a mill meets on its way
             return NO_TOUCH, nothing

@@ -1,0 +1,77 @@
+"""Bars that are thin and spin fast pass through no ground in swept modes, however they meet it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from carom.components import AABBCollider, RigidBody, Transform
+from carom.framework import Settings, World
+from carom.plugins import Physics, half_space, terrain
+from carom.plugins.half_space import HalfSpaceCollider
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
+from carom.plugins.terrain import create_chain
+
+pytestmark = [pytest.mark.slow, pytest.mark.compiled]
+
+HALF, FASTEST, APART, STEPS = (1.0, 0.01), 500.0, 60.0, 15
+NODES = np.arange(-12.0, 12.1, 1.5)
+
+
+def lay_ground(world, ground, places, heights, **material):
+    if ground == "half-space":
+        world.create_entity(Transform((0, 0)), RigidBody(kind="static"), HalfSpaceCollider((0, 1), **material))
+    for x, levels in zip(places, heights, strict=True):
+        if ground == "chain":
+            create_chain(world, np.stack((x + NODES, levels), 1), **material)
+        elif ground != "half-space":
+            shape = {"wall": AABBCollider, "box": BoxCollider}[ground]((25.0, 0.02), **material)
+            world.create_entity(Transform((x, -0.02)), RigidBody(kind="static"), shape)
+
+
+def lowest(bodies, places, heights, ground):
+    """Of each bar: how far its middle, and the lowest point between its ends, are above the ground."""
+    turned = np.stack((np.cos(bodies.rotation), np.sin(bodies.rotation)), 1)
+    gaps = []
+    for share in np.linspace(-1, 1, 41):
+        at = bodies.position + share * turned
+        levels = [np.interp(x, NODES, row) for x, row in zip(at[:, 0] - places, heights, strict=True)]
+        gaps.append(at[:, 1] - (levels if ground == "chain" else 0.0))
+    return gaps[20], np.min(gaps, axis=0)
+
+
+def count_passed(mode, ground, e, friction, seed, count):
+    """How many bars have their middle behind the ground after some step, and how deep the line from end to end ever
+    is in it."""
+    random, passed, deepest = np.random.default_rng(seed), np.zeros(count, bool), 0.0
+    places, angles = np.arange(count) * APART, random.uniform(-3, 3, count)
+    heights = random.uniform(-0.5, 0.5, (count, len(NODES)))
+    high = 0.5 + np.abs(np.sin(angles)) + 0.01 + random.uniform(0.02, 3.0, count)
+    velocities = np.stack((random.uniform(-10, 10, count), random.uniform(-30, 0, count)), 1)
+    plugins, settings = (Rotation(), terrain.plugin, half_space.plugin), Settings(collision=mode, on_fault="ignore")
+    with World(Physics(2, gravity=0), *plugins, settings=settings) as world:
+        lay_ground(world, ground, places, heights, restitution=e, friction=friction)
+        for k in range(count):
+            body, spin = RigidBody(linear_velocity=velocities[k]), Spin(random.uniform(-FASTEST, FASTEST))
+            world.create_entity(
+                Transform((places[k], high[k]), angles[k]),
+                body,
+                spin,
+                BoxCollider(HALF, restitution=e, friction=friction),
+            )
+        for _ in range(STEPS):
+            world.step()
+            middle, least = lowest(world.bodies.dynamic, places, heights, ground)
+            passed |= middle < 0.0
+            deepest = max(deepest, -least.min())
+    return passed.sum(), deepest
+
+
+@pytest.mark.parametrize("mode", ["continuous", "event_driven"])
+@pytest.mark.parametrize("ground", ["wall", "box", "half-space", "chain"])
+@pytest.mark.parametrize("count", [25, pytest.param(500, marks=pytest.mark.long)])
+def test_no_thin_bar_passes_through_ground(count, ground, mode):
+    for e, friction in ((0.0, 0.0), (0.0, 0.5), (0.5, 0.0), (1.0, 0.5)):
+        passed, deepest = count_passed(mode, ground, e, friction, 13, count)
+        assert passed == 0
+        assert deepest < 0.1
