@@ -249,15 +249,15 @@ class Driven(Joint, abstract=True):
         self.in_order("limits", self.lower, self.upper)
 
     def moving(self, row: Row, most: float | None, driven: Row | None = None) -> list[Row]:
-        """The rows that limit the value, which is 0 at ``row.low``, drive it, or that of another row, with that at
-        most, or are its spring."""
+        """The rows that drive the value, which is 0 at ``row.low``, or that of another row, with ``most``, are its
+        spring, or limit it."""
         rows, limits = [], self.in_order("limits", self.lower, self.upper)
-        if limits != FREE:
-            rows.append(row._replace(rule=LIMIT, low=row.low + limits[0], high=row.low + limits[1]))
         if self.motor_speed is not None:
             limit = math.inf if most is None else most
             rows.append((driven or row)._replace(rule=DRIVE, target=self.motor_speed, most=limit))
         if self.frequency is not None:
             low, ratio = row.low + self.rest, self.damping_ratio
             rows.append(row._replace(rule=SPRING, low=low, frequency=self.frequency, damping_ratio=ratio))
+        if limits != FREE:  # solved last: no motor is stronger
+            rows.append(row._replace(rule=LIMIT, low=row.low + limits[0], high=row.low + limits[1]))
         return rows

@@ -5,8 +5,8 @@ SLIDE how far b's anchor is along an axis of a. Others are angles: TURN about an
 axis of b leads away from one of a in one direction, and CONE, by how much in all. GIVEN is what a plugin says, see
 given. A row HOLDs its value, keeps it within LIMITs, DRIVEs it at a speed, brings it there as a SERVO, or is a SPRING.
 What holds is as soft as a spring of a frequency that follows the rate of the substeps, and is solved without that in
-the passes that do not push; springs are solved in the pass that pushes alone. One that swings faster than substeps can
-follow holds its value.
+the passes that do not push; limits are not soft, so that no motor is stronger. Springs are solved in the pass that
+pushes alone. One that swings faster than substeps can follow holds its value.
 
 Joints come before the contacts of their range, in the pass that pushes and once in those that do not. Their bodies have
 the columns of bodies that spin, as contacts of such bodies have: see rows.JOINTED.
@@ -187,7 +187,6 @@ def ask(joints, j, value):
         lower = below <= above
         room = below if lower else above
         speed = -room / h if room > 0.0 else -joints.push_rate[j] * room
-        joints.soft[j] = room <= 0.0
         joints.pushing[j] = speed if lower else -speed
         if room > 0.0:
             joints.opening[j] = joints.pushing[j]
