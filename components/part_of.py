@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -58,7 +58,7 @@ class PartOf(Component):
     holder: int = special_column(default=0, dtype=int, init=False)
     turn: RotationField = special_column(default=0.0, item="rotation", init=False)
 
-    def check_in(self, contents: Any, entity: int | None) -> None:
+    def check_in(self, contents: Any, entity: int | None, beside: Collection[type[Any]] = ()) -> None:
         """ValueError if its body is none, or is a part of this entity."""
         name, types_of = "PartOf" if entity is None else f"entity {entity}: PartOf", contents.entities.types_of
         if self.body not in contents.entities or self.body in contents.dead:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
 
 import numpy as np
@@ -190,8 +190,8 @@ class Component:
             if not fits:
                 column.check_dimensions(value, dimensions, entity)
 
-    def check_in(self, contents: Any, entity: int | None) -> None:
-        """ValueError if it cannot be in a world with these contents."""
+    def check_in(self, contents: Any, entity: int | None, beside: Collection[type[Any]] = ()) -> None:
+        """ValueError if it cannot be in a world with these contents, given to the entity with others beside it."""
 
     def fit(self, dimensions: int, entity: int | None = None) -> None:
         """Whole vectors, of that many dimensions, from now on; ValueError if one has others."""

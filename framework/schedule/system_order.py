@@ -65,6 +65,9 @@ class SystemOrder:
     def _add_force_system(self, system: ForceSystem) -> None:
         if self.world.physics is None:
             raise NoPhysicsError("no physics in this world: World(Physics(...))")
+        wanted = system.requires
+        if not (isinstance(wanted, (tuple, list)) and all(isinstance(component, type) for component in wanted)):
+            raise TypeError(f"{system.name}.requires must be a tuple of component types, got {wanted!r}")
         self._refuse_twice(system, self._wanted_forces)
         system.world = self.world
         self._wanted_forces.append(system)

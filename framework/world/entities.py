@@ -182,13 +182,14 @@ class EntityVerbs:
             raise KeyError(f"no entity {entity!r} in this world") from None
 
     def _check(self, components: Iterable[Any], entity: int | None) -> None:
-        dimensions = self.dimensions
+        components = tuple(components)
+        dimensions, types = self.dimensions, {type(component) for component in components}
         for component in components:
             if isinstance(component, Component):
                 self.registry.require(type(component), entity)
                 if dimensions is not None:
                     component.fit(dimensions, entity)
-                component.check_in(self._contents(), entity)
+                component.check_in(self._contents(), entity, types)
             elif isinstance(component, type):
                 raise TypeError(f"components are instances: {component.__name__}(...), got the class itself")
             elif isinstance(component, (list, tuple, Many)):

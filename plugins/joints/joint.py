@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -145,9 +146,13 @@ class Joint(Component, abstract=True):
         if dimensions == 3 and "axis" in self.columns and not np.any(np.abs(self.axis) > LEAST):
             raise ValueError(f"{name} needs an axis in a world of 3 dimensions, got {np.asarray(self.axis).tolist()}")
 
-    def check_in(self, contents: Any, entity: int | None) -> None:
-        """ValueError unless it has two bodies, or one and the world, one of which is dynamic."""
+    def check_in(self, contents: Any, entity: int | None, beside: Collection[type[Any]] = ()) -> None:
+        """ValueError unless it has two bodies, or one and the world, one of which is dynamic, and an entity of its own.
+        """
         name, dynamic = f"{'' if entity is None else f'entity {entity}: '}{type(self).__name__}", False
+        for other in sorted({*beside, *contents.entities.types_of(entity)} - {type(self)}, key=lambda o: o.__name__):
+            if issubclass(other, Joint) or getattr(other, "makes_body", False):
+                raise ValueError(f"{name} is an entity of its own, not one that has a {other.__name__} as well")
         for body in (self.a, self.b):
             if body == WORLD:
                 continue

@@ -137,6 +137,20 @@ def test_joints_belong_to_one_world_with_physics():
         bare.create_entity(Hinge(None, 1, anchor=(0, 0)))
 
 
+def test_a_joint_is_an_entity_of_its_own():
+    world, joints = joint_world()
+    leaf, parts = plank(world, (0.5, 0)), (Transform((2, 0)), RigidBody(), SphereCollider(0.5))
+    name = "Hinge is an entity of its own, not one that has a "
+    with pytest.raises(ValueError, match=rf"^entity {leaf}: {name}BoxCollider as well"):
+        world.add_component(leaf, Hinge(None, leaf, anchor=(0, 0)))
+    with pytest.raises(ValueError, match=f"^{name}RigidBody as well"):
+        world.create_entity(*parts, Hinge(None, leaf, anchor=(0, 0)))
+    with pytest.raises(ValueError, match=f"^{name}Motor as well"):
+        world.create_entity(Hinge(None, leaf, anchor=(0, 0)), Motor(None, leaf, speed=1.0))
+    world.step()
+    assert len(joints) == 0
+
+
 def test_fields_that_do_not_fit_leave_the_joint_as_it_is():
     world, _ = joint_world()
     leaf = plank(world, (0.5, 0))

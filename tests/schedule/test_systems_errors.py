@@ -221,3 +221,11 @@ def test_a_processor_added_within_a_plain_step_joins_at_its_end_and_its_failure_
         esper.process(world.settings.dt)
     assert world.component_for_entity(e, Transform).x == 2.0
     assert world.step_count == 2
+
+
+def test_what_a_force_system_requires_is_looked_at_where_it_is_added():
+    class Wind(ForceSystem):
+        requires = Fuel  # type: ignore[assignment]
+
+    with make_world() as world, pytest.raises(TypeError, match=r"Wind\.requires must be a tuple of component types"):
+        world.add_system(Wind())
