@@ -97,3 +97,24 @@ def test_sliders_of_a_light_body_between_heavy_ones_give_no_energy(substeps):
     for _ in range(600):
         world.step()
         assert world.kinetic_energy() <= start
+
+
+@pytest.mark.parametrize("seed", [0, 7])
+def test_bodies_of_three_moments_that_tumble_about_a_joint_gain_little(seed):
+    """In 20 s; they turn on after the joints are solved. The first two steps make their velocities fit together."""
+    random = np.random.default_rng(seed)
+    with World(Physics(3, gravity=0), Rotation(), Joints()) as world:
+        ends = [
+            world.create_entity(
+                Transform((x, 0, 0)), RigidBody(linear_velocity=random.uniform(-1, 1, 3)),
+                Spin(random.uniform(-4, 4, 3), random.uniform(0.1, 0.18, 3)),
+            )
+            for x in (0.0, 1.0)
+        ]  # fmt: skip
+        world.create_entity(Ball(*ends, anchor=(0.5, 0, 0)))
+        for _ in range(2):
+            world.step()
+        start = world.kinetic_energy()
+        for _ in range(1200):
+            world.step()
+            assert 0.9 * start < world.kinetic_energy() < 1.04 * start
