@@ -243,8 +243,8 @@ class Pipeline(esper.Processor):
         try:
             self.physics.begin_step(others_write)
         except BaseException as error:
-            if hasattr(error, "__notes__"):  # it comes from a plugin's function
-                self.fail("compiling what the step needs", error)
+            if hasattr(error, "__notes__"):  # they say where: in a function of a plugin, in a handler
+                self.fail("opening the step", error)
             self.roll_back()
             raise
 

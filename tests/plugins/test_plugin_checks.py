@@ -232,7 +232,7 @@ def test_what_cannot_be_compiled_is_named():
     plugin.pair(disc, disc)(disc_disc)
     world = World(Physics(), plugin)
     world.create_entity(Transform((0, 0)), RigidBody(), disc(1.0))
-    failed = "compiling what the step needs failed in step 0"
+    failed = "opening the step failed in step 0"
     message = f"^{failed} .*plugin discs: shape DiscCollider: bounds cannot be compiled; use"
     with pytest.raises(StepError, match=message):
         world.step()
