@@ -214,7 +214,8 @@ class Parts(Plugin):
             if collider in own and Spin in body:
                 raise ValueError(f"entity {entity}: {collider.__name__} is no part of a body that turns: {cure}")
         components = self._contents.entities[entity]
-        for component in own if not components[PartOf].holder else ():
+        new = not components[PartOf].holder and entity not in self._added  # the plugin has set that of others
+        for component in own if new else ():
             if issubclass(component, Collider) and np.any(components[component].offset):
                 raise ValueError(f"entity {entity}: {component.__name__}.offset: give PartOf.position instead")
 

@@ -183,6 +183,19 @@ def test_what_a_part_has_from_its_partof_is_taken_back():
     assert world.query_sphere((5, 5), 1.0) == []
 
 
+def test_another_partof_takes_the_place_of_the_first():
+    world, parts = parts_world()
+    bodies = [world.create_entity(Transform((x, 0)), RigidBody(), SphereCollider(0.5)) for x in (0, 9)]
+    part = world.create_entity(PartOf(bodies[0], (1, 0), mass=2.0), SphereCollider(0.5))
+    world.step()
+    for body, other in (bodies, bodies[::-1]):
+        world.add_component(part, PartOf(body, (0, 2), mass=4.0))
+        world.step()
+        assert [world.component_for_entity(each, RigidBody).mass for each in (body, other)] == [5.0, 1.0]
+        assert (parts.of(body), parts.of(other)) == ([part], [])
+        assert world.query_point((9 * bodies.index(body), 2)) == [part]
+
+
 def test_parts_in_space_keep_their_turns_when_another_is_deleted():
     world, _ = parts_world(dimensions=3)
     body = world.create_entity(Transform((0, 0, 0)), RigidBody(), BoxCollider((0.2, 0.2, 0.2)))
