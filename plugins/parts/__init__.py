@@ -54,7 +54,7 @@ class Parts(Plugin):
         self._generation, self._any_static = self._table.generation, False
         self._rows: Any = ()  # of the parts and of their bodies
         self._rows_version = -1
-        self._offsets: list[str] = []  # columns of their colliders
+        self._looked_at: list[str] = []  # columns of their colliders
         world.events.define("part_lost")
         self._physics.extensions.adopters.append(self._follow)
         self._physics.extensions.waiting.append(lambda: self._now() != self._seen)
@@ -129,9 +129,10 @@ class Parts(Plugin):
         return self._contents.log.rounds, table.version, table.members_version, statics, Changes.count, inside, derived
 
     def _derived(self, rows: np.ndarray) -> list[np.ndarray]:
-        """What parts have from their PartOf in the columns of other components, but for where they move."""
+        """What parts have from their PartOf in the columns of other components, but for where they move; and which are
+        sensors, as these add no mass."""
         arrays = self._table.arrays
-        return [arrays[key].take(rows, axis=0) for key in ("mass", *self._offsets) if key in arrays]
+        return [arrays[key].take(rows, axis=0) for key in ("mass", *self._looked_at) if key in arrays]
 
     def _look(self) -> tuple[Any, Any, Any]:
         """(the entities of the parts in order, their fields (n, k) as bits, what all depend on)."""
@@ -337,7 +338,8 @@ class Parts(Plugin):
         self._rows = table.rows_of(record.entity[:count]), table.rows_of(record.body[:count])
         self._rows_version = table.version
         colliders = [kind for kind in table.component_types if issubclass(kind, Collider)]
-        self._offsets = [kind.columns["offset"].key for kind in colliders if table.has_mask(kind)[self._rows[0]].any()]
+        own = [kind for kind in colliders if table.has_mask(kind)[self._rows[0]].any()]
+        self._looked_at = [kind.columns[name].key for kind in own for name in ("offset", "sensor")]
         self._any_static = bool((self._rows[1] >= table.stops[1]).any())
 
 

@@ -196,6 +196,17 @@ def test_another_partof_takes_the_place_of_the_first():
         assert world.query_point((9 * bodies.index(body), 2)) == [part]
 
 
+def test_a_part_without_a_mass_of_its_own_weighs_nothing_while_it_is_a_sensor():
+    world, _ = parts_world()
+    body = world.create_entity(Transform((0, 0)), RigidBody(), SphereCollider(0.5))
+    parts = [world.create_entity(PartOf(body, (x, 0)), SphereCollider(0.5, sensor=x > 0)) for x in (-1, 1)]
+    for sensors, mass in (((False, True), 2.0), ((True, True), 1.0), ((True, False), 2.0), ((False, False), 3.0)):
+        for part, sensor in zip(parts, sensors, strict=True):
+            world.component_for_entity(part, SphereCollider).sensor = sensor
+        world.step()
+        assert world.component_for_entity(body, RigidBody).mass == mass
+
+
 def test_parts_in_space_keep_their_turns_when_another_is_deleted():
     world, _ = parts_world(dimensions=3)
     body = world.create_entity(Transform((0, 0, 0)), RigidBody(), BoxCollider((0.2, 0.2, 0.2)))
