@@ -73,6 +73,7 @@ def test_pulley_on_bodies_that_swing_and_turn_keeps_its_length_and_gains_no_ener
     assert now > before - 0.05 * G
 
 
+@pytest.mark.compiled
 @pytest.mark.plain
 @pytest.mark.parametrize("dimensions", [2, 3])
 def test_turns_are_counted_beyond_the_first(dimensions):

@@ -77,6 +77,7 @@ def test_a_torsion_spring_in_a_plane(method, damping):
     check_order(method, end, exact, 20)
 
 
+@pytest.mark.compiled
 @methods
 def test_a_pendulum_that_goes_over_the_top(method):
     """angle'' = -k sin(angle), from 0: twice Jacobi's amplitude."""
@@ -145,6 +146,7 @@ def heavy_top(w0, seconds):
     return np.concatenate((q, turned(q, end[4:])))
 
 
+@pytest.mark.compiled
 @methods
 def test_a_needle_in_a_field(method):
     """A heavy top of three moments, under a torque that turns with it."""
@@ -169,6 +171,7 @@ def test_the_energy_of_a_heavy_top_stays(method, bound):
     assert abs(along - before) < bound * abs(before)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("method", ["velocity_verlet", "yoshida4", "rk4", "flight"])
 def test_a_free_top_beside_a_needle_keeps_its_energy(method):
     """To rounding, as where no force system gives torques."""
@@ -307,6 +310,7 @@ def test_limits_of_speed_and_damping_that_no_step_resolves(d, method):
                     assert abs(world.component_for_entity(entity, Transform).rotation) <= 2 * (step + 1) / 60 + 1e-12
 
 
+@pytest.mark.compiled
 @methods
 @pytest.mark.parametrize("d", [2, 3])
 def test_a_wheel_on_the_ground_goes_as_under_a_constant_torque(d, method):
