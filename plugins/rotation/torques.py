@@ -59,14 +59,19 @@ def put_spin(state, spin, i, w):
 
 
 @part
+def scaled_along(q, v, by):
+    """A vector whose components along the axes that q turns to are so many times as large."""
+    along = rotate(q, v, True)
+    return rotate(q, (along[0] * by[0], along[1] * by[1], along[2] * by[2]), False)
+
+
+@part
 def momentum_of(state, spin, i, w):
     """Of a body that turns so fast, along the axes of the world."""
     if is_plane(state):
         return inertia_of(state, spin, i)[2] * w[0], 0.0, 0.0
     principal, _, own = principal_moments(state, spin, i)
-    q = product(rotation_in_space(state, i), own)
-    m = rotate(q, w, True)
-    return rotate(q, (m[0] * principal[0], m[1] * principal[1], m[2] * principal[2]), False)
+    return scaled_along(product(rotation_in_space(state, i), own), w, principal)
 
 
 @part
@@ -76,9 +81,7 @@ def spin_by(state, spin, i, momentum):
         moment = inertia_of(state, spin, i)[2]
         return momentum[0] / moment if moment > 0.0 else 0.0, 0.0, 0.0
     _, inverse, own = principal_moments(state, spin, i)
-    q = product(rotation_in_space(state, i), own)
-    m = rotate(q, momentum, True)
-    return rotate(q, (m[0] * inverse[0], m[1] * inverse[1], m[2] * inverse[2]), False)
+    return scaled_along(product(rotation_in_space(state, i), own), momentum, inverse)
 
 
 @part

@@ -50,24 +50,23 @@ def test_a_new_joint_wakes_its_bodies():
     assert at(world, body).y == pytest.approx(1.0, abs=0.05)
 
 
+def asleep_after_going_back(world, body):
+    """Whether it sleeps after three steps, which are the same to the bit from a snapshot."""
+    snapshot = world.snapshot()
+    run(world, 3)
+    later = world.state_hash()
+    world.restore(snapshot)
+    run(world, 3)
+    assert world.state_hash() == later
+    return world.component_for_entity(body, RigidBody).asleep
+
+
 def test_going_back_wakes_only_what_was_to_wake():
     world, _ = joint_world(sleeping=True)
     body, rope = hanging(world)
-    snapshot = world.snapshot()
-    run(world, 3)
-    later = world.state_hash()
-    world.restore(snapshot)
-    run(world, 3)
-    assert world.state_hash() == later
-    assert world.component_for_entity(body, RigidBody).asleep
+    assert asleep_after_going_back(world, body)
     world.component_for_entity(rope, Distance).most = 1.5
-    snapshot = world.snapshot()
-    run(world, 3)
-    later = world.state_hash()
-    world.restore(snapshot)
-    run(world, 3)
-    assert world.state_hash() == later
-    assert not world.component_for_entity(body, RigidBody).asleep
+    assert not asleep_after_going_back(world, body)
 
 
 CHANGES = {
