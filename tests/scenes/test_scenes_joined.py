@@ -85,9 +85,10 @@ def ends_apart(world, joints):
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize(
-    "seeds", [pytest.param(range(1), marks=pytest.mark.slow), pytest.param(range(1, 40), marks=pytest.mark.long)]
+    ("seeds", "share"),
+    [pytest.param(range(1), 0.08, marks=pytest.mark.slow), pytest.param(range(1, 40), 0.02, marks=pytest.mark.long)],
 )
-def test_thrown_ragdolls_are_not_torn_nor_go_through_stairs(seeds, mode):
+def test_thrown_ragdolls_are_not_torn_nor_go_through_stairs(seeds, share, mode):
     """25 at once, which do not meet each other, from anywhere above the stairs. Few limbs whirl so fast that
     they are a little apart for a step."""
     gaps_of_all = []
@@ -113,7 +114,7 @@ def test_thrown_ragdolls_are_not_torn_nor_go_through_stairs(seeds, mode):
             gaps_of_all += worst.tolist()
     assert max(gaps_of_all) < 0.15
     assert np.quantile(gaps_of_all, 0.98) < 0.1
-    assert np.mean(np.array(gaps_of_all) > 0.05) < 0.08  # as what strikes them fast is solved in short substeps
+    assert np.mean(np.array(gaps_of_all) > 0.05) < share  # as what strikes them fast is solved in short substeps
 
 
 def test_the_car_drives_over_the_hills():
