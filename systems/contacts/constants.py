@@ -27,6 +27,7 @@ DEEPEST = 0.17  # extents at most
 # Passes over the rows in a substep.
 RELAX_PASSES = 2  # after the pass that pushes: they take back the speed that pushing has given
 LAST_RELAX_PASSES = 4  # of the last substep, whose velocities stay
+TURNING_RELAX_PASSES = 1  # of each where bodies spin: the friction of a row follows its normal, not all normals
 REFINED_PASSES = 8  # of each substep of an island with more: columns under heavy bodies sway with 2, pyramids with 12
 FURTHER_PASSES = 1000  # at most, over rows that are not solved and islands that have gained energy,
 FURTHER_WORK = 20_000  # rows of the island in all of these,

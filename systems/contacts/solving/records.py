@@ -91,6 +91,7 @@ JOINTS = Schema(
 
 SOLVER = Schema(
     "Solver",
+    unshared=True,
     # rows: contacts at rest, in the order of their ranges and colours
     contacts=integer(),
     slot=ints("int32"),  # the row of contact r,
@@ -132,6 +133,19 @@ SOLVER = Schema(
     tangent_mass=floats(),  # kg, that an impulse along the surface moves
     rolling=floats(),  # m, of rolling friction
     rolled=vectors(),  # N m s in a substep, by that
+    # of the bodies of each row while its chunk is solved:
+    mass_a=floats(),  # inverse masses,
+    mass_b=floats(),
+    inertia_a=vectors(),  # inverse moments,
+    inertia_b=vectors(),
+    products_a=vectors(),
+    products_b=vectors(),
+    velocity_a=vectors(),  # and motions
+    velocity_b=vectors(),
+    spin_a=vectors(),
+    spin_b=vectors(),
+    ends=ints("int32"),  # where each chunk ends
+    chunks=integer(),
     visits=integer(),  # rows solved in this step
     starts=ints(),  # where each colour begins
     # bodies, in the order of their ranges
@@ -217,7 +231,10 @@ SOLVER = Schema(
     joints=JOINTS,
 )
 
-ARMS = ("place", "arm_a", "arm_b", "core_a", "core_b", "tangent_mass", "rolling", "rolled")
+ARMS = (
+    "place", "arm_a", "arm_b", "core_a", "core_b", "tangent_mass", "rolling", "rolled", "mass_a", "mass_b", "inertia_a",
+    "inertia_b", "products_a", "products_b", "velocity_a", "velocity_b", "spin_a", "spin_b", "ends",
+)  # fmt: skip
 TURNS = ("spin", "spin_before", "turn", "sine", "versine", "inverse_inertia", "inverse_products", "reach")
 
 # Impulses of the contacts at rest, for the next step: [now, i] is the memory, [1 - now, i] is written.

@@ -123,7 +123,7 @@ def apply_impulse(solver, k, impulse, arms):
 
 @part
 def solve_normals(solver, bias, pushes, span):
-    """One pass over the rows of a range, along their normals.
+    """One pass over the rows of a range, along their normals, where nothing spins.
 
     bias: speed at which each row may close, below 0 at which it is to open; softly where this pass ``pushes``.
     """

@@ -11,18 +11,15 @@ from __future__ import annotations
 
 import math
 
-from ....framework.compilation import packed, part
+from ....framework.compilation import inlined, packed, part
 from ....framework.jit.records.record_type import zero_of
-from ....framework.vectors import add, add_scaled, dot, length, scale
+from ....framework.vectors import add, add_scaled, dot, scale
 from ...codes import OK
 from ..constants import (
-    AGREED,
-    AGREED_SHARE,
     DAMPING_RATIO,
     DEEP,
     DEEPEST,
     EXCESS,
-    HARD_PASSES,
     LAST_RELAX_PASSES,
     LOADED,
     MOST_LOAD,
@@ -33,27 +30,16 @@ from ..constants import (
     SLOPE,
     STIFFER,
     STILL,
-    SUBSTEP_WORK,
     TOLD_GAIN,
+    TURNING_RELAX_PASSES,
     VERY_DEEP,
 )  # fmt: skip
+from .chunks import find_chunks
 from .guard import excess_speed, finish_substep, island_of, islands_of, open_all
 from .hard import choose_hard, leave_open
 from .joints import add_joints, keep_joints, measure_joints, solve_joints, start_joints, warm_start_joints
-from .rows import (
-    ARMS,
-    JOINTED,
-    NO_ARMS,
-    apply_impulse,
-    closing_speed,
-    relax_listed,
-    room_of,
-    solve_friction,
-    solve_normals,
-    solve_rolling,
-    turn_body,
-    weigh_row,
-)  # fmt: skip
+from .passes import close_in_order, converge, note_impulses, solve_pass
+from .rows import ARMS, JOINTED, NO_ARMS, apply_impulse, room_of, turn_body, weigh_row
 
 ORDINARY, REFINED, HARD = range(3)  # ranges: with the usual substeps, with more, with contacts that do not sag
 
@@ -134,92 +120,14 @@ def move(solver, h, span):
         turn_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], h))
 
 
-@part
-def note_impulses(solver, span):
-    """What the impulses are before a pass or a substep."""
-    for k in range(span[0], span[1]):
-        solver.previous[k] = solver.impulse[k]
-
-
-@part
-def least_change(solver, h, span):
-    """The change of a speed that matters in a hard island, m/s for each m of extent; see AGREED_SHARE."""
-    fastest = 0.0
-    for q in range(span[2], span[3]):
-        fastest = max(fastest, length(solver.acceleration[q]) * h)
-    return AGREED_SHARE * fastest if fastest > 0.0 else math.inf
-
-
-@part
-def agrees(solver, h, least, span):
-    """Whether the last pass has changed nothing that matters."""
-    any_wrong = False
-    for k in range(span[0], span[1]):
-        wrong = min(AGREED * solver.extent[k] / h, least) * solver.mass[k]
-        any_wrong |= not abs(solver.impulse[k] - solver.previous[k]) <= wrong
-    return not any_wrong
-
-
-@part
-def converge(solver, pushes, h, span):
-    """Passes over a hard island until they agree."""
-    start, stop, least = span[0], span[1], least_change(solver, h, span)
-    for _ in range(min(HARD_PASSES, SUBSTEP_WORK // (stop - start))):
-        note_impulses(solver, span)
-        solve_pass(solver, solver.pushing if pushes else solver.opening, pushes, span)
-        if agrees(solver, h, least, span):
-            break
-
-
-@part
-def list_by_gap(solver, span):
-    """The rows of a range into ``listed``, what is nearest first; Shell's sort."""
-    start, count, listed, opening = span[0], span[1] - span[0], solver.listed, solver.opening
-    for e in range(count):
-        listed[e] = start + e
-    stride = count // 2
-    while stride > 0:
-        for e in range(stride, count):
-            k, place = listed[e], e
-            while place >= stride and (
-                opening[listed[place - stride]] > opening[k]
-                or (opening[listed[place - stride]] == opening[k] and listed[place - stride] > k)
-            ):
-                listed[place] = listed[place - stride]
-                place -= stride
-            listed[place] = k
-        stride //= 2
-
-
-@part
-def close_in_order(solver, h, span):
-    """What falls far in a substep: rows come in as they close, the nearest first, each once those before it agree.
-
-    All at once would not end: a pass takes back of an impulse no more than what is open, and one of a row that another
-    one should have held before is as high as a whole fall.
-    """
-    list_by_gap(solver, span)
-    count, least = span[1] - span[0], least_change(solver, h, span)
-    work = SUBSTEP_WORK
-    for e in range(count):
-        k = solver.listed[e]
-        new = closing_speed(solver, k, span[4]) > solver.opening[k]
-        while new and work > 0:
-            note_impulses(solver, span)
-            relax_listed(solver, e + 1, span[4])
-            work -= e + 1
-            new = not agrees(solver, h, least, span)
-
-
-@part
-def solve_pass(solver, bias, pushes, span):
-    """One pass over the rows of a range: along their normals, then along their surfaces."""
-    solve_normals(solver, bias, pushes, span)
-    if solver.has_friction:
-        solve_friction(solver, span)
-    if len(span[4]) > 0 and solver.has_rolling:
-        solve_rolling(solver, span)
-    solver.visits += span[1] - span[0]
+@inlined
+def relax_passes(kind, ends, arms):
+    """How many passes take back the speed that pushing has given."""
+    if kind != ORDINARY:
+        return REFINED_PASSES
+    if len(arms) > 0:
+        return TURNING_RELAX_PASSES
+    return LAST_RELAX_PASSES if ends else RELAX_PASSES
 
 
 @part
@@ -242,7 +150,7 @@ def solve_substep(solver, springs, most, dt, h, kind, ends, span):
         leave_open(solver, h, span)
     if len(span[4]) > 1:  # once: more often, chains give way more
         solve_joints(solver, False)
-    for _ in range(REFINED_PASSES if kind != ORDINARY else (LAST_RELAX_PASSES if ends else RELAX_PASSES)):
+    for _ in range(relax_passes(kind, ends, span[4])):
         solve_pass(solver, opening, False, span)
     if stiff:
         converge(solver, False, h, span)
@@ -322,6 +230,8 @@ def solve_range(solver, substeps, kind, dt, span):
     h, stiff, special = dt / substeps, kind == HARD, kind != ORDINARY
     springs = spring_of(solver, 1.0, substeps, h), spring_of(solver, STIFFER, substeps, h)
     open_all(solver, span)
+    if len(span[4]) > 0:
+        find_chunks(solver, span)
     scale_impulses(solver, 1.0 / substeps, span)
     for k in range(span[0], span[1]):
         sag = LOADED * solver.sag * solver.impulse[k] * h / solver.mass[k]

@@ -1,0 +1,102 @@
+"""Passes over the rows of a range; in hard islands until they agree."""
+
+from __future__ import annotations
+
+import math
+
+from ....framework.compilation import part
+from ....framework.vectors import length
+from ..constants import AGREED, AGREED_SHARE, HARD_PASSES, SUBSTEP_WORK
+from .chunks import solve_chunks
+from .rows import closing_speed, relax_listed, solve_friction, solve_normals, solve_rolling
+
+
+@part
+def solve_pass(solver, bias, pushes, span):
+    """One pass over the rows of a range: along their normals and along their surfaces."""
+    if len(span[4]) > 0:
+        if solver.has_rolling:
+            solve_rolling(solver, span)
+        solve_chunks(solver, bias, pushes, span)
+    else:
+        solve_normals(solver, bias, pushes, span)
+        if solver.has_friction:
+            solve_friction(solver, span)
+    solver.visits += span[1] - span[0]
+
+
+@part
+def note_impulses(solver, span):
+    """What the impulses are before a pass or a substep."""
+    for k in range(span[0], span[1]):
+        solver.previous[k] = solver.impulse[k]
+
+
+@part
+def least_change(solver, h, span):
+    """The change of a speed that matters in a hard island, m/s for each m of extent; see AGREED_SHARE."""
+    fastest = 0.0
+    for q in range(span[2], span[3]):
+        fastest = max(fastest, length(solver.acceleration[q]) * h)
+    return AGREED_SHARE * fastest if fastest > 0.0 else math.inf
+
+
+@part
+def agrees(solver, h, least, span):
+    """Whether the last pass has changed nothing that matters."""
+    any_wrong = False
+    for k in range(span[0], span[1]):
+        wrong = min(AGREED * solver.extent[k] / h, least) * solver.mass[k]
+        any_wrong |= not abs(solver.impulse[k] - solver.previous[k]) <= wrong
+    return not any_wrong
+
+
+@part
+def converge(solver, pushes, h, span):
+    """Passes over a hard island until they agree."""
+    start, stop, least = span[0], span[1], least_change(solver, h, span)
+    for _ in range(min(HARD_PASSES, SUBSTEP_WORK // (stop - start))):
+        note_impulses(solver, span)
+        solve_pass(solver, solver.pushing if pushes else solver.opening, pushes, span)
+        if agrees(solver, h, least, span):
+            break
+
+
+@part
+def list_by_gap(solver, span):
+    """The rows of a range into ``listed``, what is nearest first; Shell's sort."""
+    start, count, listed, opening = span[0], span[1] - span[0], solver.listed, solver.opening
+    for e in range(count):
+        listed[e] = start + e
+    stride = count // 2
+    while stride > 0:
+        for e in range(stride, count):
+            k, place = listed[e], e
+            while place >= stride and (
+                opening[listed[place - stride]] > opening[k]
+                or (opening[listed[place - stride]] == opening[k] and listed[place - stride] > k)
+            ):
+                listed[place] = listed[place - stride]
+                place -= stride
+            listed[place] = k
+        stride //= 2
+
+
+@part
+def close_in_order(solver, h, span):
+    """What falls far in a substep: rows come in as they close, the nearest first, each once those before it agree.
+
+    All at once would not end: a pass takes back of an impulse no more than what is open, and one of a row that another
+    one should have held before is as high as a whole fall.
+    """
+    list_by_gap(solver, span)
+    count, least = span[1] - span[0], least_change(solver, h, span)
+    work = SUBSTEP_WORK
+    for e in range(count):
+        k = solver.listed[e]
+        new = closing_speed(solver, k, span[4]) > solver.opening[k]
+        while new and work > 0:
+            note_impulses(solver, span)
+            relax_listed(solver, e + 1, span[4])
+            work -= e + 1
+            new = not agrees(solver, h, least, span)
