@@ -82,7 +82,7 @@ def _record_class(schema: Schema, dimensions: int) -> type[Record]:
         if isinstance(field, Schema):
             body[name] = _inner(name, at)
         elif isinstance(field, Column):
-            body[name] = _column(schema.name, name, field, at, dimensions)
+            body[name] = _column(schema, name, field, at, dimensions)
         else:
             body[name] = _scalar(field.dtype, at)
     return type(schema.name, (Record,), body)
@@ -125,8 +125,8 @@ def _inner(name: str, at: int) -> property:
     return property(attrgetter(slot), put)
 
 
-def _column(record: str, name: str, field: Column, at: int, dimensions: int) -> property:
-    dtype, item = np.dtype(field.dtype), field.item_shape(dimensions)
+def _column(schema: Schema, name: str, field: Column, at: int, dimensions: int) -> property:
+    record, dtype, item = schema.name, np.dtype(field.dtype), field.item_shape(dimensions)
     leading, slot = 2 if field.stacked else 1, _slot(name)
 
     def put(self: Record, array: np.ndarray) -> None:
@@ -134,6 +134,8 @@ def _column(record: str, name: str, field: Column, at: int, dimensions: int) -> 
             raise ValueError(f"{record}.{name} takes arrays of {dtype} (..., {item}), got {array.dtype} {array.shape}")
         if not array.flags.c_contiguous:
             raise ValueError(f"{record}.{name} takes contiguous arrays")
+        if schema.unshared and array.base is not None:
+            raise ValueError(f"{record}.{name} takes arrays that own their memory")
         setattr(self, slot, array)
         self._words[at] = array.ctypes.data
         self._words[at + 1] = array.shape[leading - 1]
