@@ -102,7 +102,11 @@ class Simulation:
         self.queries = Queries(
             self.state, self.table, world.registry, self.scene, self.search, self.refresh_for_queries
         )
-        self.forces = ForceAccumulation(self.program, self.state, self.table, self.bodies)
+        self.forces = ForceAccumulation(self.program, self.state, self.table, self.bodies, self.quarantine.tell)
+        self.table.writable_while = {
+            "force": lambda: self.state.forces_summed or not world.has_system(self.forces),
+            "torque": lambda: self.forces.adding,
+        }
         self.integration = Integration(self.program, self.scene, self.forces, world.registry, lambda: world.settings)
         self.broad_phase = BroadPhase(self.program, self.search)
         self.narrow_phase = NarrowPhase(self.program, self.scene, world.registry, self.bodies)

@@ -17,8 +17,8 @@ class Bodies:
     """Columns as zero-copy views: ``bodies.position``, and ``bodies.charge.value`` of a component of one's own.
 
     ``dynamic``, ``kinematic`` and ``static`` are the same for the bodies of one kind. Views hold until the next
-    structural change. Columns of static bodies are read-only, and so are ``entity``, ``kind`` and numbers of arrays of
-    all. Assigning writes into the column: ``bodies.linear_velocity = 0``.
+    structural change. Columns of static bodies are read-only, and of all ``entity``, ``kind``, numbers of arrays, and
+    ``force`` and ``torque`` where they would be lost. Assigning writes into the column: ``bodies.linear_velocity = 0``.
     """
 
     __slots__ = ("_kind", "_table")
@@ -95,7 +95,7 @@ class Bodies:
     def __getattr__(self, name: str) -> Any:
         if self._table.has_column(name):
             view = self._table.make(name)[self.rows]
-            if self._kind == STATIC or name in self._table.read_only:
+            if self._kind == STATIC or not self._table.is_writable(name):
                 view.flags.writeable = False
             else:
                 self._table.lend(name, self._kind is None)

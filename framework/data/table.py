@@ -61,6 +61,7 @@ class Table:
         self.on_lend: Callable[[str], None] = lambda key: None  # called with one more
         self.on_written: Callable[[str, int], None] | None = None  # called with what code of the game has written
         self.read_only = {"entity", "kind"}  # columns
+        self.writable_while: dict[str, Callable[[], bool]] = {}  # columns in which a value counts only at times
         self.on_rows_moved: Callable[[RowPlan], None] = lambda plan: None
         self.on_arrays_changed: Callable[[], None] = lambda: None  # called when a row has got another array
         self.on_changed_inside: Callable[[Any, int, int, np.ndarray], None] = lambda *_: None  # see changed_inside
@@ -218,6 +219,10 @@ class Table:
             self.columns_version += 1
             self.on_make()
         return array
+
+    def is_writable(self, key: str) -> bool:
+        """Whether code of the game may write into that column at this moment."""
+        return key not in self.read_only and (key not in self.writable_while or self.writable_while[key]())
 
     def lend(self, key: str, statics: bool) -> None:
         """A writable view of that column is given away. Other columns change by writes of handles alone, and so do, but

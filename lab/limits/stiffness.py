@@ -61,7 +61,8 @@ class Forces:
         bodies = world.bodies.dynamic
         self.entity = np.array(bodies.entity)
         self.damping = np.repeat(np.array(bodies.linear_damping), world.dimensions or 0)
-        self._columns = {name: getattr(bodies, name) for name in ("position", "linear_velocity", "force")}
+        table = self._services.table
+        self._columns = {name: table.make(name)[bodies.rows] for name in ("position", "linear_velocity", "force")}
         self._kept = {name: column.copy() for name, column in self._columns.items()}
         self._root = np.sqrt(np.repeat(bodies.mass, world.dimensions or 0))
         position, velocity = (_finite(self._kept[name]) for name in ("position", "linear_velocity"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,8 @@ from ..compounds.stages import carry_forces
 from ..sleeping.stages import AWAKE
 from ..staged import StagedSystem
 from .stages import limit_velocities, sum_forces
+
+LARGEST_TORQUE = 1e150  # N m: squares of it are finite
 
 
 class ForceAccumulation(StagedSystem):
@@ -41,9 +43,12 @@ class ForceAccumulation(StagedSystem):
         ),
     )  # fmt: skip
 
-    def __init__(self, program: Program, state: Record, table: Table, bodies: Bodies) -> None:
+    def __init__(
+        self, program: Program, state: Record, table: Table, bodies: Bodies, tell: Callable[[int, str, Any], None]
+    ) -> None:
         super().__init__(program)
-        self._state, self._table, self._bodies = state, table, bodies
+        self._state, self._table, self._bodies, self._tell = state, table, bodies, tell
+        self.adding = False  # while force systems do
         self.several_evaluations = False  # the integrator sums forces again within the step
         self.summed: np.ndarray | None = None  # a copy, while integrators with more stages need to compare
 
@@ -83,22 +88,40 @@ class ForceAccumulation(StagedSystem):
         torque = self._table.arrays.get("torque")
         if torque is not None:
             torque[...] = 0.0
-        for system in self.world.force_systems:
-            bodies = required_bodies(self._table, self._bodies, system)
-            if bodies is None:
-                continue
-            try:
-                system.add_forces(bodies, time)
-            except Exception as error:
-                error.add_note(f"in force system {system.name}")
-                raise
-            if isinstance(bodies, SelectedBodies):
-                bodies.scatter()
+        self.adding = True
+        try:
+            for system in self.world.force_systems:
+                self._add(system, time)
+        finally:
+            self.adding = False
 
         torque = self._table.arrays.get("torque")
-        if torque is not None and torque.any() and not self.kind()[1]:
+        if torque is None or not torque.any():
+            return
+        if not self.kind()[1]:
             names = ", ".join(system.name for system in self.world.force_systems)
             raise CaromError(f"force systems {names}: what adds to bodies.torque needs requires = (Spin,)")
+        if self._table.in_step and not np.abs(torque).max() <= LARGEST_TORQUE:
+            self._refuse(torque)
+
+    def _add(self, system: ForceSystem, time: float) -> None:
+        bodies = required_bodies(self._table, self._bodies, system)
+        if bodies is None:
+            return
+        try:
+            system.add_forces(bodies, time)
+        except Exception as error:
+            error.add_note(f"in force system {system.name}")
+            raise
+        if isinstance(bodies, SelectedBodies):
+            bodies.scatter()
+
+    def _refuse(self, torque: np.ndarray) -> None:
+        """Bodies with a torque that cannot be are named, and their forces become nan: the flight takes these out."""
+        rows = np.flatnonzero(~(np.abs(torque) <= LARGEST_TORQUE).reshape(len(torque), -1).all(axis=1))
+        for row in rows.tolist():
+            self._tell(row, "torque", torque[row].tolist())
+        torque[rows], self._table.make("force")[rows] = 0.0, np.nan
 
     def nothing_acts(self) -> bool:
         """Whether there is no gravity, no force system and, at the moment, no force given to a dynamic body."""

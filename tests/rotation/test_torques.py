@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipj
 
 from carom.components import RigidBody, SphereCollider, Transform
-from carom.framework import ForceSystem, Settings, StepError, System, World
+from carom.framework import ForceSystem, Phase, Settings, StepError, System, World
 from carom.plugins import Physics
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
@@ -233,6 +233,80 @@ def test_what_a_flight_takes_out_has_not_turned():
         with pytest.warns(UserWarning, match="takes no part"):
             world.step()
         assert (body.rotation, spin.angular_velocity) == before
+
+
+@methods
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("wrong", [math.nan, -math.inf, 1e200])
+def test_a_torque_that_cannot_be_takes_its_body_out(wrong, d, method):
+    """As a force that cannot be does: it is named once, stands still, and others go on to the bit as without it."""
+    torque = [0.3]
+
+    def push(bodies):
+        bodies.torque[:-1] += torque[0]
+        bodies.torque[-1] += 0.3
+
+    def mover(world, x):
+        spin = Spin(0.5, 1.0) if d == 2 else Spin((0.5, 0.4, 0.3), MOMENTS)
+        return world.create_entity(Transform((x, *(0.0,) * (d - 1))), RigidBody(linear_velocity=(1.0,) * d), spin)
+
+    with space(d, method, 1 / 60) as world, space(d, method, 1 / 60) as alone:
+        world.settings = world.settings.replace(on_fault="ignore")
+        victim, other, same = mover(world, 0.0), mover(world, 9.0), mover(alone, 9.0)
+        for each in (world, alone):
+            each.add_system(Forces(push))
+            each.step()
+        body, spin = world.component_for_entity(victim, Transform), world.component_for_entity(victim, Spin)
+        before = body.position.tolist(), np.array(body.rotation), np.array(spin.angular_velocity)
+        torque[0] = wrong
+        for _ in range(3):
+            world.step()
+            alone.step()
+        value = wrong if d == 2 else [wrong] * 3
+        assert world.faults == [
+            f"entity {victim}: torque is {value}; until it is mended the body takes no part in the simulation"
+        ]
+        assert body.position.tolist() == before[0]
+        assert np.all(body.rotation == before[1])
+        assert np.all(spin.angular_velocity == before[2])
+        for kind, field in ((Transform, "position"), (Transform, "rotation"), (Spin, "angular_velocity")):
+            one, two = (getattr(w.component_for_entity(e, kind), field) for w, e in ((world, other), (alone, same)))
+            assert np.all(one == two)
+        torque[0] = 0.3
+        world.step()
+        assert np.all(spin.angular_velocity != before[2])
+        assert body.position[0] > before[0][0]
+
+
+@pytest.mark.parametrize("name", ["force", "torque"])
+def test_what_would_be_lost_is_refused(name):
+    """Forces and torques written where no step takes them; a force after FORCES is one that acts."""
+
+    class Writes(System):
+        def process(self, dt):
+            getattr(self.world.bodies.dynamic, name)[:] += 3.0
+
+    with space(2, "rk4", 1 / 60) as world:
+        entity = world.create_entity(Transform((0, 0)), RigidBody(), Spin(0.5, 1.0))
+        world.add_system(Forces(spring))
+        world.step()
+        for bodies in (world.bodies, world.bodies.dynamic):
+            with pytest.raises(ValueError, match="read-only"):
+                getattr(bodies, name)[:] = 3.0
+            with pytest.raises(ValueError, match="read-only"):
+                setattr(bodies, name, 3.0)
+        for phase in (Phase.START, Phase.FORCES, Phase.INTEGRATION, Phase.END):
+            Writes.phase = phase
+            system = Writes()
+            world.add_system(system)
+            if name == "force" and phase == Phase.FORCES:
+                world.step()
+                velocity = world.component_for_entity(entity, RigidBody).linear_velocity
+                assert velocity == pytest.approx([3.0 / 60] * 2)
+            else:
+                with pytest.raises(StepError, match=r"Writes.*read-only"):
+                    world.step()
+            world.remove_system(system)
 
 
 @pytest.mark.compiled
