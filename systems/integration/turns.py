@@ -13,10 +13,10 @@ BESIDE = {
 # part: of these; begins: it is the first of the step; within: bodies turn with these parts; torque: of force systems,
 # N m, one or three numbers for each row, no rows where no force system has a Spin in what it requires. The others have
 # three numbers, of which a plane uses the first: what the step began with, torque and momentum at the start of the
-# part, sums of RK4, and whether torques have changed within the step.
+# part, sums of RK4; and whether torques have changed within the step, and a body turns fast.
 TURNS = Schema(
     "Turns", part=integer(), begins=flag(), within=flag(), torque=floats(), start_rotation=table("float64", 4),
-    start_spin=table("float64", 3), pushed=table("float64", 3), gained=floats(), changed=flags(),
+    start_spin=table("float64", 3), pushed=table("float64", 3), gained=floats(), changed=flags(), fast=flags(),
     turned=table("float64", 3), momentum=table("float64", 3), middle=table("float64", 3), speeds=table("float64", 3),
     kicks=table("float64", 3),
 )  # fmt: skip
