@@ -1,7 +1,8 @@
 """Stiffness of a world's forces in the present state: the oscillators that they form with the bodies.
 
 The changes of the forces for small shifts of the bodies, and for small changes of their velocities, give the matrices
-of stiffness and drag, each divided by the masses. Their modes are independent oscillators x'' = -k x - c x'. The world
+of stiffness and drag, each divided by the masses. Where force systems give torques, turns count beside shifts, with
+moments of inertia for masses. Their modes are independent oscillators x'' = -k x - c x'. The world
 is left unchanged, bit for bit; force systems are evaluated several times, which they must allow.
 """
 
@@ -14,7 +15,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from ...components.spin import Spin, axes_of
 from ...framework import World
+from ...framework.data.bodies import Bodies
+from ...framework.data.table import Table
 from ...framework.jit.records.record import Record
 from .stability import Floats
 
@@ -39,7 +43,7 @@ class Modes:
 
     entity: the body with the largest amplitude
     stiffness, drag: 1/s^2 and 1/s, by forces; complex if forces turn the motion
-    damping: 1/s, linear_damping
+    damping: 1/s, linear_damping or angular_damping
     """
 
     entity: np.ndarray
@@ -52,25 +56,43 @@ class Forces:
     """The forces of a world's dynamic bodies as functions of their state: see :func:`forces_of`.
 
     Vectors have one number per degree of freedom, times the root of its mass, so that the matrices of forces with a
-    potential are symmetric.
+    potential are symmetric. Those of turns, about the principal axes of the bodies, come after those of places.
+
+    entity, damping: of each degree of freedom
     """
 
     def __init__(self, world: World) -> None:
-        self._world = world
+        self._world, d = world, world.dimensions or 0
         self._services: Any = world.physics
-        bodies = world.bodies.dynamic
-        self.entity = np.array(bodies.entity)
-        self.damping = np.repeat(np.array(bodies.linear_damping), world.dimensions or 0)
-        table = self._services.table
-        self._columns = {name: table.make(name)[bodies.rows] for name in ("position", "linear_velocity", "force")}
+        bodies, table = world.bodies.dynamic, self._services.table
+        turning = self._services.forces.kind()[1]
+        self._spins = np.flatnonzero(bodies.has(Spin)) if turning else np.empty(0, int)
+        names = ["position", "linear_velocity", "force"] + ["rotation", "spin.angular_velocity", "torque"] * turning
+        self._columns = {name: table.make(name)[bodies.rows] for name in names}
         self._kept = {name: column.copy() for name, column in self._columns.items()}
-        self._root = np.sqrt(np.repeat(bodies.mass, world.dimensions or 0))
+        self.entity, self.damping = np.repeat(bodies.entity, d), np.repeat(np.array(bodies.linear_damping), d)
+        self._root, self._places = np.sqrt(np.repeat(bodies.mass, d)), d * len(bodies)
         position, velocity = (_finite(self._kept[name]) for name in ("position", "linear_velocity"))
         length = _spacing(position, _finite(world.bodies.position))
-        self._shift = {
+        shift = {
             "position": _power_of_two(max(SHIFT * length, FARTHEST * float(np.abs(position).max(initial=0.0)))),
             "linear_velocity": _power_of_two(SHIFT * (float(np.abs(velocity).max(initial=0.0)) or length)),
         }
+        self._shift = {name: np.full(self._places, value) for name, value in shift.items()}
+        if len(self._spins):
+            self._add_turns(bodies)
+
+    def _add_turns(self, bodies: Bodies) -> None:
+        table, entities = self._services.table, bodies.entity[self._spins]
+        axes, moments = zip(*(_principal(table, int(entity)) for entity in entities), strict=True)
+        self._axes, root = np.array(axes), np.sqrt(np.ravel(moments))
+        each, damping = len(root) // len(entities), np.array(bodies.spin.angular_damping[self._spins])
+        self._root = np.append(self._root, np.where(root > 0.0, root, np.inf))  # what has no moment does not turn
+        self.entity = np.append(self.entity, np.repeat(entities, each))
+        self.damping = np.append(self.damping, np.repeat(damping, each))
+        turned, spun = (_largest(self._kept[name][self._spins]) for name in ("rotation", "spin.angular_velocity"))
+        for name, angle in (("position", max(SHIFT, FARTHEST * turned)), ("linear_velocity", SHIFT * (spun or 1.0))):
+            self._shift[name] = np.append(self._shift[name], np.full(len(root), _power_of_two(angle)))
 
     def begin(self) -> None:
         """Sum the forces at the present state; ValueError if they are not finite."""
@@ -94,32 +116,49 @@ class Forces:
 
     def noise(self, name: str) -> float:
         """The rounding error of stiffness ("position") or drag ("linear_velocity")."""
-        return 8 * EPS * float(np.abs(self._rest / self._root).max(initial=0.0)) / self._shift[name]
+        return 8 * EPS * float(np.abs(self._rest / self._root / self._shift[name]).max(initial=0.0))
 
     def _answer(self, name: str, direction: Floats) -> Floats:
-        column, start = self._columns[name], self._kept[name]
         moved = direction / self._root
-        largest = float(np.abs(moved).max())
+        largest = float(np.abs(moved / self._shift[name]).max())
         if largest == 0.0:
             return np.zeros(len(self))
-        scale = self._shift[name] / largest
+        scale = 1.0 / largest
         answers = []
         for sign in (1.0, -1.0):
-            column[:] = start + (sign * scale * moved).reshape(start.shape)
+            self._move(name, sign * scale * moved)
             answers.append(-sign * (self._sum() - self._rest) / scale)
-        column[:] = start
+        self._move(name, np.zeros(len(self)))
         there, back = answers
         if np.abs(there - back).max() > KINK * max(np.abs(there).max(), np.abs(back).max()):
             return max(there, back, key=lambda answer: float(np.abs(answer).max()))  # a rope: take the taut side
         return (there + back) / 2
 
+    def _move(self, name: str, by: Floats) -> None:
+        """Shift the bodies, or change their velocities, by so much from where they were, and turn them."""
+        start, turns = self._kept[name], name == "position"
+        self._columns[name][:] = start + by[: self._places].reshape(start.shape)
+        if not len(self._spins):
+            return
+        turn = np.einsum("bij,bj->bi", self._axes, by[self._places :].reshape(len(self._spins), -1))
+        name = "rotation" if turns else "spin.angular_velocity"
+        start = self._kept[name][self._spins]
+        if start.ndim == 1:
+            self._columns[name][self._spins] = start + turn[:, 0]
+        else:
+            self._columns[name][self._spins] = _turned(start, turn) if turns else start + turn
+
     def _sum(self) -> Floats:
         self._services.forces.evaluate(self._world.time)
-        force = self._columns["force"]
-        bad = np.flatnonzero(~np.isfinite(force).all(axis=1))
+        sums = self._columns["force"].ravel()
+        if len(self._spins):
+            torque = self._columns["torque"][self._spins].reshape(len(self._spins), -1)
+            sums = np.concatenate((sums, np.einsum("bij,bi->bj", self._axes, torque).ravel()))
+        bad = np.flatnonzero(~np.isfinite(sums))
         if len(bad):
-            raise ValueError(f"entity {self.entity[bad[0]]}: the forces on it are {force[bad[0]].tolist()}")
-        return force.ravel() / self._root
+            entity, acting = self.entity[bad[0]], "forces" if bad[0] < self._places else "forces and torques"
+            raise ValueError(f"entity {entity}: the {acting} on it are {sums[self.entity == entity].tolist()}")
+        return sums / self._root
 
 
 @contextmanager
@@ -200,13 +239,33 @@ def _modes_in(basis: Floats, by_stiffness: Floats, by_drag: Floats, forces: Forc
     stiffest, fastest = float(np.abs(k).max()), float(np.abs(c).max())
     k = _cleaned(k, max(NOISE * stiffest, forces.noise("position")))
     c = _cleaned(c, max(NOISE * max(fastest, stiffest**0.5), forces.noise("linear_velocity")))
-    dimensions = len(forces) // len(forces.entity)
-    return Modes(forces.entity[np.argmax(weights, axis=0) // dimensions], k, c, g)
+    return Modes(forces.entity[np.argmax(weights, axis=0)], k, c, g)
 
 
 def _cleaned(values: Any, noise: float) -> Any:
     real, turning = (np.where(np.abs(part) > noise, part, 0.0) for part in (values.real, values.imag))
     return real + 1j * turning
+
+
+def _principal(table: Table, entity: int) -> tuple[Floats, Floats]:
+    """(a body's principal axes as columns along those of the world, its moments of inertia about them)."""
+    spin = object.__new__(Spin)
+    spin._bind(table, entity)
+    moments = spin.moments
+    if not np.ndim(moments):
+        return np.eye(1), np.array([moments])
+    principal, own = np.linalg.eigh(moments)
+    principal = np.where(principal > 8 * EPS * principal[-1], principal, 0.0)
+    return axes_of(table.column("rotation")[table.find(entity)]) @ own, principal
+
+
+def _turned(rotation: Floats, turn: Floats) -> Floats:
+    """Quaternions (n, 4), turned by small vectors (n, 3)."""
+    w, u = rotation[:, :1], rotation[:, 1:]
+    half = 0.5 * turn
+    moved = w - (half * u).sum(axis=1, keepdims=True), u + w * half + np.cross(half, u)
+    turned = np.concatenate(moved, axis=1)
+    return turned / np.linalg.norm(turned, axis=1, keepdims=True)
 
 
 def _spacing(dynamic: Floats, everything: Floats) -> float:
@@ -216,6 +275,10 @@ def _spacing(dynamic: Floats, everything: Floats) -> float:
         if wide > 0.0:
             return wide / len(places) ** (1 / places.shape[1])
     return float(np.abs(dynamic).max(initial=0.0)) or 1.0
+
+
+def _largest(values: Floats) -> float:
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
 def _finite(rows: Floats) -> Floats:

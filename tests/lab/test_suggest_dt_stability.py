@@ -16,6 +16,7 @@ from carom.framework import ForceSystem, Plugin, Settings, World
 from carom.lab.limits.stability import advanced, stability_limits
 from carom.lab.limits.step_length import SAFETY, step_limits, suggest_dt
 from carom.plugins import Physics
+from carom.plugins.rotation import Rotation, Spin
 from carom.plugins.springs import Springs
 from carom.systems import Integrator
 from carom.systems.integration.integrators import STANDARD_INTEGRATORS
@@ -221,6 +222,70 @@ def test_linear_damping_alone_has_no_limit():
         assert limit(1e6, 0.0, method) == math.inf
     assert limit(3.0, 100.0, "explicit_euler") == pytest.approx(3.0 / 100.0, rel=1e-6)
     assert limit(3.0, 100.0, "semi_implicit_euler") >= 2 / 10 * (1 - NOISE)
+
+
+class Torsion(ForceSystem):
+    """Torque = -k angle - c w, in 3D about the last axis."""
+
+    requires = (Spin,)
+
+    def __init__(self, stiffness, drag):
+        self.stiffness, self.drag = stiffness, drag
+
+    def add_forces(self, bodies, time):
+        w, q = bodies.spin.angular_velocity, bodies.rotation
+        if q.ndim == 1:
+            bodies.torque -= self.stiffness * q + self.drag * w
+        else:
+            bodies.torque[:, 2] -= self.stiffness * 2 * np.arctan2(q[:, 3], q[:, 0]) + self.drag * w[:, 2]
+
+
+def turning(d, method, stiffness, drag, damping=0.0, dt=1 / 60):
+    """A body of 0.8 kg m^2 turned by 1 mrad, and one without a Spin that takes no part."""
+    world = World(Physics(d, gravity=0), Rotation(), settings=Settings(integrator=method, dt=dt))
+    spin = Spin(0.0 if d == 2 else (0.0, 0.0, 0.0), 0.8 if d == 2 else (2.0, 1.5, 0.8), angular_damping=damping)
+    turn = 1e-3 if d == 2 else (math.cos(5e-4), 0.0, 0.0, math.sin(5e-4))
+    world.create_entity(Transform((1,) * d), RigidBody())
+    world.create_entity(Transform((2,) * d, turn), RigidBody(mass=5.0), spin)
+    world.add_system(Torsion(0.8 * stiffness, 0.8 * drag))
+    return world
+
+
+@all_methods
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("column", range(5))
+def test_turns_have_the_limits_of_places(d, method, column):
+    """Of the same oscillator, with moments of inertia for masses."""
+    (stiffness, drag), w = COLUMNS[column], 40.0
+    with turning(d, method, stiffness * w * w, drag * w) as world:
+        before = world.state_hash()
+        found = step_limits(world)
+        assert world.state_hash() == before
+    place = step_limits(oscillators(method, 1 / 60, stiffness * w * w, drag * w, mass=1.0, v0=1.0))
+    assert found.stability == pytest.approx(place.stability, rel=1e-5)
+    if found.oscillation is not None:
+        assert found.oscillation.entity == 2
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("method", ["semi_implicit_euler", "velocity_verlet", "yoshida4", "rk4"])
+def test_a_turning_body_grows_beyond_the_limit_alone(d, method):
+    for drag in (0.0, 20.0):
+        with turning(d, method, 1600.0, drag) as world:
+            limit = step_limits(world).stability
+        for part, grows in ((0.97, False), (1.05, True)):
+            with turning(d, method, 1600.0, drag, dt=part * limit) as world:
+                largest = 0.0
+                for _ in range(200):
+                    world.step()
+                    largest = max(largest, float(np.abs(world.bodies.spin.angular_velocity).max()))
+                assert (largest > 0.4) == grows
+
+
+def test_angular_damping_counts_beside_torques():
+    """As linear damping does beside forces, and alone it has no limit."""
+    assert step_limits(turning(2, "explicit_euler", 100.0, 0.0, 3.0)).stability == pytest.approx(3.0 / 100.0, rel=1e-5)
+    assert step_limits(turning(2, "explicit_euler", 0.0, 0.0, 1e6)).stability == math.inf
 
 
 def test_a_rope_at_its_full_length_counts_as_taut():
