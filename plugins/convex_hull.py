@@ -23,7 +23,7 @@ FIRST = 5  # row of the first corner; before: the mass centre, three vectors who
 plugin = Plugin("convex_hull", version="1.0")
 
 
-def _faces_of(points: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+def faces_of(points: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     """(which points it has, outward unit normal) of each face: a plane through three of them with none beyond."""
     triples = np.array(list(itertools.combinations(range(len(points)), 3)), int).reshape(-1, 3)
     places = points[triples]
@@ -44,6 +44,12 @@ def _faces_of(points: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     return faces
 
 
+def around(ring: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """The order of the corners of a face, counter-clockwise about its normal."""
+    ways = ring - ring.mean(axis=0)
+    return np.argsort(np.arctan2(np.cross(ways[0], ways) @ normal, ways @ ways[0]))
+
+
 @functools.lru_cache(maxsize=256)
 def _hull_of(data: bytes) -> np.ndarray | str:
     """The rows of the hull of points, given as their bytes; or what is wrong with the points."""
@@ -53,7 +59,7 @@ def _hull_of(data: bytes) -> np.ndarray | str:
     size = np.abs(points).max() or 1.0  # divided by it nothing overflows, at any size
     size *= np.abs((points - points[0]) / size).max() or 1.0
     shape, index = np.unique((points - points[0]) / size, axis=0, return_index=True)
-    faces = _faces_of(shape)
+    faces = faces_of(shape)
     if not faces or any(on.all() for on, _ in faces):
         return "must not all lie in a plane"
     corner = sum(on.astype(int) for on, _ in faces) >= 3  # of fewer faces: inside of one, or of an edge
@@ -61,8 +67,7 @@ def _hull_of(data: bytes) -> np.ndarray | str:
     triangles = []
     for on, normal in faces:
         ring = shape[on & corner] - middle
-        ways = ring - ring.mean(axis=0)
-        ring = ring[np.argsort(np.arctan2(np.cross(ways[0], ways) @ normal, ways @ ways[0]))]
+        ring = ring[around(ring, normal)]
         triangles += [ring[[0, k, k + 1]] for k in range(1, len(ring) - 1)]
     a, b, c = np.array(triangles).transpose(1, 0, 2)
     six = (a * np.cross(b, c)).sum(axis=1)  # times the volumes of the tetrahedra from the middle

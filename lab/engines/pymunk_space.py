@@ -83,11 +83,11 @@ def _plain(world: World, bodies: Any) -> Bodies:
         shaped |= has
         friction[has], restitution[has] = columns.friction[has], columns.restitution[has]
         if collider in OUTLINES:
-            found, rounding[has], _ = outlines_of(world, collider, bodies.entity[has])
+            found, rounding[has], *_ = outlines_of(world, collider, bodies.entity[has])
         elif collider is SphereCollider:
             found, rounding[has] = np.zeros((has.sum(), 1, 2)), columns.radius[has]
         else:
-            found = SIGNS * columns.half_extents[has][:, None]
+            found = SIGNS[2] * columns.half_extents[has][:, None]
         for k, own, offset in zip(np.flatnonzero(has).tolist(), found, columns.offset[has], strict=True):
             corners[k] = own + offset
             _refuse("offsets of moving bodies' colliders", offset * moves[k])

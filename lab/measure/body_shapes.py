@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +13,7 @@ from ...components import AABBCollider, SphereCollider
 from ...components.spin import Spin
 from ...framework import World
 from ...systems.shapes.rotation import axes_of
-from .outlines import OUTLINES, SIGNS, depths, outlines_of
+from .outlines import BOX_FACES, NO_FACES, OUTLINES, SIGNS, depths, outlines_of
 
 Floats = NDArray[np.float64]
 QUIET = np.errstate(over="ignore", invalid="ignore")  # bodies out of range are reported without warnings
@@ -24,9 +25,10 @@ class Shapes:
 
     ``entity (n,)``, ``centre (n, d)``, ``half (n, d)``, ``speed (n,)``, ``round (n,)`` true for spheres,
     ``static (n,)`` true for static bodies, ``sensor (n,)`` true for sensors.
-    ``outline (n,)``: of what turns in a plane its corners as they are turned, (m, 2) about the centre, of others None;
-    ``rounding (n,)``: how far it goes beyond these, of spheres the radius; ``size (n,)``: the smallest extent.
-    ``hand (n, d)``: of a sphere that spins in a plane the way from its centre to a point on it, of others NaN.
+    ``outline (n,)``: of what turns its corners as they are turned, (m, d) about the centre, of others None;
+    ``rounding (n,)``: how far it goes beyond these, of spheres the radius; ``size (n,)``: the smallest extent;
+    ``faces (n,)``: in space the rows of the corners of each face, see :class:`~.outlines.Outline`.
+    ``axes (n, d, d)``: of a sphere that spins the axes of its body in its columns, of others NaN.
     """
 
     entity: NDArray[np.int64]
@@ -39,7 +41,8 @@ class Shapes:
     outline: NDArray[np.object_]
     rounding: Floats
     size: Floats
-    hand: Floats
+    faces: NDArray[np.object_]
+    axes: Floats
 
     @property
     def lower(self) -> Floats:
@@ -55,10 +58,16 @@ class Shapes:
         return np.array([outline is not None for outline in self.outline], bool)
 
     @property
+    def faceless(self) -> NDArray[np.bool_]:
+        """Which rows have no faces: balls and capsules."""
+        return np.array([len(faces) == 0 for faces in self.faces], bool)
+
+    @property
     def corners(self) -> list[Floats]:
-        """In a plane, of each row (m, 2) about its centre, without the rounding."""
-        rows = zip(self.outline, self.round, SIGNS * self.half[:, None], strict=True)
-        return [(np.zeros((1, 2)) if ball else box) if turning is None else turning for turning, ball, box in rows]
+        """Of each row (m, d) about its centre, without the rounding."""
+        d = self.half.shape[1]
+        rows = zip(self.outline, self.round, SIGNS[d] * self.half[:, None], strict=True)
+        return [(np.zeros((1, d)) if ball else box) if turning is None else turning for turning, ball, box in rows]
 
     @property
     def typical_diameter(self) -> float:
@@ -66,12 +75,11 @@ class Shapes:
         return float(2 * np.median(self.half.max(axis=1))) if len(self.entity) else 0.0
 
     def at(self, places: Floats, turns: Floats) -> Shapes:
-        """A single shape, repeated at each of the places (m, d), turned on by angles (m,) in a plane."""
+        """A single shape, repeated at each of the places (m, d), turned on by matrices (m, d, d)."""
         repeated = {name: np.repeat(getattr(self, name), len(places), axis=0) for name in self.__dataclass_fields__}
-        if places.shape[1] == 2:
-            for k, axes in enumerate(axes_of(turns, 2)):
-                repeated["hand"][k] = axes @ self.hand[0]
-                repeated["outline"][k] = None if self.outline[0] is None else self.outline[0] @ axes.T
+        for k, turn in enumerate(turns):
+            repeated["axes"][k] = turn @ self.axes[0]
+            repeated["outline"][k] = None if self.outline[0] is None else self.outline[0] @ turn.T
         return Shapes(**{**repeated, "centre": places})
 
     def where(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Shapes:
@@ -85,41 +93,44 @@ def dimensions_of(world: World) -> int:
 
 
 @QUIET
-def shapes_of(world: World) -> Shapes:
-    """All built-in colliders of ``world`` in its present state, in a plane capsules and polygons too; a turned
-    AABBCollider has the half extents of what encloses it."""
+def shapes_of(world: World, solids: Collection[Any] = ()) -> Shapes:
+    """All built-in colliders of ``world`` in its present state, in a plane capsules and polygons too, in space those of
+    ``solids``; a turned AABBCollider has the half extents of what encloses it."""
     bodies, d = world.bodies, dimensions_of(world)
     fixed = np.arange(len(bodies)) >= bodies.kinematic.rows.stop
     axes = axes_of(np.asarray(bodies.rotation), d)
     speeds = np.where(fixed, 0.0, np.linalg.norm(bodies.linear_velocity, axis=1))
-    spins = bodies.has(Spin) & (d == 2)
+    spins = bodies.has(Spin)
     parts: list[tuple[Any, ...]] = []
-    for collider in (SphereCollider, AABBCollider, *(OUTLINES if d == 2 else ())):
+    for collider in (SphereCollider, AABBCollider, *(OUTLINES if d == 2 else solids)):
         has = np.asarray(bodies.has(collider), bool)
         if not has.any():  # there may be no such columns
             continue
         columns, turned, count = getattr(bodies, collider.prefix[:-1]), axes[has], int(has.sum())
-        outline, rounding, hand = np.full(count, None), np.zeros(count), np.full((count, d), np.nan)
+        outline, faces, rounding = np.full(count, None), np.full(count, None), np.zeros(count)
+        marked = np.full((count, d, d), np.nan)
         if collider is SphereCollider:
             rounding = np.array(columns.radius[has])
-            half, size = np.repeat(rounding[:, None], d, axis=1), 2 * rounding
-            hand[spins[has]] = (rounding[:, None] * turned[:, :, 0])[spins[has]]
+            half, size, known = np.repeat(rounding[:, None], d, axis=1), 2 * rounding, [NO_FACES] * count
+            marked[spins[has]] = turned[spins[has]]
         elif collider is AABBCollider:
             half = np.einsum("nij,nj->ni", np.abs(turned), columns.half_extents[has])
-            size = 2 * half.min(axis=1)
+            size, known = 2 * half.min(axis=1), [BOX_FACES] * count
         else:
-            corners, rounding, size = outlines_of(world, collider, bodies.entity[has])
+            corners, rounding, size, known = outlines_of(world, collider, bodies.entity[has])
             for k in range(count):
                 outline[k] = corners[k] @ turned[k].T
             half = np.array([np.abs(one).max(axis=0) for one in outline]) + rounding[:, None]
+        for k in range(count):
+            faces[k] = known[k]
         centre = bodies.position[has] + np.einsum("nij,nj->ni", turned, columns.offset[has])
         rounds = np.full(count, collider is SphereCollider)
         first = bodies.entity[has], centre, half, speeds[has], rounds, fixed[has], columns.sensor[has]
-        parts.append((*first, outline, rounding, size, hand))
+        parts.append((*first, outline, rounding, size, faces, marked))
     if not parts:
-        empty, none, nothing = np.zeros((0, d)), np.zeros(0, bool), np.zeros(0)
+        empty, none, nothing, objects = np.zeros((0, d)), np.zeros(0, bool), np.zeros(0), np.zeros(0, object)
         first = np.zeros(0, np.int64), empty, empty, nothing, none, none, none
-        return Shapes(*first, np.zeros(0, object), nothing, nothing, empty)
+        return Shapes(*first, objects, nothing, nothing, objects, np.zeros((0, d, d)))
     return Shapes(*(np.concatenate([np.asarray(column) for column in columns]) for columns in zip(*parts, strict=True)))
 
 

@@ -1,7 +1,8 @@
-"""The outlines of shapes that turn in a plane, and how deep two outlines overlap."""
+"""The outlines of shapes that turn, and how deep two of a plane overlap."""
 
 from __future__ import annotations
 
+import functools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,31 +10,44 @@ from numpy.typing import NDArray
 
 from ...framework import World
 from ...plugins.capsule import CapsuleCollider
+from ...plugins.convex_hull import ConvexHullCollider, around, faces_of
 from ...plugins.convex_polygon import ConvexPolygonCollider
 from ...plugins.rotation import BoxCollider
 from ...plugins.terrain.segment import ChainSegmentCollider
+from ...plugins.terrain.triangle import TerrainTriangleCollider
 
 Floats = NDArray[np.float64]
 
-SIGNS = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+Rows = NDArray[np.int64]
+
+SIGNS = {  # by the dimensions: the corners of a box; in space bit k of a corner's number is the end of axis k
+    2: np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]),
+    3: 2.0 * (np.arange(8)[:, None] >> np.arange(3) & 1) - 1.0,
+}
+NO_FACES = np.zeros((0, 3), np.int64)
+BOX_FACES = np.array([(0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)])
 MOST_NUMBERS = 4_000_000  # in one array: more pairs are looked at by turns
 
 
 class Outline(NamedTuple):
-    """``corners`` (m, 2), counter-clockwise, about the shape's centre and along the body's own axes; the shape goes
-    ``rounding`` beyond them; ``size``: its smallest extent."""
+    """``corners`` (m, d) about the shape's centre and along the body's own axes, in a plane counter-clockwise; the
+    shape goes ``rounding`` beyond them; ``size``: its smallest extent; ``faces`` (f, k): in space the rows of the
+    corners of each face, counter-clockwise from outside, the last one repeated where a face has fewer than k."""
 
     corners: Floats
     rounding: float
     size: float
+    faces: Rows = NO_FACES
 
 
 def _box(box: Any) -> Outline:
-    return Outline(SIGNS * box.half_extents, 0.0, 2 * float(np.min(box.half_extents)))
+    d = len(box.half_extents)
+    return Outline(SIGNS[d] * box.half_extents, 0.0, 2 * float(np.min(box.half_extents)), BOX_FACES)
 
 
 def _capsule(capsule: Any) -> Outline:
-    ends = np.array([(0.0, -capsule.half_height), (0.0, capsule.half_height)])
+    ends = np.zeros((2, len(capsule.offset)))
+    ends[:, 1] = -capsule.half_height, capsule.half_height
     return Outline(ends, capsule.radius, 2 * capsule.radius)
 
 
@@ -48,16 +62,40 @@ def _segment(segment: Any) -> Outline:
     return Outline(ends, 0.0, float(np.linalg.norm(ends[1] - ends[0])))
 
 
+def _hull(hull: Any) -> Outline:
+    corners = np.array(hull.corners)
+    return Outline(corners, 0.0, float(np.ptp(corners, axis=0).min()), _hull_faces(corners.tobytes()))
+
+
+@functools.lru_cache(maxsize=256)
+def _hull_faces(data: bytes) -> Rows:
+    """Of corners (m, 3), given as their bytes."""
+    corners = np.frombuffer(data).reshape(-1, 3)
+    corners = corners - corners.mean(axis=0)
+    corners /= np.abs(corners).max()
+    rings = [np.flatnonzero(on)[around(corners[on], normal)] for on, normal in faces_of(corners)]
+    return padded(rings, max(map(len, rings)))
+
+
+def _triangle(triangle: Any) -> Outline:
+    corners = np.array([triangle.a, triangle.b, triangle.c])
+    return Outline(corners, 0.0, float(np.ptp(corners, axis=0).max()), np.arange(3)[None])
+
+
 OUTLINES = {
     BoxCollider: _box, CapsuleCollider: _capsule, ConvexPolygonCollider: _polygon, ChainSegmentCollider: _segment,
 }  # fmt: skip
+SOLIDS = {
+    BoxCollider: _box, CapsuleCollider: _capsule, ConvexHullCollider: _hull, TerrainTriangleCollider: _triangle,
+}  # fmt: skip
 
 
-def outlines_of(world: World, collider: Any, entities: NDArray[np.int64]) -> tuple[list[Floats], Floats, Floats]:
-    """The corners, the roundings and the sizes of that collider of each of the entities."""
-    found = [OUTLINES[collider](world.component_for_entity(entity, collider)) for entity in entities.tolist()]
-    corners, rounding, size = zip(*found, strict=True)
-    return list(corners), np.array(rounding), np.array(size)
+def outlines_of(world: World, collider: Any, entities: Rows) -> tuple[list[Floats], Floats, Floats, list[Rows]]:
+    """The corners, the roundings, the sizes and the faces of that collider of each of the entities."""
+    outline = {**OUTLINES, **SOLIDS}[collider]
+    found = [outline(world.component_for_entity(entity, collider)) for entity in entities.tolist()]
+    corners, rounding, size, faces = zip(*found, strict=True)
+    return list(corners), np.array(rounding), np.array(size), list(faces)
 
 
 def rounded(corners: Floats, rounding: float, points: int = 9) -> Floats:
@@ -85,7 +123,7 @@ def depths(a: list[Floats], b: list[Floats], apart: Floats, reach: Floats) -> Fl
     some = max(1, MOST_NUMBERS // (2 * corners * (corners * corners + 2 * corners)))
     for first in range(0, len(a), some):
         rows = slice(first, first + some)
-        one, other = _padded(a[rows], corners), _padded(b[rows], corners) + apart[rows, None]
+        one, other = padded(a[rows], corners), padded(b[rows], corners) + apart[rows, None]
         axes = np.concatenate([_normals(one), -_normals(other)], axis=1)
         if reach[rows].any():
             between = (other[:, :, None] - one[:, None]).reshape(len(one), -1, 2)
@@ -96,8 +134,8 @@ def depths(a: list[Floats], b: list[Floats], apart: Floats, reach: Floats) -> Fl
     return found
 
 
-def _padded(polygons: list[Floats], corners: int) -> Floats:
-    """(k, corners, 2): the last corner is repeated."""
+def padded(polygons: list[Any], corners: int) -> NDArray[Any]:
+    """(k, corners, ...): the last corner is repeated."""
     return np.array([np.concatenate([one, np.repeat(one[-1:], corners - len(one), axis=0)]) for one in polygons])
 
 

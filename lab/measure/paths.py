@@ -30,8 +30,8 @@ class PathImpact:
 
 @dataclass(frozen=True)
 class Traces:
-    """Paths: ``positions`` (samples, bodies, d), NaN where no body was; ``entities`` (bodies,), ascending; in a plane
-    ``angles`` (samples, bodies), else 0.
+    """Paths: ``positions`` (samples, bodies, d), NaN where no body was; ``entities`` (bodies,), ascending;
+    ``rotations``: angles (samples, bodies) or quaternions (samples, bodies, 4).
 
     ``moved``: number of all bodies that moved, including these. ``impacts``: the impacts of the run, if all steps are
     shown, else None.
@@ -39,7 +39,7 @@ class Traces:
 
     entities: NDArray[np.int64]
     positions: NDArray[Any]
-    angles: NDArray[Any]
+    rotations: NDArray[Any]
     moved: int = 0
     impacts: list[PathImpact] | None = None
 
@@ -70,8 +70,8 @@ class Traces:
         travelled = np.nan_to_num(np.linalg.norm(ways, axis=2)).sum(axis=0)
         moved = int((travelled > 0).sum())
         chosen = np.sort(np.argsort(-travelled, kind="stable")[: min(count, moved)])
-        positions, angles = self.positions[:, chosen], self.angles[:, chosen]
-        return replace(self, entities=self.entities[chosen], positions=positions, angles=angles, moved=moved)
+        positions, rotations = self.positions[:, chosen], self.rotations[:, chosen]
+        return replace(self, entities=self.entities[chosen], positions=positions, rotations=rotations, moved=moved)
 
 
 class Recorder:
@@ -81,7 +81,7 @@ class Recorder:
         self.world = world
         self.impacts: list[PathImpact] | None = [] if step_by_step else None
         self.entities: NDArray[np.int64] = np.empty(0, np.int64)  # in the order they appeared
-        self.samples: list[NDArray[np.float32]] = []  # positions of the entities known at that time, and angles
+        self.samples: list[NDArray[np.float32]] = []  # positions and rotations of the entities known at that time
 
     @QUIET
     def record(self) -> None:
@@ -95,10 +95,10 @@ class Recorder:
         if len(new) > room:
             new = np.sort(np.random.default_rng(0).choice(new, room, replace=False))
         self.entities = np.concatenate([self.entities, new])
-        d = dimensions_of(self.world)
-        sample = np.full((len(self.entities), d + 1), np.nan, np.float32)
+        now = np.column_stack([bodies.position, bodies.rotation])
+        sample = np.full((len(self.entities), now.shape[1]), np.nan, np.float32)
         _, mine, rows = np.intersect1d(self.entities, ids, assume_unique=True, return_indices=True)
-        sample[mine, :d], sample[mine, d] = bodies.position[rows], bodies.rotation[rows] if d == 2 else 0.0
+        sample[mine] = now[rows]
         self.samples.append(sample)
 
     def traces(self) -> Traces:
@@ -107,8 +107,9 @@ class Recorder:
         for number, sample in enumerate(self.samples):
             places[number, : len(sample)] = sample
         order = np.argsort(self.entities, kind="stable")
-        places = places[:, order]
-        return Traces(self.entities[order], places[..., :-1], places[..., -1], impacts=self.impacts)
+        places, d = places[:, order], dimensions_of(self.world)
+        rotations = places[..., 2] if d == 2 else places[..., d:]
+        return Traces(self.entities[order], places[..., :d], rotations, impacts=self.impacts)
 
 
 def _impacts(world: World, after: int) -> list[PathImpact]:

@@ -2,42 +2,50 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from matplotlib.collections import EllipseCollection, LineCollection, PolyCollection
 from matplotlib.colors import to_rgba_array
+from numpy.typing import NDArray
 
 from ..measure.body_shapes import Floats, Shapes
-from ..measure.outlines import rounded
+from ..measure.outlines import padded, rounded
 from . import canvas
 from .canvas import Sheet
-from .projection import Projection, corners, edges, faces
+from .projection import Projection
 
 MOST_ARROWS = 1500  # in 2D; more could not be distinguished
 MOST_ARROWS_3D = 400  # the nearest
 MOST_SEGMENTS = 160_000
 MOST_CONTACTS_3D = 200  # more would hide the bodies
+SPOTS = (0.6, 0.4, 0.2)  # rad, on balls in 3D, at both ends of each axis: how far they reach
 ANGLES = np.linspace(0, 2 * np.pi, 40, endpoint=False)
-FACE_SHADE = (0.3, 0.0, 0.5)  # of boxes, by the axis of the face's normal: light from above
+FACE_SHADE = np.array([(0.3, 0.6, 0.5), (0.3, 0.0, 0.5)])  # of faces in 3D that look down or up, by the axis
 FAINT = 0.3  # opacity of sensors
+GLASS = 0.13  # opacity of walls in 3D
+Painted = tuple[int, Floats, Any, Any]  # the row of a body, a polygon in the plane, the colours of it and its edge
 OUTLINED = 6.0  # points: smaller bodies have no outline
 
 
 def draw_walls(sheet: Sheet, walls: Shapes, projection: Projection) -> None:
-    """Static geometry: filled in 2D, edges only in 3D; sensors faint."""
+    """Static geometry: filled in 2D; in 3D transparent, clipped by the view; sensors faint."""
+    colours = np.where(walls.sensor[:, None], to_rgba_array(canvas.SENSOR, FAINT), to_rgba_array(canvas.WALL))
     if projection.flat:
-        colours = np.where(walls.sensor[:, None], to_rgba_array(canvas.SENSOR, FAINT), to_rgba_array(canvas.WALL))
         _draw_flat(sheet, walls, colours, canvas.WALL_EDGE, 0.6, zorder=1)
         return
-    segments, filled = [], []
-    for low, high in zip(walls.lower, walls.upper, strict=True):
-        seen = np.maximum(low, projection.lower), np.minimum(high, projection.upper)
-        places, _, _ = projection.plane(corners(*seen))
-        segments += [places[list(edge)] for edge in edges()]
-        filled += [places[rows] for _, _, rows in faces()]
-    sheet.axes.add_collection(PolyCollection(filled, facecolors=canvas.WALL, alpha=0.13, linewidths=0, zorder=1))
-    _lines(sheet, segments, colors=canvas.WALL_EDGE, linewidths=0.6, alpha=0.7, zorder=1.1)
+    draw_bodies(sheet, walls.where(walls.faceless), colours[walls.faceless], projection, zorder=1)
+    rings, owner, _ = _seen_rings(walls, projection)
+    within = np.all((rings >= projection.lower) & (rings <= projection.upper), axis=(1, 2))
+    parts = [ring if whole else projection.clipped(ring) for ring, whole in zip(rings, within, strict=True)]
+    lengths = np.array([len(part) for part in parts], int)
+    if lengths.any():
+        places = np.split(projection.plane(np.concatenate(parts))[0], np.cumsum(lengths)[:-1])
+        colours = colours[owner]
+        colours[:, 3] = GLASS
+        style: dict[str, Any] = {"edgecolors": to_rgba_array(canvas.WALL_EDGE, 0.7), "linewidths": 0.6, "zorder": 1}
+        sheet.axes.add_collection(PolyCollection(places, facecolors=colours, **style))
 
 
 def draw_bodies(sheet: Sheet, bodies: Shapes, colours: Floats, projection: Projection, zorder: float = 3) -> None:
@@ -55,29 +63,67 @@ def draw_bodies(sheet: Sheet, bodies: Shapes, colours: Floats, projection: Proje
 def _draw_solids(
     sheet: Sheet, bodies: Shapes, colours: Floats, projection: Projection, outline: float, zorder: float
 ) -> None:
-    """Balls and boxes as polygons in one list, painted from far to near; balls with a highlight."""
-    places, magnification, depth = projection.plane(bodies.centre)
+    """Faces, balls and capsules as polygons in one list, painted from far to near."""
+    depth = projection.plane(bodies.centre)[2]
     shade = canvas.mixed(colours, canvas.BACKGROUND, 0.75 * (1 - depth))
-    light = canvas.mixed(shade, "#ffffff", np.full(len(shade), 0.35))
-    circle = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
-    polygons, fill, edge = [], [], []
-    dark = to_rgba_array(canvas.BACKGROUND)[0]
-    for k in np.argsort(depth, kind="stable"):
-        if bodies.round[k]:
-            size = bodies.half[k, 0] * magnification[k]
-            polygons += [places[k] + size * circle, places[k] + size * (0.35 * circle + (-0.3, 0.33))]
-            fill += [shade[k], light[k]]
-            edge += [dark, light[k]]
-            continue
-        ends, _, _ = projection.plane(corners(bodies.lower[k], bodies.upper[k]))
-        for axis, direction, rows in faces():
-            seen_from = direction * (projection.camera[axis] - bodies.centre[k, axis])
-            if seen_from > bodies.half[k, axis]:  # the camera is on this face's side
-                polygons.append(ends[rows])
-                fill.append(canvas.mixed(shade[k], canvas.BACKGROUND, FACE_SHADE[axis]))
-                edge.append(dark)
+    painted = [*_seen_faces(bodies, shade, projection), *_seen_balls(sheet, bodies, shade, projection)]
+    painted.sort(key=lambda one: depth[one[0]])
     style: dict[str, Any] = {"linewidths": 0.6 * outline, "zorder": zorder}
-    sheet.axes.add_collection(PolyCollection(polygons, facecolors=fill, edgecolors=edge, **style))
+    if painted:
+        _, polygons, fill, edge = zip(*painted, strict=True)
+        sheet.axes.add_collection(PolyCollection(polygons, facecolors=fill, edgecolors=edge, **style))
+
+
+def _seen_faces(bodies: Shapes, shade: Floats, projection: Projection) -> Iterator[Painted]:
+    """Each face that looks at the camera."""
+    rings, owner, normals = _seen_rings(bodies, projection)
+    squares = normals**2
+    dark = FACE_SHADE[(normals[:, 1] > 0.0).astype(int)]
+    share = (squares * dark).sum(axis=1) / squares.sum(axis=1)
+    colours = canvas.mixed(shade[owner], canvas.BACKGROUND, share)
+    for k, ring, colour in zip(owner.tolist(), projection.plane(rings)[0], colours, strict=True):
+        yield k, ring, colour, canvas.BACKGROUND
+
+
+def _seen_balls(sheet: Sheet, bodies: Shapes, shade: Floats, projection: Projection) -> Iterator[Painted]:
+    """Balls and capsules: each with its spots, if it spins, and a highlight."""
+    _, magnification, _ = projection.plane(bodies.centre)
+    radii, corners = bodies.rounding * magnification, bodies.corners
+    light, spots = (canvas.mixed(shade, *other) for other in (("#ffffff", 0.35), (canvas.PANEL, 0.6)))
+    for k in np.flatnonzero(bodies.faceless).tolist():
+        ends, _, _ = projection.plane(bodies.centre[k] + corners[k])
+        yield k, rounded(ends, radii[k], 40), shade[k], canvas.BACKGROUND
+        if radii[k] * sheet.points > OUTLINED:
+            toward = projection.camera - bodies.centre[k]
+            for spot in _spots(bodies.axes[k], toward / np.linalg.norm(toward)):
+                yield k, projection.plane(bodies.centre[k] + bodies.rounding[k] * spot)[0], spots[k], spots[k]
+        yield k, rounded(ends, 0.35 * radii[k], 40) + radii[k] * np.array((-0.3, 0.33)), light[k], light[k]
+
+
+def _spots(axes: Floats, toward: Floats) -> Iterator[Floats]:
+    """On a unit ball, what the camera sees of a circle about either end of each axis; none about axes that are NaN."""
+    for k, size in enumerate(SPOTS):
+        rim = np.cos(ANGLES)[:, None] * axes[:, k - 1] + np.sin(ANGLES)[:, None] * axes[:, k - 2]
+        for middle in (axes[:, k], -axes[:, k]):
+            circle = np.cos(size) * middle + np.sin(size) * rim
+            ahead = circle @ toward
+            if (ahead > 0.0).any():
+                level = circle - ahead[:, None] * toward  # what is hidden is drawn at the edge
+                level /= np.linalg.norm(level, axis=1, keepdims=True)
+                yield np.where(ahead[:, None] > 0.0, circle, level)
+
+
+def _seen_rings(shapes: Shapes, projection: Projection) -> tuple[Floats, NDArray[np.int64], Floats]:
+    """Of the faces that look at the camera the corners around them in the world, (f, k, 3), the rows of their shapes,
+    (f,), and vectors along their normals, (f, 3)."""
+    solids = zip(shapes.centre, shapes.corners, shapes.faces, strict=True)
+    found = [ring for centre, corners, faces in solids for ring in centre + corners[faces]]
+    most = max(map(len, found), default=3)
+    rings = padded(found, most).reshape(-1, most, 3)
+    owner = np.repeat(np.arange(len(shapes.faces)), [len(faces) for faces in shapes.faces])
+    normals = np.cross(rings, np.roll(rings, -1, axis=1)).sum(axis=1)
+    seen = ((projection.camera - rings[:, 0]) * normals).sum(axis=1) > 0.0
+    return rings[seen], owner[seen], normals[seen]
 
 
 def draw_contacts(sheet: Sheet, points: Floats, normals: Floats, diameter: float, projection: Projection) -> bool:
@@ -160,12 +206,12 @@ def _draw_flat(sheet: Sheet, shapes: Shapes, colours: Floats, edge: str, outline
 
 def _draw_hands(sheet: Sheet, discs: Shapes, opacity: Floats, zorder: float) -> None:
     """A line from the centre to the rim of each that spins, to see how far it has turned."""
-    spins = np.isfinite(discs.hand).all(axis=1) & (2 * discs.rounding * sheet.points > OUTLINED)
+    spins = np.isfinite(discs.axes).all(axis=(1, 2)) & (2 * discs.rounding * sheet.points > OUTLINED)
     if spins.any():
         some = discs.where(spins)
-        colours = to_rgba_array(np.full(len(some.hand), canvas.PANEL), opacity[spins])
+        colours = to_rgba_array(np.full(len(some.entity), canvas.PANEL), opacity[spins])
         widths = np.clip(0.14 * some.rounding * sheet.points, 0.8, 3.0)
-        hands = list(np.stack([some.centre, some.centre + some.hand], axis=1))
+        hands = list(np.stack([some.centre, some.centre + some.rounding[:, None] * some.axes[:, :, 0]], axis=1))
         _lines(sheet, hands, colors=colours, linewidths=widths, capstyle="butt", zorder=zorder)
 
 

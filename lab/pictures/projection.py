@@ -68,6 +68,20 @@ class Projection:
         places, _, _ = self.plane(corners(self.lower, self.upper))
         return places.min(axis=0), places.max(axis=0)
 
+    def clipped(self, ring: Floats) -> Floats:
+        """The part of a flat convex polygon (m, 3) that is in the view; it may be empty."""
+        for axis in range(3):
+            for sign, end in ((-1.0, self.lower[axis]), (1.0, self.upper[axis])):
+                over = sign * (ring[:, axis] - end)
+                if not (over > 0.0).any():
+                    continue
+                after, further = np.roll(ring, -1, axis=0), np.roll(over, -1)
+                crosses = (over > 0.0) != (further > 0.0)
+                share = np.divide(over, over - further, out=np.zeros_like(over), where=crosses)
+                both = np.stack([ring, ring + share[:, None] * (after - ring)], axis=1)
+                ring = both[np.stack([over <= 0.0, crosses], axis=1)]
+        return ring
+
     def _relative(self, points: Floats) -> Floats:
         return (points - (self.lower + self.upper) / 2) @ self.axes.T
 
@@ -77,18 +91,3 @@ def corners(lower: Floats, upper: Floats) -> Floats:
     d = len(lower)
     bits = (np.arange(2**d)[:, None] >> np.arange(d)) & 1
     return np.where(bits, upper, lower)
-
-
-def edges() -> list[tuple[int, int]]:
-    """The twelve edges of a box, as pairs of rows of :func:`corners`."""
-    return [(a, a | 1 << axis) for a in range(8) for axis in range(3) if not a >> axis & 1]
-
-
-def faces() -> list[tuple[int, float, list[int]]]:
-    """The six faces of a box: axis, direction (-1 or 1) of the normal, rows of :func:`corners` around it."""
-    found = []
-    for axis in range(3):
-        u, v = 1 << (axis + 1) % 3, 1 << (axis + 2) % 3
-        for direction, base in ((-1.0, 0), (1.0, 1 << axis)):
-            found.append((axis, direction, [base, base | u, base | u | v, base | v]))
-    return found

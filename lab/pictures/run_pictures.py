@@ -10,8 +10,11 @@ import numpy as np
 from matplotlib.colors import to_rgba_array
 
 from ...components.part_of import PartOf
+from ...framework import World
 from ...plugins.joints import Joints
-from ..measure.body_shapes import QUIET, Floats, Shapes, shapes_of
+from ...systems.shapes.rotation import axes_of
+from ..measure.body_shapes import QUIET, Floats, Shapes, dimensions_of, shapes_of
+from ..measure.outlines import SOLIDS
 from ..measure.paths import Traces
 from ..measure.run import Run
 from ..reporting.text import counted
@@ -42,20 +45,25 @@ class Still:
     def of(cls, run: Run) -> Still:
         """The final state of ``run``."""
         world, d = run.world, run.report.dimensions
-        shapes = shapes_of(world)
+        shapes = shapes_of(world, SOLIDS)
         ids = np.asarray(world.bodies.entity)
         order = np.argsort(ids, kind="stable")
         row = order[np.minimum(np.searchsorted(ids, shapes.entity, sorter=order), max(len(ids) - 1, 0))]
         velocity = np.asarray(world.bodies.linear_velocity)[row] if len(ids) else np.zeros((0, d))
         contacts = world.contacts
         points, normals = (np.array(c, float).reshape(-1, d) for c in (contacts.point, contacts.normal))
-        ends = [np.stack(one.anchors(), axis=1) for one in world.plugins if isinstance(one, Joints)]
-        return cls(shapes, velocity, points, normals, np.concatenate([np.zeros((0, 2, d)), *ends]))
+        return cls(shapes, velocity, points, normals, joints_of(world))
 
     @property
     def moving(self) -> np.ndarray:
         """True for shapes that can be drawn as bodies."""
         return ~self.shapes.static & (np.abs(self.shapes.centre) < DRAWABLE).all(axis=1)
+
+
+def joints_of(world: World) -> Floats:
+    """Both ends of the joints, (k, 2, d)."""
+    ends = [np.stack(one.anchors(), axis=1) for one in world.plugins if isinstance(one, Joints)]
+    return np.concatenate([np.zeros((0, 2, dimensions_of(world))), *ends])
 
 
 @QUIET
@@ -177,7 +185,8 @@ def _draw_ghosts(sheet: Sheet, traces: Traces, followed: Shapes, colours: Floats
     for row, entity in enumerate(followed.entity):
         body = np.searchsorted(traces.entities, entity)
         shown = when[np.isfinite(positions[when, body]).all(axis=1)]
-        places, turns = positions[shown, body], traces.angles[shown, body] - traces.angles[-1, body]
+        axes = axes_of(traces.rotations[:, body].astype(float), positions.shape[2])
+        places, turns = positions[shown, body], axes[shown] @ axes[-1].T
         repeated = np.tile(colours[row], (len(places), 1))
         repeated[:, 3] = np.linspace(0.12, 0.4, len(places))
         draw_bodies(sheet, followed.where(np.array([row])).at(places, turns), repeated, projection, zorder=2.7)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from helpers_cli import refusal, report_of
 from helpers_processes import run_python
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from PIL import Image
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
@@ -19,9 +19,12 @@ from carom.lab.measure.body_shapes import overlaps_of, shapes_of, sizes_of
 from carom.lab.measure.run import FEW_BODIES, FEW_STEPS, run
 from carom.lab.pictures.projection import Projection
 from carom.lab.pictures.run_pictures import GHOSTS, Still, draw_final, draw_traces
-from carom.plugins import Physics, capsule, convex_polygon
+from carom.plugins import Physics, capsule, convex_hull, convex_polygon
 from carom.plugins.capsule import CapsuleCollider
+from carom.plugins.convex_hull import ConvexHullCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider
+from carom.plugins.joints import Distance, Joints
+from carom.plugins.parts import PartOf, Parts
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 carom, ball = helpers_cli.carom, helpers_cli.ball  # fixtures
@@ -188,10 +191,14 @@ def colours_of(sheet):
     return colour_at
 
 
-def final_picture(world, steps, lower, upper):
+def final_sheet(world, steps, lower, upper):
     done = run(world, steps)
     projection = Projection.of(np.asarray(lower, float), np.asarray(upper, float))
-    return colours_of(draw_final(done, Still.of(done), projection, projection.frame()))
+    return draw_final(done, Still.of(done), projection, projection.frame()), projection
+
+
+def final_picture(world, steps, lower, upper):
+    return colours_of(final_sheet(world, steps, lower, upper)[0])
 
 
 def test_the_mark_of_a_ball_turns_with_it():
@@ -254,6 +261,87 @@ def test_the_repeated_shapes_of_a_path_are_turned_as_they_were():
     for centre, rim in rims:
         turned = centre[0]
         np.testing.assert_allclose(rim, (turned + np.cos(turned), -np.sin(turned)), rtol=0, atol=1e-5)
+
+
+# -- in space ------------------------------------------------------------------------------------------------------
+
+LOWER, UPPER = np.array((-12.0, -9.0, -12.0)), np.array((12.0, 9.0, 12.0))
+RIGHT, UP, TOWARD = Projection.of(LOWER, UPPER).axes
+
+
+def facing(angle):
+    """The quaternion of a body whose z axis points towards the camera, turned by that angle in the picture."""
+    along = np.cos(angle) * RIGHT + np.sin(angle) * UP
+    turn = np.stack([along, np.cross(TOWARD, along), TOWARD], axis=1)
+    w = np.sqrt(1 + np.trace(turn)) / 2
+    return w, *((turn[k - 1, k - 2] - turn[k - 2, k - 1]) / (4 * w) for k in (0, 1, 2))
+
+
+def spatial_picture(world, steps):
+    sheet, projection = final_sheet(world, steps, LOWER, UPPER)
+    colour_at = colours_of(sheet)
+    return lambda place: colour_at(projection.plane(np.asarray(place, float))[0])
+
+
+def test_what_is_turned_in_space_is_drawn_so():
+    """A box, a capsule and a hull of 4 by 0.6, turned by 60 degrees about the way to the camera."""
+    corners = [(x, y, z) for x in (-2, 2) for y in (-0.3, 0.3) for z in (-0.3, 0.3)]
+    shapes = {-8: BoxCollider((2, 0.3, 0.3)), 0: CapsuleCollider(0.3, 1.7), 8: ConvexHullCollider(corners)}
+    plugins = capsule.plugin, convex_hull.plugin
+    with World(Physics(dimensions=3, gravity=(0.0, 0.0, 0.0)), Rotation(), *plugins) as world:
+        for x, shape in shapes.items():
+            upright = np.pi / 2 if isinstance(shape, CapsuleCollider) else 0.0
+            turned = Transform(x * RIGHT, rotation=facing(np.pi / 3 - upright))
+            world.create_entity(turned, RigidBody(kind="kinematic"), shape)
+        colour_at = spatial_picture(world, 0)
+    background = colour_at(-8 * UP)
+    along = 0.5 * RIGHT + np.sqrt(0.75) * UP
+    across = np.cross(TOWARD, along)
+    for x in shapes:
+        for way in (0 * along, 1.8 * along, -1.8 * along, 0.2 * across):
+            assert np.abs(colour_at(x * RIGHT + way) - background).max() > 20
+        for way in (2.4 * along, -2.4 * along, 0.6 * across, -0.6 * across, 1.8 * RIGHT):
+            np.testing.assert_array_equal(colour_at(x * RIGHT + way), background)
+
+
+def test_the_spots_of_a_ball_in_space_turn_with_it():
+    """Near the rim there are those at both ends of its x axis, 0.6 rad in radius; a ball without a Spin has none."""
+    with World(Physics(dimensions=3, gravity=(0.0, 0.0, 0.0)), Rotation()) as world:
+        world.create_entity(Transform(-4 * RIGHT, rotation=facing(1.0)), RigidBody(), Spin(), SphereCollider(3))
+        world.create_entity(Transform(4 * RIGHT), RigidBody(), SphereCollider(3))
+        colour_at = spatial_picture(world, 0)
+    plain = colour_at(4 * RIGHT - 2.0 * UP)
+    edge = np.cos(0.6) / 0.9  # of the spots, as the cosine of the angle there
+    for angle in np.linspace(0, 2 * np.pi, 60, endpoint=False):
+        direction = np.cos(angle + 1.0) * RIGHT + np.sin(angle + 1.0) * UP
+        np.testing.assert_array_equal(colour_at(4 * RIGHT + 2.7 * direction), plain)
+        marked = np.abs(colour_at(-4 * RIGHT + 2.7 * direction) - plain).max() > 50
+        if abs(abs(np.cos(angle)) - edge) > 0.03:
+            assert marked == (abs(np.cos(angle)) > edge)
+
+
+def test_ropes_and_parts_in_space_are_drawn_and_a_wide_floor_ends_with_the_view():
+    with World(Physics(dimensions=3, gravity=(0.0, 0.0, 0.0)), Rotation(), Joints(), Parts()) as world:
+        world.create_entity(Transform((0, -5, 0)), BoxCollider((1e4, 1, 1e4)))
+        ball = world.create_entity(Transform((2, 1, 3)), RigidBody(), SphereCollider(0.5))
+        world.create_entity(Distance(None, ball, anchor_a=(0, 6, 0)))
+        holder = world.create_entity(Transform(5 * UP, rotation=facing(np.pi / 3)), RigidBody(kind="kinematic"))
+        world.create_entity(PartOf(holder, (4, 0, 0)), BoxCollider((0.4, 0.4, 0.4)))
+        sheet, projection = final_sheet(world, 1, LOWER, UPPER)
+    polygons, ropes = [], []
+    for part in sheet.axes.collections:
+        if isinstance(part, LineCollection):
+            ropes += part.get_segments()
+        elif isinstance(part, PolyCollection):
+            polygons += [path.vertices for path in part.get_paths()]
+    ends = projection.plane(np.array([(0, 6, 0), (2, 1, 3)]))[0]
+    assert any(np.allclose(rope, ends) for rope in ropes)
+    centre = projection.plane(5 * UP + 4 * (0.5 * RIGHT + np.sqrt(0.75) * UP))[0]
+    assert any(np.linalg.norm(polygon.mean(axis=0) - centre) < 0.3 for polygon in polygons)
+    seen = projection.plane(np.array([(x, -4, z) for x in (-12, 12) for z in (-12, 12)]))[0]
+    assert any(np.allclose(np.ptp(polygon, axis=0), np.ptp(seen, axis=0)) for polygon in polygons)
+    lower, upper = projection.frame()
+    assert all((polygon > lower - 1e-9).all() and (polygon < upper + 1e-9).all() for polygon in polygons)
 
 
 def test_overlaps_of_what_turns_are_those_of_their_projections():
