@@ -13,6 +13,7 @@ from ..framework.data.table import KINDS
 from ..framework.typing import Vector, VectorField
 
 FASTEST = 1e307  # m/s along each axis: differences of two such velocities, and their lengths, are finite
+OF_A_SPIN = ("angular_velocity", "inertia", "angular_damping", "max_angular_speed", "rolling_friction", "torque")
 Kind = Literal["dynamic", "kinematic", "static"]
 # Arguments, checked like fields.
 FORCE = Column(item="vector", owner="RigidBody", name="apply_force")
@@ -89,6 +90,12 @@ class RigidBody(Component, flat=True):
     applied_force: VectorField = special_column(default=0.0, item="vector", on_demand=True, init=False)
     applied_frame: int = special_column(default=-1, dtype=int, on_demand=True, init=False, on_write=force_applied)
     step_force: VectorField = special_column(default=0.0, item="vector", on_demand=True, init=False)
+
+    @classmethod
+    def _unknown(cls, name: str) -> TypeError:
+        if name not in OF_A_SPIN:
+            return super()._unknown(name)
+        return TypeError(f"RigidBody has no field {name!r}: that of a Spin turns bodies, from carom.plugins.rotation")
 
     @property
     def asleep(self) -> bool:

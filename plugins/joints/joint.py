@@ -138,11 +138,13 @@ class Joint(Component, abstract=True):
         """ValueError for fields that do not go together."""
 
     def fit(self, dimensions: int, entity: int | None = None) -> None:
-        super().fit(dimensions, entity)
-        self._entity = self._entity if entity is None else entity  # for messages
         name = f"{'' if entity is None else f'entity {entity}: '}{type(self).__name__}"
         if dimensions not in self.dimensions:
             raise ValueError(f"{name} is no joint of worlds of {dimensions} dimensions")
+        if dimensions == 2 and "axis" in self.columns and np.any(self.axis):
+            raise ValueError(f"{name}.axis is for 3D worlds, leave it out, got {np.asarray(self.axis).tolist()}")
+        super().fit(dimensions, entity)
+        self._entity = self._entity if entity is None else entity  # for messages
         if dimensions == 3 and "axis" in self.columns and not np.any(np.abs(self.axis) > LEAST):
             raise ValueError(f"{name} needs an axis in a world of 3 dimensions, got {np.asarray(self.axis).tolist()}")
 

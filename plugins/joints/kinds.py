@@ -268,7 +268,7 @@ class Motor(Joint):
 
     def check(self) -> None:
         if (self.speed is None) == (self.angle is None):
-            raise ValueError("Motor takes a speed or an angle, and not both")
+            raise ValueError(f"Motor takes a speed or an angle, got {'neither' if self.angle is None else 'both'}")
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, b.position)

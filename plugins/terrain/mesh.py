@@ -67,6 +67,8 @@ def create_height_field(
     cell
         m, the distance of neighbouring points
     """
+    if world.dimensions != 3:
+        raise ValueError(f"create_height_field: a mesh is for 3D worlds, this world is {world.dimensions}D")
     size = FIELD_CELL.checked(cell)
     try:
         levels = np.asarray(heights, float)

@@ -41,7 +41,7 @@ def in_order(registry: Registry, colliders: Iterable[type[Component]]) -> list[t
                 name = shipped.partition(".")[0]
                 whole = hasattr(import_module(f"carom.plugins.{name}"), "plugin")
                 cure = f"World(Physics(...), {f'{name}.plugin' if whole else f'{name.capitalize()}()'}), "
-                cure += "with carom.plugins" if whole else f"from carom.plugins.{name}"
+                cure += f"from carom.plugins import {name}" if whole else f"from carom.plugins.{name}"
             raise UnhandledPairError(
                 f"{collider.__name__} is a collider that no plugin of this world has registered: {cure}"
             )

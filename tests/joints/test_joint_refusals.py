@@ -30,8 +30,8 @@ from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Motor, Mou
         (lambda: Weld(1, 2, anchor=(0, 0), breaking_force=0.0), "positive"),
         (lambda: Slider(1, 2, direction=(0, 0)), "not be 0"),
         (lambda: Slider(1, 2, direction=(0, 1e-200)), "not be 0"),
-        (lambda: Motor(1, 2), "speed or an angle"),
-        (lambda: Motor(1, 2, speed=1.0, angle=1.0), "speed or an angle"),
+        (lambda: Motor(1, 2), "speed or an angle, got neither"),
+        (lambda: Motor(1, 2, speed=1.0, angle=1.0), "speed or an angle, got both"),
     ],
 )
 def test_what_no_joint_can_be_is_refused_at_the_call(make, message):
@@ -90,6 +90,7 @@ def test_what_no_world_can_have_is_refused_at_the_call(add):
         (Weld(lift, wall, anchor=(0, 0)), "no dynamic body"),
         (Cone(moving[1], moving[0], anchor=(0, 0), axis=(0, 1)), "2 dimensions"),
         (Hinge(moving[1], moving[0], anchor=(0, 0, 1)), "must have 2 components"),
+        (Hinge(moving[1], moving[0], anchor=(0, 0), axis=(0, 0, 1)), "axis is for 3D worlds"),
     ):
         with pytest.raises(ValueError, match=message) as error:
             world.add_component(empty, joint) if add else world.create_entity(joint)

@@ -215,6 +215,6 @@ def test_bad_heights_are_refused():
         create_height_field(world, np.zeros((2, 2)), 0.0)
     world.close()
     world = World(Physics(dimensions=2), terrain.plugin)
-    with pytest.raises(ValueError, match="create_triangle_mesh: a mesh is for 3D worlds, this world is 2D"):
+    with pytest.raises(ValueError, match="create_height_field: a mesh is for 3D worlds, this world is 2D"):
         create_height_field(world, np.zeros((2, 2)), 1.0)
     world.close()

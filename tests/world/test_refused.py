@@ -87,6 +87,7 @@ REFUSED = {
     "annotated value": (annotated_value, TypeError, "Health.hp = 10 is no column"),
     "default": (default_of_another_shape, ValueError, "Health.hp must be one scalar"),
     "no physics": (body_without_physics, NoPhysicsError, "entity 1 has RigidBody"),
+    "turning": (lambda: RigidBody(angular_velocity=1), TypeError, "that of a Spin turns bodies"),
     "sphere": (lambda: SphereCollider(1, bounce=1), TypeError, "did you mean 'restitution'"),
     "many": (lambda: SphereCollider.many(1, bounce=1), TypeError, "did you mean 'restitution'"),
     "capsule": (lambda: CapsuleCollider(1, 1, bounciness=1), TypeError, "did you mean 'restitution'"),
