@@ -13,6 +13,7 @@ from . import codes, records
 from .broad_phase.search import CandidateSearch
 from .broad_phase.static_grid import reserve_static_grid
 from .broad_phase.uniform_grid import reserve_grid
+from .impacts import records as impact_records
 from .scene import Scene
 
 COLOURS = 64
@@ -96,16 +97,16 @@ class Room:
         old = len(impacts.heap)
         if state.needed > old:
             size = with_spare(state.needed)
-            impacts.reserve(size, *records.EVENTS, keep=old)
+            impacts.reserve(size, *impact_records.EVENTS, keep=old)
             impacts.heap[old:size] = np.arange(old, size)
         if impacts.logged + impacts.together >= len(impacts.log_pair):
-            impacts.reserve(with_spare(impacts.logged + impacts.together), *records.LOG, keep=impacts.logged)
+            impacts.reserve(with_spare(impacts.logged + impacts.together), *impact_records.LOG, keep=impacts.logged)
         if impacts.together > len(impacts.member):
             rows = with_spare(impacts.together)
-            impacts.reserve(rows, "member", *records.MEMBERS)
+            impacts.reserve(rows, "member", *impact_records.MEMBERS)
             impacts.reserve(2 * rows, "next_member")
         if impacts.together > 0 and len(impacts.first_member) < state.count:
-            impacts.reserve(self._scene.table.capacity, *records.BODIES_OF_MEMBERS)
+            impacts.reserve(self._scene.table.capacity, *impact_records.BODIES_OF_MEMBERS)
         impacts.together = 0
         impacts.linked = False
 

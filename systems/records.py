@@ -16,6 +16,7 @@ from ..framework.schedule.stages import PROGRAM_FIELDS
 from .broad_phase.records import GRID
 from .compounds.records import COMPOUNDS, PARTS
 from .contacts.solving.records import ARMS, SOLVER, TURNS, WARM_START
+from .impacts.records import IMPACTS
 
 
 def default_of(field: Any) -> Any:
@@ -253,79 +254,6 @@ PAIR_COLUMNS = Section(
     place=ints("int32"),  # while two lists are merged
 )  # fmt: skip
 PAIRS = Schema("Pairs", PAIR_COLUMNS, count=integer())
-
-BOUNCED = "bodies have bounced"
-EVENTS = Section(
-    "impact", "impacts", BOUNCED,
-    event_pair=ints("int32"),
-    event_count_a=ints(),  # impact_count of both bodies when the event was made
-    event_count_b=ints(),
-    event_kind=ints("int8"),
-    event_time=floats(),
-    event_key=ints(),
-    event_change=floats(),  # of the speed along the normal
-    event_normal=vectors(),
-    event_point=vectors(),
-    event_pull=vectors(),  # change of velocity along the surface
-    heap=ints("int32"),
-    worklist=ints("int32"),  # pairs to search for their next impact,
-    listed_since=floats(),  # each from this time on
-    links=ints("int32"),  # to a body's next pair
-)  # fmt: skip
-HEADS = Section("impact", "impacts", BOUNCED, heads=ints("int32"))  # the first pair of each body
-# Impacts at the same time: the events, by member; lists of the members of each body.
-MEMBER_LISTS = Section("impact", "impacts", BOUNCED, member=ints("int32"), next_member=ints("int32"))
-MEMBERS = Section(
-    "impact", "impacts", BOUNCED,
-    group=ints("int32"),
-    is_left=flags(),
-    share=floats(),  # impulses along the normals, N s
-    before=floats(),
-    ahead=floats(),
-    weight=floats(),
-    terms=floats(),
-    friction_impulse=vectors(),  # impulses along the surfaces
-)  # fmt: skip
-BODIES_OF_MEMBERS = Section(
-    "impact", "impacts", BOUNCED,
-    first_member=ints("int32"),
-    gained=vectors(),  # change of velocity
-)  # fmt: skip
-LOG = Section(
-    "impact", "impacts", BOUNCED,
-    log_pair=ints("int32"),
-    log_time=floats(),
-    log_impulse=floats(),
-    log_normal=vectors(),
-    log_point=vectors(),
-)  # fmt: skip
-IMPACTS = Schema(
-    "Impacts", EVENTS, HEADS, MEMBER_LISTS, MEMBERS, BODIES_OF_MEMBERS, LOG,
-    active=flag(),  # something may bounce in this step
-    sweeps=flag(),  # bodies are swept
-    waiting=integer(),
-    # the loop
-    listed=integer(),  # pairs in the worklist
-    linked=flag(),  # ``heads`` and ``links`` are those of the pairs
-    swept_version=integer(),  # of the rows, when the impacts of static bodies were set to none
-    may_sink=flag(),  # through something thin, at the speed of contacts at rest
-    pending=integer(),  # the event that waits for room or code, off the queue; -1: none
-    touchdown_pair=integer(),  # the last one of whose bodies landings were searched
-    touchdown_time=number(),  # the time of its impact while they are searched, else 0
-    now=number(),
-    until=number(),
-    # impacts at the same time
-    together=integer(),  # for how many there must be room
-    group_visits=integer(),  # impacts in all passes over groups of this step
-    # what has happened in this step
-    logged=integer(),
-    capped=integer(),  # impacts beyond the cap,
-    capped_row=integer(),  # and the body of the first of them
-    looked=integer(),  # pairs searched for their next impact in this step
-    rounds=integer(),  # of pairs for what is left of the step
-    halted=integer(),  # bodies that were stopped because these were too many,
-    halted_row=integer(),  # and the first of them
-)  # fmt: skip
 
 # Contacts at the end of the step and of the one before: [now, i] and [1 - now, i].
 CONTACTS = Schema(

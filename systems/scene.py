@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..components import AABBCollider, Collider
+from ..components import AABBCollider, Collider, RigidBody, Transform
 from ..components.spin import Spin
 from ..framework.data.row_moves import MovedColumns, RowPlan
 from ..framework.data.table import FEW, Table
@@ -382,3 +382,18 @@ class Scene:
 def any_rotated(rotation: np.ndarray) -> bool:
     """Whether any angle is not 0, in 3D any quaternion has a part beside the first."""
     return bool(rotation.any() if rotation.ndim == 1 else rotation[:, 1:].any())
+
+
+def make_table(dimensions: int) -> Table:
+    """The table of a world's bodies, with the columns that no component has. Those of sleep move with the rows; none of
+    them has an array before something sleeps."""
+    table = Table(dimensions)
+    for component in (Transform, RigidBody):
+        table.add_component_type(component)
+    table.add_array("previous_position", "vector")
+    table.add_array("force", "vector", on_demand=True)
+    table.add_array("torque", "angular", on_demand=True)
+    table.add_array("inverse_mass")
+    for name, column in SLEEP_COLUMNS.fields.items():
+        table.add_array(f"_{name}", column.item, dtype=column.dtype, on_demand=True)
+    return table

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..components import RigidBody, Transform
+from ..components import Transform
 from ..framework.data.adoption import Adoption
 from ..framework.data.bodies import Bodies
 from ..framework.data.column_copies import ColumnCopies
 from ..framework.data.esper_bridge import Membership
-from ..framework.data.table import Table
 from ..framework.jit.records.record import Record, make_record
 from ..framework.jit.records.schema import Schema
 from ..framework.schedule.phases import System
@@ -41,12 +40,12 @@ from .quarantine.quarantine import Quarantine
 from .queries.system import Queries
 from .record_buffers import Room
 from .records import STATE
-from .scene import Scene
+from .scene import Scene, make_table
 from .settings import check_settings, gravity_vector, write_settings
 from .shapes.attribution import ErrorAttribution
 from .shapes.geometry_levels import LevelCheck, check_sensors
 from .shapes.pair_coverage import check_pairs
-from .sleeping.sleepers import Sleepers, add_columns
+from .sleeping.sleepers import Sleepers
 from .stage_list import CLOSING, KEPT, OPENING, STAGES, SYSTEM_OF_STAGE
 from .tracking import CONTACTS, WARM_START, put_joints_back, put_rows_back, saved_rows
 
@@ -63,7 +62,7 @@ class Simulation:
     def __init__(self, world: World, dimensions: int, gravity: Any) -> None:
         self._world, self.dimensions = world, dimensions
         self.state = make_record(STATE, dimensions)
-        self.table = _make_table(dimensions)
+        self.table = make_table(dimensions)
         self.table.clock = world.clock
         self.table.forces_are_summed = lambda: self.state.forces_summed
         self.set_gravity(gravity)
@@ -446,15 +445,3 @@ class Simulation:
 
     def _membership(self) -> Membership:
         return Membership(self._world._contents())
-
-
-def _make_table(dimensions: int) -> Table:
-    table = Table(dimensions)
-    for component in (Transform, RigidBody):
-        table.add_component_type(component)
-    table.add_array("previous_position", "vector")
-    table.add_array("force", "vector", on_demand=True)
-    table.add_array("torque", "angular", on_demand=True)
-    table.add_array("inverse_mass")
-    add_columns(table)
-    return table

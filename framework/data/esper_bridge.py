@@ -12,7 +12,8 @@ import esper
 import numpy as np
 
 from .change_log import ChangeLog, Stores
-from .entities import Counter, Entities, WatchedComponents, among
+from .entities import Entities, among
+from .members import Counter, WatchedComponents
 
 _NONE: dict[type[Any], Any] = {}
 _NAMES = (

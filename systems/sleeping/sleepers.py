@@ -17,17 +17,12 @@ from ..scene import ZERO_WHERE_STATIC, Scene
 from ..tracking import CONTACTS as CONTACT_NUMBERS
 from ..tracking import WARM_START, put_rows_back, saved_rows
 from .lent_columns import LentColumns
+from .links import links_with_falling
 from .stages import AWAKE, DISTURBED, FALLING, STILL
 from .stored import CONTACTS, IMPULSES, Stored
 
 PUSHES = ("applied_force", "applied_frame", "step_force")
 PATH = ("origin", "path_velocity", "path_second", "path_third")
-
-
-def add_columns(table: Table) -> None:
-    """The columns that move with the rows; none of them has an array before something sleeps."""
-    for name, column in SLEEP_COLUMNS.fields.items():
-        table.add_array(f"_{name}", column.item, dtype=column.dtype, on_demand=True)
 
 
 class Sleepers:
@@ -112,7 +107,7 @@ class Sleepers:
             self._all_wake, state.due = True, 0
         elif self._words[self._due]:
             self._followed = self._structure()
-            self._note_links()
+            self.links = links_with_falling(state, self.links)
         if state.due or (state.first == 0 and (state.asleep or table.blocks[0])):
             table.settle(self._still()[: table.stops[0]] == STILL)
             self._followed = self._structure()
@@ -191,22 +186,6 @@ class Sleepers:
         bodies.still[moving : table.count] = STILL
         state.due = state.fresh_statics = 0
         self._exchange()
-
-    def _note_links(self) -> None:
-        state, bodies = self._state, self._state.bodies
-        pairs, joints, dynamic = state.pairs, state.solver.joints, state.dynamic
-        near = pairs.near_contact[: pairs.count] & pairs.is_solid[: pairs.count]
-        held = joints.order[: joints.active]
-        a = np.concatenate((pairs.a[: pairs.count][near], joints.row_a[held]))
-        b = np.concatenate((pairs.b[: pairs.count][near], joints.row_b[held]))
-        fixed, body = np.maximum(a, b), np.minimum(a, b)
-        some = (fixed >= dynamic) & (body >= 0) & (body < dynamic)
-        fixed, body = fixed[some], body[some]
-        due = bodies.still[body] == FALLING
-        found = np.stack((bodies.entity[fixed[due]], bodies.island[body[due]]), axis=1)
-        links = np.concatenate((self.links, found))
-        links = links[np.lexsort((links[:, 1], links[:, 0]))]
-        self.links = links[np.append(True, (links[1:] != links[:-1]).any(axis=1))[: len(links)]]
 
     # -- waking -----------------------------------------------------------------------------------
 
