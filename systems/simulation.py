@@ -103,8 +103,10 @@ class Simulation:
         )
         self.forces = ForceAccumulation(self.program, self.state, self.table, self.bodies, self.quarantine.tell)
         self.table.writable_while = {
-            "force": lambda: self.state.forces_summed or not world.has_system(self.forces),
-            "torque": lambda: self.forces.adding,
+            "force": lambda: (
+                self.table.adding_forces or self.state.forces_summed or not world.has_system(self.forces)
+            ),
+            "torque": lambda: self.table.adding_forces,
         }
         self.integration = Integration(self.program, self.scene, self.forces, world.registry, lambda: world.settings)
         self.broad_phase = BroadPhase(self.program, self.search)

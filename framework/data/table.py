@@ -51,6 +51,7 @@ class Table(TableColumns):
         self.on_arrays_changed: Callable[[], None] = lambda: None  # called when a row has got another array
         self.on_changed_inside: Callable[[Any, int, int, np.ndarray], None] = lambda *_: None  # see changed_inside
         self.forces_are_summed: Callable[[], bool] = lambda: False  # whether ``force`` holds the sum of this step
+        self.adding_forces = False  # force systems do at the moment
         self.frames_applied = False  # whether a force was applied from outside since the last window
         self._plan, self._columns, self._bound_columns = RowPlan(), MovedColumns(), -1
         self.add_array("entity", dtype=np.int64)

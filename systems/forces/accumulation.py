@@ -48,7 +48,6 @@ class ForceAccumulation(StagedSystem):
     ) -> None:
         super().__init__(program)
         self._state, self._table, self._bodies, self._tell = state, table, bodies, tell
-        self.adding = False  # while force systems do
         self.several_evaluations = False  # the integrator sums forces again within the step
         self.summed: np.ndarray | None = None  # a copy, while integrators with more stages need to compare
 
@@ -88,12 +87,12 @@ class ForceAccumulation(StagedSystem):
         torque = self._table.arrays.get("torque")
         if torque is not None:
             torque[...] = 0.0
-        self.adding = True
+        self._table.adding_forces = True
         try:
             for system in self.world.force_systems:
                 self._add(system, time)
         finally:
-            self.adding = False
+            self._table.adding_forces = False
 
         torque = self._table.arrays.get("torque")
         if torque is None or not torque.any():

@@ -131,7 +131,9 @@ def evaluate_forces(table: Table, bodies: Bodies, world: World) -> None:
     """
     if not world.force_systems:
         return
-    force = table.make("force").copy()
+    table.make("force")
+    kept = {name: table.arrays[name].copy() for name in ("force", "torque") if name in table.arrays}
+    table.adding_forces = True
     try:
         for system in world.force_systems:
             required = required_bodies(table, bodies, system)
@@ -141,4 +143,7 @@ def evaluate_forces(table: Table, bodies: Bodies, world: World) -> None:
             if not isinstance(required, SelectedBodies):
                 system.add_forces(SelectedBodies(table, np.arange(len(required))), world.time)
     finally:
-        table.arrays["force"][...] = force
+        table.adding_forces = False
+        for name in ("force", "torque"):
+            if name in table.arrays:
+                table.arrays[name][...] = kept.get(name, 0.0)
