@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from ...systems.shapes.rotation import axes_of
 from .outlines import BOX_FACES, NO_FACES, OUTLINES, SIGNS, depths, outlines_of
 
 Floats = NDArray[np.float64]
+NONE: Mapping[int, Collection[Any]] = {}
 QUIET = np.errstate(over="ignore", invalid="ignore")  # bodies out of range are reported without warnings
 
 
@@ -93,16 +94,16 @@ def dimensions_of(world: World) -> int:
 
 
 @QUIET
-def shapes_of(world: World, solids: Collection[Any] = ()) -> Shapes:
-    """All built-in colliders of ``world`` in its present state, in a plane capsules and polygons too, in space those of
-    ``solids``; a turned AABBCollider has the half extents of what encloses it."""
+def shapes_of(world: World, further: Mapping[int, Collection[Any]] = NONE) -> Shapes:
+    """All built-in colliders of ``world`` in its present state, in a plane capsules and polygons too, and ``further``
+    ones by the dimensions; a turned AABBCollider has the half extents of what encloses it."""
     bodies, d = world.bodies, dimensions_of(world)
     fixed = np.arange(len(bodies)) >= bodies.kinematic.rows.stop
     axes = axes_of(np.asarray(bodies.rotation), d)
     speeds = np.where(fixed, 0.0, np.linalg.norm(bodies.linear_velocity, axis=1))
     spins = bodies.has(Spin)
     parts: list[tuple[Any, ...]] = []
-    for collider in (SphereCollider, AABBCollider, *(OUTLINES if d == 2 else solids)):
+    for collider in (SphereCollider, AABBCollider, *(OUTLINES if d == 2 else ()), *further.get(d, ())):
         has = np.asarray(bodies.has(collider), bool)
         if not has.any():  # there may be no such columns
             continue

@@ -12,6 +12,8 @@ from ...framework import World
 from ...plugins.capsule import CapsuleCollider
 from ...plugins.convex_hull import ConvexHullCollider, around, faces_of
 from ...plugins.convex_polygon import ConvexPolygonCollider
+from ...plugins.half_space import HalfSpaceCollider
+from ...plugins.one_way_segment import OneWaySegmentCollider
 from ...plugins.rotation import BoxCollider
 from ...plugins.terrain.segment import ChainSegmentCollider
 from ...plugins.terrain.triangle import TerrainTriangleCollider
@@ -26,6 +28,7 @@ SIGNS = {  # by the dimensions: the corners of a box; in space bit k of a corner
 }
 NO_FACES = np.zeros((0, 3), np.int64)
 BOX_FACES = np.array([(0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)])
+FAR = 1e4  # m, how far half-spaces are drawn
 MOST_NUMBERS = 4_000_000  # in one array: more pairs are looked at by turns
 
 
@@ -82,17 +85,33 @@ def _triangle(triangle: Any) -> Outline:
     return Outline(corners, 0.0, float(np.ptp(corners, axis=0).max()), np.arange(3)[None])
 
 
+def _half_space(half_space: Any) -> Outline:
+    up = half_space.normal / np.linalg.norm(half_space.normal)
+    aside = np.array((up[1], -up[0]))
+    axes = [aside, up]
+    if len(up) == 3:
+        aside = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
+        aside /= np.linalg.norm(aside)
+        axes = [aside, up, np.cross(aside, up)]
+    corners = (SIGNS[len(up)] - np.eye(len(up))[1]) @ np.array(axes)
+    return Outline(FAR * corners, 0.0, 2 * FAR, BOX_FACES)
+
+
 OUTLINES = {
     BoxCollider: _box, CapsuleCollider: _capsule, ConvexPolygonCollider: _polygon, ChainSegmentCollider: _segment,
 }  # fmt: skip
-SOLIDS = {
-    BoxCollider: _box, CapsuleCollider: _capsule, ConvexHullCollider: _hull, TerrainTriangleCollider: _triangle,
+ONLY_DRAWN = {  # not measured; by the dimensions
+    2: {OneWaySegmentCollider: _segment, HalfSpaceCollider: _half_space},
+    3: {
+        BoxCollider: _box, CapsuleCollider: _capsule, ConvexHullCollider: _hull, HalfSpaceCollider: _half_space,
+        TerrainTriangleCollider: _triangle,
+    },
 }  # fmt: skip
 
 
 def outlines_of(world: World, collider: Any, entities: Rows) -> tuple[list[Floats], Floats, Floats, list[Rows]]:
     """The corners, the roundings, the sizes and the faces of that collider of each of the entities."""
-    outline = {**OUTLINES, **SOLIDS}[collider]
+    outline = {**OUTLINES, **ONLY_DRAWN[2], **ONLY_DRAWN[3]}[collider]
     found = [outline(world.component_for_entity(entity, collider)) for entity in entities.tolist()]
     corners, rounding, size, faces = zip(*found, strict=True)
     return list(corners), np.array(rounding), np.array(size), list(faces)

@@ -14,7 +14,7 @@ from ...framework import World
 from ...plugins.joints import Joints
 from ...systems.shapes.rotation import axes_of
 from ..measure.body_shapes import QUIET, Floats, Shapes, dimensions_of, shapes_of
-from ..measure.outlines import SOLIDS
+from ..measure.outlines import ONLY_DRAWN
 from ..measure.paths import Traces
 from ..measure.run import Run
 from ..reporting.text import counted
@@ -45,7 +45,7 @@ class Still:
     def of(cls, run: Run) -> Still:
         """The final state of ``run``."""
         world, d = run.world, run.report.dimensions
-        shapes = shapes_of(world, SOLIDS)
+        shapes = shapes_of(world, ONLY_DRAWN)
         ids = np.asarray(world.bodies.entity)
         order = np.argsort(ids, kind="stable")
         row = order[np.minimum(np.searchsorted(ids, shapes.entity, sorter=order), max(len(ids) - 1, 0))]

@@ -19,10 +19,11 @@ from carom.lab.measure.body_shapes import overlaps_of, shapes_of, sizes_of
 from carom.lab.measure.run import FEW_BODIES, FEW_STEPS, run
 from carom.lab.pictures.projection import Projection
 from carom.lab.pictures.run_pictures import GHOSTS, Still, draw_final, draw_traces
-from carom.plugins import Physics, capsule, convex_hull, convex_polygon
+from carom.plugins import Physics, capsule, convex_hull, convex_polygon, half_space
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_hull import ConvexHullCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider
+from carom.plugins.half_space import HalfSpaceCollider
 from carom.plugins.joints import Distance, Joints
 from carom.plugins.parts import PartOf, Parts
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
@@ -320,9 +321,10 @@ def test_the_spots_of_a_ball_in_space_turn_with_it():
             assert marked == (abs(np.cos(angle)) > edge)
 
 
-def test_ropes_and_parts_in_space_are_drawn_and_a_wide_floor_ends_with_the_view():
-    with World(Physics(dimensions=3, gravity=(0.0, 0.0, 0.0)), Rotation(), Joints(), Parts()) as world:
-        world.create_entity(Transform((0, -5, 0)), BoxCollider((1e4, 1, 1e4)))
+def test_ropes_and_parts_in_space_are_drawn_and_the_ground_ends_with_the_view():
+    plugins = Joints(), Parts(), half_space.plugin
+    with World(Physics(dimensions=3, gravity=(0.0, 0.0, 0.0)), Rotation(), *plugins) as world:
+        world.create_entity(Transform((0, -4, 0)), HalfSpaceCollider((0, 1, 0)))
         ball = world.create_entity(Transform((2, 1, 3)), RigidBody(), SphereCollider(0.5))
         world.create_entity(Distance(None, ball, anchor_a=(0, 6, 0)))
         holder = world.create_entity(Transform(5 * UP, rotation=facing(np.pi / 3)), RigidBody(kind="kinematic"))
