@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import functools
 from typing import Any, NamedTuple
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...framework import World
+from ...framework.data.arrays.column import ArrayColumn
 from ...plugins.capsule import CapsuleCollider
 from ...plugins.convex_hull import ConvexHullCollider, around, faces_of
 from ...plugins.convex_polygon import ConvexPolygonCollider
@@ -110,9 +112,15 @@ ONLY_DRAWN = {  # not measured; by the dimensions
 
 
 def outlines_of(world: World, collider: Any, entities: Rows) -> tuple[list[Floats], Floats, Floats, list[Rows]]:
-    """The corners, the roundings, the sizes and the faces of that collider of each of the entities."""
-    outline = {**OUTLINES, **ONLY_DRAWN[2], **ONLY_DRAWN[3]}[collider]
-    found = [outline(world.component_for_entity(entity, collider)) for entity in entities.tolist()]
+    """The corners, the roundings, the sizes and the faces of that collider of each of the entities, in the order of
+    the rows of ``world.bodies``."""
+    if any(isinstance(column, ArrayColumn) for column in collider.columns.values()):
+        rows: Any = (world.component_for_entity(entity, collider) for entity in entities.tolist())
+    else:  # without a handle for each: they may be the pieces of a terrain
+        columns, chosen = getattr(world.bodies, collider.prefix[:-1]), np.isin(world.bodies.entity, entities)
+        fields = [getattr(columns, name)[chosen] for name in collider.columns]
+        rows = map(collections.namedtuple("Row", collider.columns)._make, zip(*fields, strict=True))
+    found = map({**OUTLINES, **ONLY_DRAWN[2], **ONLY_DRAWN[3]}[collider], rows)
     corners, rounding, size, faces = zip(*found, strict=True)
     return list(corners), np.array(rounding), np.array(size), list(faces)
 
