@@ -13,7 +13,7 @@ from ...components import AABBCollider, SphereCollider
 from ...components.spin import Spin
 from ...framework import World
 from ...systems.shapes.rotation import axes_of
-from .outlines import BOX_FACES, NO_FACES, OUTLINES, SIGNS, depths, outlines_of
+from .outlines import FACES, NO_FACES, OUTLINES, SIGNS, depths, outlines_of
 
 Floats = NDArray[np.float64]
 NONE: Mapping[int, Collection[Any]] = {}
@@ -28,7 +28,7 @@ class Shapes:
     ``static (n,)`` true for static bodies, ``sensor (n,)`` true for sensors.
     ``outline (n,)``: of what turns its corners as they are turned, (m, d) about the centre, of others None;
     ``rounding (n,)``: how far it goes beyond these, of spheres the radius; ``size (n,)``: the smallest extent;
-    ``faces (n,)``: in space the rows of the corners of each face, see :class:`~.outlines.Outline`.
+    ``faces (n,)``: the rows of the corners of each face, see :class:`~.outlines.Outline`.
     ``axes (n, d, d)``: of a sphere that spins the axes of its body in its columns, of others NaN.
     """
 
@@ -60,7 +60,7 @@ class Shapes:
 
     @property
     def faceless(self) -> NDArray[np.bool_]:
-        """Which rows have no faces: balls and capsules."""
+        """Which rows have no faces: in space balls and capsules."""
         return np.array([len(faces) == 0 for faces in self.faces], bool)
 
     @property
@@ -116,11 +116,11 @@ def shapes_of(world: World, further: Mapping[int, Collection[Any]] = NONE) -> Sh
             marked[spins[has]] = turned[spins[has]]
         elif collider is AABBCollider:
             half = np.einsum("nij,nj->ni", np.abs(turned), columns.half_extents[has])
-            size, known = 2 * half.min(axis=1), [BOX_FACES] * count
+            size, known = 2 * half.min(axis=1), [FACES[d]] * count
         else:
             corners, rounding, size, known = outlines_of(world, collider, bodies.entity[has])
             for k in range(count):
-                outline[k] = corners[k] @ turned[k].T
+                outline[k] = corners[k] @ turned[k].T if collider.rotates else corners[k]
             half = np.array([np.abs(one).max(axis=0) for one in outline]) + rounding[:, None]
         for k in range(count):
             faces[k] = known[k]

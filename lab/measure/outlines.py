@@ -19,6 +19,7 @@ from ...plugins.one_way_segment import OneWaySegmentCollider
 from ...plugins.rotation import BoxCollider
 from ...plugins.terrain.segment import ChainSegmentCollider
 from ...plugins.terrain.triangle import TerrainTriangleCollider
+from ...plugins.tile_grid import TileGridCollider
 
 Floats = NDArray[np.float64]
 
@@ -30,6 +31,7 @@ SIGNS = {  # by the dimensions: the corners of a box; in space bit k of a corner
 }
 NO_FACES = np.zeros((0, 3), np.int64)
 BOX_FACES = np.array([(0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)])
+FACES = {2: NO_FACES, 3: BOX_FACES}  # of a box
 FAR = 1e4  # m, how far half-spaces are drawn
 MOST_NUMBERS = 4_000_000  # in one array: more pairs are looked at by turns
 
@@ -37,7 +39,8 @@ MOST_NUMBERS = 4_000_000  # in one array: more pairs are looked at by turns
 class Outline(NamedTuple):
     """``corners`` (m, d) about the shape's centre and along the body's own axes, in a plane counter-clockwise; the
     shape goes ``rounding`` beyond them; ``size``: its smallest extent; ``faces`` (f, k): in space the rows of the
-    corners of each face, counter-clockwise from outside, the last one repeated where a face has fewer than k."""
+    corners of each face, counter-clockwise from outside, the last one repeated where a face has fewer than k; in a
+    plane those of each piece, of what is not convex."""
 
     corners: Floats
     rounding: float
@@ -47,7 +50,7 @@ class Outline(NamedTuple):
 
 def _box(box: Any) -> Outline:
     d = len(box.half_extents)
-    return Outline(SIGNS[d] * box.half_extents, 0.0, 2 * float(np.min(box.half_extents)), BOX_FACES)
+    return Outline(SIGNS[d] * box.half_extents, 0.0, 2 * float(np.min(box.half_extents)), FACES[d])
 
 
 def _capsule(capsule: Any) -> Outline:
@@ -96,14 +99,22 @@ def _half_space(half_space: Any) -> Outline:
         aside /= np.linalg.norm(aside)
         axes = [aside, up, np.cross(aside, up)]
     corners = (SIGNS[len(up)] - np.eye(len(up))[1]) @ np.array(axes)
-    return Outline(FAR * corners, 0.0, 2 * FAR, BOX_FACES)
+    return Outline(FAR * corners, 0.0, 2 * FAR, FACES[len(up)])
+
+
+def _tiles(grid: Any) -> Outline:
+    cells, size = np.pad(grid.cells[::-1], ((0, 0), (1, 1))), grid.tile_size  # the lowest row first
+    row, ends = np.nonzero(cells[:, 1:] != cells[:, :-1])  # of the runs of tiles, by turns
+    low, high = np.stack([ends[::2], row[::2]], axis=1), np.stack([ends[1::2], row[1::2] + 1], axis=1)
+    corners = np.where(SIGNS[2] > 0.0, high[:, None], low[:, None]) - (cells.shape[1] / 2 - 1, cells.shape[0] / 2)
+    return Outline(size * corners.reshape(-1, 2), 0.0, size, np.arange(4 * len(low)).reshape(-1, 4))
 
 
 OUTLINES = {
     BoxCollider: _box, CapsuleCollider: _capsule, ConvexPolygonCollider: _polygon, ChainSegmentCollider: _segment,
 }  # fmt: skip
 ONLY_DRAWN = {  # not measured; by the dimensions
-    2: {OneWaySegmentCollider: _segment, HalfSpaceCollider: _half_space},
+    2: {OneWaySegmentCollider: _segment, HalfSpaceCollider: _half_space, TileGridCollider: _tiles},
     3: {
         BoxCollider: _box, CapsuleCollider: _capsule, ConvexHullCollider: _hull, HalfSpaceCollider: _half_space,
         TerrainTriangleCollider: _triangle,

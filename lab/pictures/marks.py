@@ -199,9 +199,12 @@ def _draw_flat(sheet: Sheet, shapes: Shapes, colours: Floats, edge: str, outline
         _ellipses(sheet, discs.centre, 2 * discs.half[:, 0], facecolors=colours[shapes.round], **style)
         _draw_hands(sheet, discs, colours[shapes.round, 3], zorder)
     if len(boxes.entity):
-        around = zip(boxes.centre, boxes.corners, boxes.rounding, strict=True)
-        polygons = [centre + rounded(corners, rounding) for centre, corners, rounding in around]
-        sheet.axes.add_collection(PolyCollection(polygons, facecolors=colours[~shapes.round], **style))
+        around = zip(boxes.centre, boxes.corners, boxes.rounding, boxes.faces, strict=True)
+        pieces = [centre + (corners[faces] if len(faces) else rounded(corners, rounding)[None])
+                  for centre, corners, rounding, faces in around]  # fmt: skip
+        fill = np.repeat(colours[~shapes.round], [len(some) for some in pieces], axis=0)
+        polygons = [piece for some in pieces for piece in some]
+        sheet.axes.add_collection(PolyCollection(polygons, facecolors=fill, **style))
 
 
 def _draw_hands(sheet: Sheet, discs: Shapes, opacity: Floats, zorder: float) -> None:
