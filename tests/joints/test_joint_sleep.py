@@ -90,6 +90,8 @@ def test_what_hangs_asleep_wakes_when_its_joint_changes_and_not_before(change, t
     rope = world.create_entity(Distance(hook, lamp, length=(0.0, 2.0)))
     run(world, 300)
     body, start = world.component_for_entity(lamp, RigidBody), world.snapshot()
+    world.component_for_entity(rope, Distance).most = 2.0  # as before
+    run(world, 1)
     assert body.asleep
     for _ in range(2):
         world.restore(start)
