@@ -87,21 +87,26 @@ def _seen_faces(bodies: Shapes, shade: Floats, projection: Projection) -> Iterat
 
 def _seen_balls(sheet: Sheet, bodies: Shapes, shade: Floats, projection: Projection) -> Iterator[Painted]:
     """Balls and capsules: each with its spots, if it spins, and a highlight."""
-    _, magnification, _ = projection.plane(bodies.centre)
-    radii, corners = bodies.rounding * magnification, bodies.corners
+    places, magnification, _ = projection.plane(bodies.centre)
+    radii, spins = bodies.rounding * magnification, np.isfinite(bodies.axes).all(axis=(1, 2))
+    circle = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
     light, spots = (canvas.mixed(shade, *other) for other in (("#ffffff", 0.35), (canvas.PANEL, 0.6)))
     for k in np.flatnonzero(bodies.faceless).tolist():
-        ends, _, _ = projection.plane(bodies.centre[k] + corners[k])
-        yield k, rounded(ends, radii[k], 40), shade[k], canvas.BACKGROUND
-        if radii[k] * sheet.points > OUTLINED:
+        if bodies.round[k]:
+            outer, inner = places[k] + radii[k] * circle, places[k] + 0.35 * radii[k] * circle
+        else:
+            ends, _, _ = projection.plane(bodies.centre[k] + bodies.outline[k])
+            outer, inner = rounded(ends, radii[k], 20), rounded(ends, 0.35 * radii[k], 20)
+        yield k, outer, shade[k], canvas.BACKGROUND
+        if spins[k] and radii[k] * sheet.points > OUTLINED:
             toward = projection.camera - bodies.centre[k]
             for spot in _spots(bodies.axes[k], toward / np.linalg.norm(toward)):
                 yield k, projection.plane(bodies.centre[k] + bodies.rounding[k] * spot)[0], spots[k], spots[k]
-        yield k, rounded(ends, 0.35 * radii[k], 40) + radii[k] * np.array((-0.3, 0.33)), light[k], light[k]
+        yield k, inner + radii[k] * np.array((-0.3, 0.33)), light[k], light[k]
 
 
 def _spots(axes: Floats, toward: Floats) -> Iterator[Floats]:
-    """On a unit ball, what the camera sees of a circle about either end of each axis; none about axes that are NaN."""
+    """On a unit ball, what the camera sees of a circle about either end of each axis."""
     for k, size in enumerate(SPOTS):
         rim = np.cos(ANGLES)[:, None] * axes[:, k - 1] + np.sin(ANGLES)[:, None] * axes[:, k - 2]
         for middle in (axes[:, k], -axes[:, k]):
