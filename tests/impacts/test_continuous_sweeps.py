@@ -1,4 +1,4 @@
-"""No tunnelling: B13, B15, C5 as worlds; bullets that meet, filters, disabled contacts; also single ccd bodies."""
+"""No tunnelling: B13 at its edges, B15; bullets that meet, filters, disabled contacts; also single ccd bodies."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import Phase, System
 
 DT = 1 / 60
+
 
 @both_dimensions
 @each_sweep
@@ -36,28 +37,6 @@ def test_b13_tangent_point_and_overlap(mode, d):
         hits = strikes(world, 1)
         assert hits.time.tolist() == ([0.0] if speed > 0 else [])
         np.testing.assert_allclose(velocity(world, inside), along(d, -60.0, 30.0), atol=1e-12)
-
-
-@both_dimensions
-@each_sweep
-def test_c5_thin_wall(mode, d):
-    """R = 0.1, wall 0.1 thick, 1 to 1e6 m/s, four phases: all bounce or stop where and when they should."""
-    world = mode_world(mode, d)
-    box(world, 0.05, half=along(d, 0.05, 1e3, 1e3), kind="static")
-    shots = []
-    for k, (v, e, phase) in enumerate(
-        (v, e, phase) for v in (1, 5, 10, 20, 50, 100, 1e3, 1e6) for e in (1.0, 0.0) for phase in (0, 2, 4, 7)
-    ):
-        gap = (phase / 4 + 0.1) * v * DT
-        shots.append((bullet(world, along(d, -0.1 - gap, 2.0 * k - 64), v, restitution=e), v, e, gap / v))
-    run(world, 3)
-    assert velocity(world, shots[0][0])[0] == -1
-    for entity, v, e, toi in shots:
-        assert velocity(world, entity)[0] == pytest.approx(-e * v, abs=1e-12 * v), (v, e)
-        place = -0.1 - e * v * (3 * DT - toi)
-        assert position(world, entity)[0] == pytest.approx(place, abs=1e-15 * v + (1e-12 if e else 0.005 * 0.2)), (v, e)
-    run(world, 30)
-    assert (positions(world, [shot[0] for shot in shots])[:, 0] < -0.099).all()
 
 
 @both_dimensions
