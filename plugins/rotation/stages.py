@@ -220,6 +220,26 @@ def turn_on_in_space(state, spin, i, angle, dt):
     spin.angular_velocity[i, 0], spin.angular_velocity[i, 1], spin.angular_velocity[i, 2] = w[0], w[1], w[2]
 
 
+@part
+def turn_with_contacts(state, spin, i, angle):
+    """A body turns by ``angle``, as its contacts ask. In space its spin keeps the energy that it has."""
+    if len(angle) == 2:
+        turn_about(state, i, angle)
+        return
+    principal, _, own = principal_moments(state, spin, i)
+    w = spin.angular_velocity[i, 0], spin.angular_velocity[i, 1], spin.angular_velocity[i, 2]
+    before = rotate(product(rotation_in_space(state, i), own), w, True)
+    turn_about(state, i, angle)
+    if principal[0] == principal[1] == principal[2]:
+        return
+    after, old, new = rotate(product(rotation_in_space(state, i), own), w, True), 0.0, 0.0
+    for k in range(3):
+        old += principal[k] * before[k] * before[k]
+        new += principal[k] * after[k] * after[k]
+    for k in range(3 if new > 0.0 else 0):
+        spin.angular_velocity[i, k] *= math.sqrt(old / new)
+
+
 @spinning.stage(
     after="resolve_static_penetration",
     records=(Spin,),
@@ -242,7 +262,7 @@ def take_spins(state, dt, spin):
         if not changed:
             continue
         if parts == 1 or (state.solver.contacts + state.solver.joints.active > 0 and bodies.held[i]):
-            turn_about(state, i, further)
+            turn_with_contacts(state, spin, i, further)
         else:
             turn_on_in_space(state, spin, i, further, dt)
         write_axes(state, i)
