@@ -16,8 +16,8 @@ from ...systems.compounds.inertia import inertia_of_compound
 from ...systems.compounds.rows import has_parts
 from ...systems.integration.stages import CUBIC, LINE, phi1, phi2
 from ...systems.shapes.dispatch import second_moments
+from ...systems.shapes.free_rotation import diagonalised, turn_freely, turn_to_energy
 from ...systems.shapes.quaternions import product, rotate, rotation_in_space, set_rotation
-from .free_rotation import diagonalised, turn_freely, turn_to_energy
 
 TRIPLE = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))  # of the step: the outer two of Yoshida's three
 HEAVY = 5.0  # damping times the step: above it the middle one, which goes back in time, enlarges rounding too much

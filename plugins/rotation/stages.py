@@ -16,9 +16,10 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import item, length, replace, scale
 from ...systems.forces.stages import is_zero
 from ...systems.integration.turns import DRIFT, KICK, TURNS
+from ...systems.shapes.poses import tumbles
 from ...systems.shapes.quaternions import (
     product,
-    product_of,
+    read_axes,
     rotate,
     rotation_in_space,
     set_rotation,
@@ -26,10 +27,8 @@ from ...systems.shapes.quaternions import (
     write_axes,
 )
 from .flight import inertia_of, principal_moments, torque_on, turn_alone
-from .free_rotation import turn_freely, turn_to_energy
 from .torques import begin_turn, drift_of_turn, end_turn, kick_of_turn, put_start_back, runge_kutta_turn
 
-PARALLEL = 1e-9  # square of the sine between spin and angular momentum: less is none
 SLOW = 1e-4  # rad in a step: what turns slower may fall asleep, if it is dynamic
 TOO_FAST = f"a torque is so large for the inertia that Spin.angular_velocity exceeds {FASTEST_TURN:g} rad/s"
 
@@ -191,36 +190,6 @@ def find_round(state, dt, spin, sphere):
 
 
 @part
-def turn_on_in_space(state, spin, i, angle, dt):
-    """Impacts have changed the spin of a body, which is to turn by ``angle`` beyond where the step has turned it: as
-    near to that as turning freely and about the angular momentum lead, which keep energy and momentum."""
-    principal, inverse, own = principal_moments(state, spin, i)
-    w = spin.angular_velocity[i, 0], spin.angular_velocity[i, 1], spin.angular_velocity[i, 2]
-    d, square = (item(angle, 0), item(angle, 1), item(angle, len(angle) - 1)), product_of(w, w)
-    if square == 0.0 or principal[0] == principal[1] == principal[2]:
-        turn_about(state, i, angle)
-        return
-    q = product(rotation_in_space(state, i), own)
-    along = rotate(q, w, True)
-    m = along[0] * principal[0], along[1] * principal[1], along[2] * principal[2]
-    momentum = rotate(q, m, False)
-    both, size = product_of(w, momentum), product_of(momentum, momentum)
-    free, apart = product_of(d, w) / square, square * size - both * both
-    if apart > PARALLEL * square * size:
-        free = (product_of(d, w) * size - product_of(d, momentum) * both) / apart
-    free = min(max(free, -dt), dt)
-    about = (product_of(d, momentum) - free * both) / size  # what is left
-    q, m, gained = turn_freely(q, m, inverse, free)
-    q, m = turn_to_energy(q, m, inverse, gained)
-    set_rotation(state, i, product(q, (own[0], -own[1], -own[2], -own[3])))
-    axis = replace(replace(replace(angle, 0, momentum[0]), 1, momentum[1]), len(angle) - 1, momentum[2])
-    turn_about(state, i, scale(axis, about))
-    q = product(rotation_in_space(state, i), own)
-    w = rotate(q, (m[0] * inverse[0], m[1] * inverse[1], m[2] * inverse[2]), False)
-    spin.angular_velocity[i, 0], spin.angular_velocity[i, 1], spin.angular_velocity[i, 2] = w[0], w[1], w[2]
-
-
-@part
 def turn_with_contacts(state, spin, i, angle):
     """A body turns by ``angle``, as its contacts ask. In space its spin keeps the energy that it has."""
     if len(angle) == 2:
@@ -261,10 +230,9 @@ def take_spins(state, dt, spin):
             spin.angular_velocity[i, k] = new
         if not changed:
             continue
-        if parts == 1 or (state.solver.contacts + state.solver.joints.active > 0 and bodies.held[i]):
-            turn_with_contacts(state, spin, i, further)
-        else:
-            turn_on_in_space(state, spin, i, further, dt)
+        if state.impacts.logged > 0 and bodies.impact_count[i] > 0 and tumbles(state, i):
+            read_axes(state, i)  # as impacts have turned it
+        turn_with_contacts(state, spin, i, further)
         write_axes(state, i)
         size, most = length(spin_of(state, spin, i)), spin.max_angular_speed[i]
         for k in range(parts if size > most else 0):

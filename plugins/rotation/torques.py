@@ -11,9 +11,9 @@ import math
 
 from ...framework.compilation import part
 from ...systems.integration.stages import kick_gain, phi1, phi2, runge_kutta_weights
+from ...systems.shapes.free_rotation import turn_to_energy
 from ...systems.shapes.quaternions import product, rotate, rotation_in_space, set_rotation
 from .flight import inertia_of, is_plane, limited, principal_moments, torques_on, turn_alone, turn_between_pushes
-from .free_rotation import turn_to_energy
 
 FAST_TURN = 0.5  # rad in a step: what turns faster in space RK4 changes the energy of more than Verlet steps do
 

@@ -24,6 +24,7 @@ from ...framework.vectors import absolute, add, add_scaled, dot, item, length, s
 from ..integration.trajectory import ROUNDING, along, bend_of, first_root, is_straight, rate_along
 from ..integration.turning import is_turned, turn_of_arm
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, sweep
+from ..shapes.poses import lead_on, motion_of, set_motion
 from ..shapes.tolerances import is_turning, smaller_extent
 from .turning_touch import MOST_STRIDES, NEAR, SHORTER, closing_point, touch_of_turning
 
@@ -55,6 +56,15 @@ def bounds_stay_disjoint(state, a, b, path, since, until):
     return dot(start, start) * way - ahead * ahead > SAFETY_FACTOR * dot(reach, reach) * way
 
 
+@part
+def shift_of_offset(state, i, h):
+    """How the collider of body i is shifted beside it, h seconds from where it is."""
+    motion = motion_of(state, i)
+    turn = lead_on(state, i, state.bodies.spin[i], h)
+    set_motion(state, i, motion)
+    return turn_of_arm(turn, state.bodies.offset[i])
+
+
 def first_touch(state, a, b, path, since, until, limits):
     """(APART, TOUCHES or AT_CORNER; time, normal, point, from a's centre to b's) of the first touch on b's path as seen
     from a, between two times; touching at ``since`` and parting is none unless the path leads back.
@@ -70,8 +80,7 @@ def first_touch(state, a, b, path, since, until, limits):
             state, a, b, path, spins, (since, until), (limits[0], near, limits[2], limits[3], SHORTER * limits[1])
         )
         # Offsets of colliders stand as where the step ends: seen from there, so that arms are right.
-        shift_a = turn_of_arm(scale(spins[0], t - until), state.bodies.offset[a])
-        shift_b = turn_of_arm(scale(spins[1], t - until), state.bodies.offset[b])
+        shift_a, shift_b = shift_of_offset(state, a, t - until), shift_of_offset(state, b, t - until)
         return (TOUCHES if found else APART), t, normal, add(point, shift_a), sub(at, sub(shift_b, shift_a))
     if not both_convex(state, shape_a, shape_b):
         return march(state, a, b, path, since, until, limits)

@@ -18,7 +18,7 @@ from ..integration.trajectory import ROUNDING, along, rate_along, travel_of
 from ..integration.turning import arms_to, closing_by_spin, is_turned
 from ..shapes.convex.points import MOST_POINTS, contact_points
 from ..shapes.dispatch import both_convex, evaluate, has_corner_rule, is_corner_touch
-from ..shapes.poses import turn_shape
+from ..shapes.poses import pose_of, tumbles, turn_to
 from ..shapes.tolerances import slop_of, smaller_extent, way_of_turning
 
 LOOKS, EXACT_LOOKS = 250, 60
@@ -67,11 +67,12 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
     graze = max(GRAZE * slop, way / (LOOKS - EXACT_LOOKS + strides))
     bend = 2.0 * length(path[2]) + 6.0 * length(path[3]) * until
     corners = threshold < 0.0 or (is_turned(bodies, a) and is_turned(bodies, b))  # of others, too
+    poses = pose_of(state, a), pose_of(state, b)
     touch, found, gap = (until, zero_of(state), zero_of(state), zero_of(state)), False, 0.0
     t, posed, least, low, high = since, until, 0.0, since, math.inf
     for look in range(LOOKS + strides):
-        turn_shape(state, a, scale(spin_a, t - posed))
-        turn_shape(state, b, scale(spin_b, t - posed))
+        turn_to(state, a, poses[0], spin_a, (until, posed, t))
+        turn_to(state, b, poses[1], spin_b, (until, posed, t))
         posed = t
         d = add(along(path, t), sub(sub(bodies.offset[b], bodies.offset[a]), ends))
         _, depth, normal, point = evaluate(state, shape_a, a, shape_b, b, d)
@@ -97,8 +98,8 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
         if not holds:
             further = min(further, t + stride) if high == math.inf else 0.5 * (low + high)
         t = further if further < until else until
-    turn_shape(state, a, scale(spin_a, until - posed))
-    turn_shape(state, b, scale(spin_b, until - posed))
+    turn_to(state, a, poses[0], spin_a, (until, posed, until))
+    turn_to(state, b, poses[1], spin_b, (until, posed, until))
     return found, touch, gap
 
 
@@ -111,7 +112,9 @@ def is_struck(state, i):
 @part
 def turn_of_path(state, i, dt):
     """By how much body i turns in the step, as seen from what the last impact has made of its spin."""
-    return scale(state.bodies.spin[i], dt) if is_struck(state, i) else state.bodies.turn[i]
+    led = state.impacts.logged > 0 and state.bodies.impact_count[i] > 0 and tumbles(state, i)  # by its new spin
+    struck = is_struck(state, i) or led
+    return scale(state.bodies.spin[i], dt) if struck else state.bodies.turn[i]
 
 
 @part

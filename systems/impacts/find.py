@@ -27,6 +27,7 @@ from ..linking.parts import FIRST_TOUCH, call_first_touch
 from ..narrow_phase.manifolds import is_at_manifold
 from ..narrow_phase.stages import rank_rows
 from ..shapes.dispatch import both_convex, evaluate, friction_of, has_corner_rule, is_corner_touch, restitution_of
+from ..shapes.poses import lead_on, motion_of, set_motion
 from ..shapes.tolerances import is_turning, slop_of, smaller_extent, turning_travel
 from .heap import heap_push
 from .impulses import (
@@ -280,6 +281,22 @@ def queue_next_impact(state, c, since, dt):
     found, touch = find_touch(state, c, a, b, path, since, e, dt)
     if found == NO_TOUCH:
         return
+    if not state.spinning:
+        queue_touch(state, c, path, found, touch, e, dt)
+        return
+    motions = motion_of(state, a), motion_of(state, b)  # of the end of the step
+    lead_on(state, a, bodies.spin[a], touch[0] - dt)
+    lead_on(state, b, bodies.spin[b], touch[0] - dt)
+    queue_touch(state, c, path, found, touch, e, dt)
+    set_motion(state, a, motions[0])
+    set_motion(state, b, motions[1])
+
+
+@part
+def queue_touch(state, c, path, found, touch, e, dt):
+    """Put a touch of a pair into the queue, if it is an impact; the two spin as they do then."""
+    pairs, bodies, impacts = state.pairs, state.bodies, state.impacts
+    a, b, passive = pairs.a[c], pairs.b[c], not pairs.is_solid[c]
     t, normal, point, apart = touch
     w = rate_along(path, t)
     if dot(apart, apart) == 0.0 and length(apart) == 0.0 and length(w) > 0.0:

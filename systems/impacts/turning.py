@@ -17,7 +17,7 @@ from ...framework.vectors import add, add_scaled, divided, dot, item, length, re
 from ..compounds.rows import next_row, owner_of
 from ..integration.trajectory import along, path_of
 from ..integration.turning import arms_to, change_of_spin, compliance, cross_spin, lever, twist, velocity_by_spin
-from ..shapes.poses import turn_shape
+from ..shapes.poses import lead_on, motion_of, set_motion, tumbles, turn_on, turn_shape
 
 PIECES = 6  # slides, sticks or turns round, and each once more for the restitution
 STUCK = 1e-14  # of the speeds: a slower slip is none
@@ -129,11 +129,19 @@ def turn_by_impact(state, event, arms, impulse, friction, dt):
     for side in range(2):
         i, arm, sign = (state.pairs.a[c], arms[0], -1.0) if side == 0 else (state.pairs.b[c], arms[1], 1.0)
         twisted = add(scale(lever(bodies, i, arm, normal), impulse), twist(arm, friction))
+        motion = motion_of(state, i)
+        lead_on(state, i, bodies.spin[i], -left)
         change = scale(change_of_spin(bodies, i, twisted), sign)
+        set_motion(state, i, motion)
         i = owner_of(state, i) if length(change) > 0.0 else -1
         while i >= 0:
-            bodies.spin[i] = add(bodies.spin[i], change)
-            bodies.turn[i] = add_scaled(bodies.turn[i], change, left)
-            if bodies.rolling_radius[i] == 0.0:
-                turn_shape(state, i, scale(change, left))
+            if tumbles(state, i):
+                turn_on(state, i, bodies.spin[i], -left)
+                bodies.spin[i] = add(bodies.spin[i], change)
+                turn_on(state, i, bodies.spin[i], left)
+            else:
+                bodies.spin[i] = add(bodies.spin[i], change)
+                bodies.turn[i] = add_scaled(bodies.turn[i], change, left)
+                if bodies.rolling_radius[i] == 0.0:
+                    turn_shape(state, i, scale(change, left))
             i = next_row(state, i)

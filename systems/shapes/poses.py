@@ -1,12 +1,22 @@
-"""Shapes as they are turned: what reads the axes of a body sees these."""
+"""Shapes as they are turned: what reads the axes of a body sees these.
+
+In space the axis about which a body turns moves with it, unless its moments are equal: its spin and its inertia are
+those of the moment for which its shape stands.
+"""
 
 from __future__ import annotations
 
+import math
+
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, item, length, replace
+from ...framework.vectors import add, item, length, replace, scale
 from ..integration.turning import turn_of_arm
 from .dispatch import write_rotated
+from .free_rotation import diagonalised, turn_freely, turn_to_energy
+from .quaternions import product, rotate, turned_tensor
+
+NO_INERTIA = 1e-14  # of the largest of the inverse moments: what is less is rounding of none, about a line of no width
 
 
 @part
@@ -25,3 +35,119 @@ def turn_shape(state, i, angle):
     bodies.offset[i] = add(bodies.offset[i], turn_of_arm(angle, bodies.offset[i]))
     if bodies.shape[i] >= 0:
         write_rotated(state, bodies.shape[i], i, state.rotated)
+
+
+@part
+def motion_of(state, i):
+    """What :func:`lead_on` changes of body i."""
+    bodies = state.bodies
+    return bodies.spin[i], bodies.inverse_inertia[i], bodies.inverse_products[i]
+
+
+@part
+def set_motion(state, i, motion):
+    bodies = state.bodies
+    bodies.spin[i], bodies.inverse_inertia[i], bodies.inverse_products[i] = motion
+
+
+@part
+def row_of_axes(state, i, k):
+    """Row k of the rotation matrix of body i; of 0 if there is none."""
+    axes, found, d = state.bodies.axes, zero_of(state), len(zero_of(state))
+    for j in range(d if len(axes) > 0 else 0):
+        found = replace(found, j, axes[(i * d + k) * d + j])
+    return found
+
+
+@part
+def pose_of(state, i):
+    """How body i spins, and how its shape is turned."""
+    last = len(zero_of(state)) - 1
+    rows = row_of_axes(state, i, 0), row_of_axes(state, i, 1), row_of_axes(state, i, last)
+    return motion_of(state, i), state.bodies.offset[i], rows
+
+
+@part
+def tumbles(state, i):
+    """Whether the axis about which body i turns by itself may move."""
+    diagonal, products = state.bodies.inverse_inertia[i], state.bodies.inverse_products[i]
+    if len(diagonal) == 2:
+        return False
+    x, y, z = item(diagonal, 0), item(diagonal, 1), item(diagonal, len(diagonal) - 1)
+    return not (x == y == z and length(products) == 0.0)
+
+
+@part
+def triple(like, v):
+    """A vector of three components; in a plane code for such is compiled, but never runs."""
+    return replace(replace(replace(like, 0, v[0]), 1, v[1]), len(like) - 1, v[2])
+
+
+@part
+def principal_axes(state, i):
+    """(1 / principal moments; unit quaternion from the axes of the world to these) of body i."""
+    v, u = state.bodies.inverse_inertia[i], state.bodies.inverse_products[i]
+    last = len(v) - 1
+    (x, y, z), q = diagonalised(item(v, 0), item(v, 1), item(v, last), item(u, 0), item(u, 1), item(u, last))
+    least = NO_INERTIA * max(x, max(y, z))
+    return (x if x > least else 0.0, y if y > least else 0.0, z if z > least else 0.0), q
+
+
+@part
+def momentum_along(q, inverse, spin):
+    """The angular momentum along the principal axes, to which q turns; none about an axis without inertia."""
+    along = rotate(q, (item(spin, 0), item(spin, 1), item(spin, len(spin) - 1)), True)
+    return (
+        along[0] / inverse[0] if inverse[0] > 0.0 else 0.0,
+        along[1] / inverse[1] if inverse[1] > 0.0 else 0.0,
+        along[2] / inverse[2] if inverse[2] > 0.0 else 0.0,
+    )
+
+
+@part
+def lead_on(state, i, spin, h):
+    """The vector by which body i turns freely in h seconds from that spin; its own spin and its inertia become those of
+    that time, its shape stays."""
+    bodies, own = state.bodies, state.bodies.spin[i]
+    if h == 0.0 or length(own) + length(spin) == 0.0 or not tumbles(state, i):
+        return scale(spin, h)
+    inverse, q = principal_axes(state, i)
+    m, mine = momentum_along(q, inverse, spin), momentum_along(q, inverse, own)
+    to, m, gained = turn_freely(q, m, inverse, h)
+    to, m = turn_to_energy(to, m, inverse, gained)
+    mine = rotate(to, rotate(q, mine, False), True)  # stays what it is in space
+    xx, yy, zz, xy, xz, yz = turned_tensor(to, (inverse[0], inverse[1], inverse[2], 0.0, 0.0, 0.0))
+    bodies.inverse_inertia[i] = triple(spin, (xx, yy, zz))
+    bodies.inverse_products[i] = triple(spin, (xy, xz, yz))
+    bodies.spin[i] = triple(spin, rotate(to, (mine[0] * inverse[0], mine[1] * inverse[1], mine[2] * inverse[2]), False))
+    by = product(to, (q[0], -q[1], -q[2], -q[3]))
+    sine = math.sqrt(by[1] * by[1] + by[2] * by[2] + by[3] * by[3])
+    size = 2.0 * math.atan2(sine, by[0]) / sine if sine > 0.0 else 0.0
+    return triple(spin, (size * by[1], size * by[2], size * by[3]))
+
+
+@part
+def turn_on(state, i, spin, h):
+    """The same, and its shape turns by that."""
+    turn_shape(state, i, lead_on(state, i, spin, h))
+
+
+@part
+def turn_to(state, i, end, spin, times):
+    """Body i is turned, and spins, as it does at the last of three times: from how it stands at the one before, or, if
+    it tumbles, from its pose ``end`` at the first: so there is one way on which it turns, at whatever times it is seen.
+    """
+    until, posed, t = times
+    if not tumbles(state, i):
+        turn_shape(state, i, scale(spin, t - posed))
+        return
+    motion, offset, rows = end
+    axes, d = state.bodies.axes, len(spin)
+    for k in range(d if len(axes) > 0 else 0):
+        for j in range(d):
+            axes[(i * d + k) * d + j] = item(rows[k], j)
+    state.bodies.offset[i] = offset
+    set_motion(state, i, motion)
+    turn_on(state, i, spin, t - until)
+    if t == until and len(axes) > 0 and state.bodies.shape[i] >= 0:
+        write_rotated(state, state.bodies.shape[i], i, state.rotated)

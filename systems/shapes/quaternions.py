@@ -71,6 +71,23 @@ def write_axes(state, i):
 
 
 @part
+def read_axes(state, i):
+    """A body in space is turned as its axes are."""
+    m, k = state.bodies.axes, 9 * i
+    xx, yy, zz = m[k], m[k + 4], m[k + 8]
+    x, y, z = m[k + 7] - m[k + 5], m[k + 2] - m[k + 6], m[k + 3] - m[k + 1]
+    xy, xz, yz = m[k + 1] + m[k + 3], m[k + 2] + m[k + 6], m[k + 5] + m[k + 7]
+    if xx + yy + zz > 0.0:
+        set_rotation(state, i, (1.0 + xx + yy + zz, x, y, z))
+    elif xx >= yy and xx >= zz:
+        set_rotation(state, i, (x, 1.0 + xx - yy - zz, xy, xz))
+    elif yy >= zz:
+        set_rotation(state, i, (y, xy, 1.0 + yy - xx - zz, yz))
+    else:
+        set_rotation(state, i, (z, xz, yz, 1.0 + zz - xx - yy))
+
+
+@part
 def product_of(u, v):
     """The scalar product of two triples."""
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]

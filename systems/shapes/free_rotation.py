@@ -1,9 +1,11 @@
-"""How a body turns by itself in 3D: Euler's equations, split into rotations about its principal axes.
+"""How a body turns by itself in 3D: Euler's equations, split into rotations about fixed axes.
 
-The kinetic energy is a sum of three terms, M_k^2 / (2 I_k), and under each alone the body turns about axis k at a
-constant rate: exact, explicit, and the angular momentum stays what it is. One after the other, 1 2 3 2 1 with half
-steps but for the third, they are of order 2 and symplectic (S. Reich, "Momentum conserving symplectic integrators",
-1994). The energy swings by that order, until ``turn_to_energy`` puts it right at the end.
+The kinetic energy is a sum of three terms. Under M^2 / (2 I_k) alone a body turns in space about its angular momentum;
+under what M_j^2 and M_l^2 add to that about its own axes j and l: each at a constant rate, so that the momentum stays
+what it is. The first goes along with the others. These are taken one after the other, j l j with half steps for j: of
+order 2 and symplectic (S. Reich, "Momentum conserving symplectic integrators", 1994). j and k are the axes of the most
+similar moments; where these are the same, as of a bar, it is exact however far the body turns. Else the energy swings
+by that order, until ``turn_to_energy`` puts it right at the end.
 """
 
 from __future__ import annotations
@@ -11,11 +13,12 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
-from ...systems.shapes.quaternions import product
+from .quaternions import product
 
 SWEEPS = 16  # of Jacobi rotations: each squares what is off the diagonal
 SPHERICAL = 1e-24  # square of the sine between momentum and angular velocity: less is none
 DIAGONAL = 1e-15  # of the trace: what is off the diagonal by less is rounding
+PIECE, MOST_PIECES = 0.25, 64  # rad: as far as unlike moments turn a body in one of the pieces of its way
 
 
 @part
@@ -67,14 +70,42 @@ def turn_to_energy(q, m, inverse, gained):
 
 
 @part
+def most_similar(inverse):
+    """(j, k, l): the axes of the two most similar moments, and the other one."""
+    x, y, z = abs(inverse[1] - inverse[2]), abs(inverse[2] - inverse[0]), abs(inverse[0] - inverse[1])
+    if x <= y and x <= z:
+        return 1, 2, 0
+    return (2, 0, 1) if y <= z else (0, 1, 2)
+
+
+@part
+def of_axis(v, k):
+    """The k-th of three."""
+    return v[0] if k == 0 else (v[1] if k == 1 else v[2])
+
+
+@part
+def size_of(v, factor):
+    x, y, z = factor * v[0], factor * v[1], factor * v[2]
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@part
 def turn_freely(q, m, inverse, h):
     """(rotation, momentum in its frame, what splitting has added to :func:`energy_of`) after h seconds. q: unit
     quaternion of the principal axes; m: angular momentum along them; inverse: 1 / principal moments."""
-    energy = energy_of(m, inverse)
-    for place in range(5):
-        k = place if place < 3 else 4 - place
-        rate = m[0] * inverse[0] if k == 0 else (m[1] * inverse[1] if k == 1 else m[2] * inverse[2])
-        q, m = turned_about(q, m, k, rate * (h if k == 2 else 0.5 * h))
+    energy, (j, k, other) = energy_of(m, inverse), most_similar(inverse)
+    about_j, about_other = of_axis(inverse, j) - of_axis(inverse, k), of_axis(inverse, other) - of_axis(inverse, k)
+    turned = size_of(m, about_j * h) / PIECE
+    pieces = 1 + (int(turned) if turned < MOST_PIECES else MOST_PIECES)
+    share, half = h / pieces, 0.5 * of_axis(inverse, k) * h
+    size = size_of(m, half)
+    sine = math.sin(size) / size * half if size > 0.0 else 0.0
+    q = product(q, (math.cos(size), sine * m[0], sine * m[1], sine * m[2]))
+    for _ in range(pieces):
+        q, m = turned_about(q, m, j, 0.5 * share * about_j * of_axis(m, j))
+        q, m = turned_about(q, m, other, share * about_other * of_axis(m, other))
+        q, m = turned_about(q, m, j, 0.5 * share * about_j * of_axis(m, j))
     return q, m, energy_of(m, inverse) - energy
 
 
