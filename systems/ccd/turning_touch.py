@@ -13,11 +13,12 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.stack_arrays import stack_array
-from ...framework.vectors import add, dot, length, row, scale, sub
+from ...framework.vectors import add, dot, length, negative, row, scale, sub
 from ..integration.trajectory import ROUNDING, along, rate_along, travel_of
 from ..integration.turning import arms_to, closing_by_spin, is_turned
 from ..shapes.convex.points import MOST_POINTS, contact_points
 from ..shapes.dispatch import both_convex, evaluate, has_corner_rule, is_corner_touch
+from ..shapes.linking.convex_by_address import convex_at, rounding_by_address, support_by_address
 from ..shapes.poses import pose_of, tumbles, turn_to
 from ..shapes.tolerances import slop_of, smaller_extent, way_of_turning
 
@@ -47,6 +48,24 @@ def closing_point(state, a, b, d, met, near, velocity):
     if closing > 0 and (closing < count or len(d) == 3):
         point = scale(middle, 1.0 / closing)
     return speed + closing_by_spin(bodies, a, b, arms_to(bodies, a, b, normal, point, d), normal), point
+
+
+@inlined
+def reach_along(state, i, direction):
+    """How far the shape of body i reaches from its centre in a direction; infinity if it has no support that tells."""
+    shape = convex_at(state.shapes.parameters[state.bodies.shape[i]], i)
+    if shape[0] == 0:
+        return math.inf
+    return dot(support_by_address(shape, direction), direction) + rounding_by_address(shape)
+
+
+@part
+def clear_along(state, a, b, d, normal):
+    """How far apart two convex shapes are at least, d from centre to centre, by planes across a normal; 0 if none parts
+    them."""
+    out, way = negative(normal), dot(d, normal)
+    ahead = way - reach_along(state, a, normal) - reach_along(state, b, out)
+    return max(0.0, ahead, -way - reach_along(state, a, out) - reach_along(state, b, normal))
 
 
 @part
@@ -97,6 +116,8 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
         further = t + (max(graze, -depth) if touches else max(-depth - 0.5 * near, 0.5 * near)) / fastest
         if not holds:
             further = min(further, t + stride) if high == math.inf else 0.5 * (low + high)
+            if convex and high == math.inf:  # what is beside the other one is looked at when it may be there
+                further = max(further, t + clear_along(state, a, b, d, normal) / (fastest + abs(dot(w, normal))))
         t = further if further < until else until
     turn_to(state, a, poses[0], spin_a, (until, posed, until))
     turn_to(state, b, poses[1], spin_b, (until, posed, until))
