@@ -108,22 +108,24 @@ def edge_of(start, end, beyond, normal, room):
 
 
 @part
-def part_above(b, at, normal, edge, known, support):
-    """(kind, height, how far it is beyond the edge) of what of a shape's face is on the inner side of an edge.
+def part_above(b, at, normal, edge, nearest, known, support):
+    """(kind, height, lowest point; how far it is beyond the edge) of what of a shape's face is on the inner side of an
+    edge.
 
-    at: from the edge's point to the shape's centre; known: (kind, height, nearest point from the shape's centre).
+    at: from the edge's point to the shape's centre; nearest: the point of the whole face, from there as the lowest one;
+    known: (kind, height, lowest point) of what is on the inner side of other edges.
     """
-    kind, height, nearest = known
-    nearest = add(at, nearest)
-    out, level = dot(edge.outward, nearest), dot(normal, nearest)
+    kind, height, lowest = known
+    out = dot(edge.outward, add(at, nearest))
     if out <= edge.room:
-        return kind, height, 0.0
-    inner = add(at, support(b, negative(add_scaled(normal, edge.outward, TILT))))
-    inward = dot(edge.outward, inner)
+        return kind, height, lowest, 0.0
+    inner = support(b, negative(add_scaled(normal, edge.outward, TILT)))
+    inward = dot(edge.outward, add(at, inner))
     if inward > edge.room:
-        return NONE, height, inward
-    low = dot(normal, inner)
-    return PART, max(height, low + (level - low) * (edge.room - inward) / (out - inward)), 0.0
+        return NONE, height, lowest, inward
+    ends = add_scaled(inner, sub(nearest, inner), (edge.room - inward) / (out - inward))
+    level = dot(normal, add(at, ends))
+    return (PART, level, ends, 0.0) if kind == WHOLE or level > height else (PART, height, lowest, 0.0)
 
 
 @part
@@ -160,10 +162,11 @@ def contact_of_triangle(a, b, d, support, rounding):
     _, depth, straight, place = convex_convex(a, b, d, corner_towards, support, sharp, rounding)
     between = is_between(straight, one) and is_between(straight, two) and is_between(straight, three)
     between = between and dot(straight, normal) > -NEAR
-    kind, height, far, side, outer = WHOLE, level, 0.0, normal, normal
+    kind, height, lowest, far, side, outer = WHOLE, level, nearest, 0.0, normal, normal
     for k in range(3):
         edge = one if k == 0 else two if k == 1 else three
-        kind_now, height, beyond = part_above(b, sub(d, edge.at), normal, edge, (kind, height, nearest), support)
+        known = kind, height, lowest
+        kind_now, height, lowest, beyond = part_above(b, sub(d, edge.at), normal, edge, nearest, known, support)
         kind = NONE if kind == NONE else kind_now
         leaning = beyond_edge(normal, straight, edge)
         outer = outer if leaning == normal else leaning
@@ -185,7 +188,7 @@ def contact_of_triangle(a, b, d, support, rounding):
         return False, -max(far, zone), side if far > 0.0 else straight, point
     if centre < -BEHIND * size - a.thickness:
         return False, -math.inf, normal, point
-    depth = round_b - height
+    depth, point = round_b - height, add(d, lowest)
     return True, depth, normal, add_scaled(point, normal, -dot(normal, sub(point, a.a)) - 0.5 * depth)
 
 
