@@ -156,17 +156,18 @@ def is_held_by_edge(state, a, b, path, touch, speed, dt):
 
 @part
 def passes_unseen(state, a, b, path, touch, dt):
-    """Whether so slow an approach leads through something thin before or after an impact: contacts at rest know only
-    the way after the last one."""
+    """Whether so slow an approach leads far in before or after an impact, or while the two turn: contacts at rest know
+    only the way after the last one, with shapes that stay as they are."""
     bodies, touchdown_time = state.bodies, state.impacts.touchdown_time
     count, inverse_mass = bodies.impact_count, bodies.inverse_mass
     if not state.impacts.sweeps:
         return False
     until, (_, normal, _, start) = dt, touch
     if count[a] == 0 and count[b] == 0:
-        if not (touchdown_time > 0.0 and inverse_mass[a] * inverse_mass[b] == 0.0):
+        if touchdown_time > 0.0 and inverse_mass[a] * inverse_mass[b] == 0.0:
+            until = touchdown_time
+        elif turns_far(state, a, b) or not turning_travel(state, dt, a, b) > FAST * smaller_extent(bodies, a, b):
             return False
-        until = touchdown_time
     return dot(sub(start, along(path, until)), normal) > FAST * smaller_extent(bodies, a, b)
 
 

@@ -72,3 +72,23 @@ def test_a_turntable_whose_rim_goes_far_carries_a_box_level(w, mode):
     assert abs(x[1] - 0.1) < 1e-4
     assert np.hypot(q[1], q[3]) < 1e-3  # half the tilt
     assert np.hypot(x[0], x[2]) == pytest.approx(np.exp(w * w * dt * seconds / 2), rel=2e-3)
+
+
+@pytest.mark.parametrize("mode", ["continuous", "event_driven"])
+@pytest.mark.parametrize("d", [2, 3])
+def test_boxes_that_turn_and_fall_through_more_than_a_floor_in_a_step_stay_above_it(d, mode):
+    random, boxes = np.random.default_rng(0), 30
+    physics, settings = Physics(d, gravity=(0, -9.81, 0)[:d]), Settings(dt=0.4, collision=mode, on_fault="ignore")
+    with World(physics, Rotation(), settings=settings) as world:
+        material = {"restitution": 0.5, "friction": 0.5}
+        world.create_entity(Transform((0, -1, 0)[:d]), BoxCollider((1e4, 1.0, 1e4)[:d], **material))
+        for k in range(boxes):
+            angle = random.uniform(-3, 3) if d == 2 else random.normal(size=4)
+            spin = random.uniform(-6, 6, d) if d == 3 else random.uniform(-6, 6)
+            angle = angle / np.linalg.norm(angle) if d == 3 else angle
+            place = Transform((k * APART, random.uniform(2, 10), 0)[:d], angle)
+            world.create_entity(place, RigidBody(), Spin(spin), BoxCollider(random.uniform(0.3, 0.7, d), **material))
+        for _ in range(40):
+            world.step()
+            assert world.bodies.dynamic.position[:, 1].min() > -1.0
+        assert world.bodies.dynamic.position[:, 1].min() > 0.2
