@@ -1,7 +1,8 @@
 """What cannot be moved has the last word: where the solver has pushed a body into it, or through it, the body is put
 back, and loses the speed that leads there.
 
-So is what a turning thing has struck and then turned into, within the step.
+So is what a turning thing has struck and then turned into, within the step, and what turns and has had more impacts
+than it may: from each to the next it has sunk in a little.
 
 The solver knows contacts as planes where the step starts, and shares what its passes leave undone among all of them.
 So a light body between two heavy ones may be shot through a wall that is none of its contacts, or pressed into one a
@@ -74,7 +75,8 @@ def how_deep(state, dt, c, a, b):
         return 0.0, normal
     if not found:
         _, depth, normal, _ = evaluate_pair(state, a, b, d)
-    deep = evaluate_pair(state, a, b, start)[1] if depth > allowed else 0.0
+    stopped = bodies.impact_count[a] >= STOPPED or bodies.impact_count[b] >= STOPPED  # it has turned in as well
+    deep = evaluate_pair(state, a, b, start)[1] if depth > allowed and not stopped else 0.0
     return depth - max(deep, allowed), normal
 
 
@@ -111,11 +113,14 @@ def is_moved_by_solver(state, i):
 
 @part
 def may_have_sunk(state, c, i):
-    """Whether body i of pair c may be deeper than it may: the solver has moved it, or what has struck it turns on."""
+    """Whether body i of pair c may be deeper than it may: the solver has moved it, what has struck it turns on, or so
+    many impacts in which it turns have stopped it: from one to the next it sinks in a little."""
     if is_moved_by_solver(state, i):
         return True
-    struck = state.spinning and state.pairs.impulse[c] > 0.0 and state.bodies.impact_count[i] < STOPPED
-    return struck and turns_far(state, state.pairs.a[c], state.pairs.b[c])
+    struck = state.spinning and state.pairs.impulse[c] > 0.0
+    if struck and turns_far(state, state.pairs.a[c], state.pairs.b[c]):
+        return True
+    return state.spinning and state.bodies.impact_count[i] >= STOPPED
 
 
 @part

@@ -296,3 +296,21 @@ def test_spheres_of_a_dumbbell_push_each_other_by_their_body_alone():
     assert body_of(world, ball).linear_velocity == pytest.approx((0, 0), abs=1e-12)
     assert world.momentum() == pytest.approx((-4, 0))
     assert parts.of(body) == ends
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("place", [(0.1, 2.3), (0.3, 1.2)])
+def test_a_table_that_a_thousand_kilograms_fall_on_is_not_driven_into_the_floor(place, mode):
+    world, _ = parts_world((0, -G), collision=mode, on_fault="ignore")
+    material = {"friction": 0.5, "restitution": 0.6}
+    floor(world, **material)
+    table = world.create_entity(Transform((0, 0.3)), RigidBody(0.1), Spin())
+    for x in (-0.6, 0.0, 0.6):
+        world.create_entity(PartOf(table, (x, 0), mass=0.1), BoxCollider((0.1, 0.3), **material))
+    world.create_entity(Transform(place), RigidBody(1000.0, (0, -20)), BoxCollider((1.0, 0.3), **material), Spin())
+    for _ in range(40):
+        world.step()
+        turned = at(world, table).rotation
+        lowest = at(world, table).y - 0.7 * abs(np.sin(turned)) - 0.3 * abs(np.cos(turned))
+        assert lowest > -0.13
