@@ -54,6 +54,8 @@ class Spin(Component):
     excludes: ClassVar[Mapping[type[Component], str]] = {
         AABBCollider: "its sides never turn; give it a BoxCollider, from carom.plugins.rotation"
     }
+    makes_body: ClassVar[bool] = True
+    needs: ClassVar[tuple[type[Component], ...]] = (RigidBody,)
     plugin: ClassVar[str] = "rotation"
     until_frame_ends: ClassVar[tuple[str, str]] = ("applied_torque", "applied_frame")
 

@@ -32,6 +32,7 @@ class Component:
     prefix: ClassVar[str] = ""  # of the columns' names in a table
     makes_body: ClassVar[bool] = False  # an entity that has it together with a Transform is a body
     excludes: ClassVar[Mapping[type[Component], str]] = {}  # what no entity has together with it, and the cure
+    needs: ClassVar[tuple[type[Component], ...]] = ()  # what an entity has to have as well
     # What an entity that has it gets too, if it has none: their types, and what of their values in d dimensions.
     brings: ClassVar[Mapping[type[Component], Callable[[int], dict[str, Any]]]] = {}
     plugin: ClassVar[str] = ""  # the plugin without which it does nothing

@@ -75,6 +75,10 @@ class LevelCheck:
     def check_types(self, types: Iterable[type[Component]], entity: int) -> None:
         """Whether these may be together, and colliders are shapes of this world; the entity is for messages."""
         for component in types:
+            for other in component.needs:
+                if other not in types:
+                    name = component.__name__
+                    raise ValueError(f"entity {entity} has {name}, but no {other.__name__}, which {name} needs")
             for other, cure in component.excludes.items():
                 if other in types:
                     raise ValueError(

@@ -340,6 +340,17 @@ def test_what_cannot_spin_is_refused_by_entity_with_the_cure(d, plugins, compone
         assert world.entity_exists(other)
 
 
+@pytest.mark.parametrize("beside", [(), (BoxCollider((1, 1)),)], ids=["alone", "with a collider"])
+def test_a_spin_without_a_rigid_body_is_refused_until_it_has_one(beside):
+    with space() as world:
+        entity = world.create_entity(Transform((0, 0)), Spin(1.0, 1.0), *(one.copy() for one in beside))
+        with pytest.raises(ValueError, match=f"entity {entity} has Spin, but no RigidBody, which Spin needs"):
+            world.step()
+        world.add_component(entity, RigidBody())
+        world.step()
+        assert world.component_for_entity(entity, Transform).rotation == pytest.approx(1 / 60)
+
+
 def test_wrong_values_of_spin_are_refused_where_they_are_given():
     wrong = {
         "inertia": [0, -1], "angular_damping": [-1], "angular_velocity": [math.nan, 1e200], "max_angular_speed": [-1],
