@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -303,7 +304,7 @@ def test_spheres_of_a_dumbbell_push_each_other_by_their_body_alone():
 @pytest.mark.parametrize("place", [(0.1, 2.3), (0.3, 1.2)])
 def test_a_table_that_a_thousand_kilograms_fall_on_is_not_driven_into_the_floor(place, mode):
     world, _ = parts_world((0, -G), collision=mode, on_fault="ignore")
-    material = {"friction": 0.5, "restitution": 0.6}
+    material: dict[str, Any] = {"friction": 0.5, "restitution": 0.6}
     floor(world, **material)
     table = world.create_entity(Transform((0, 0.3)), RigidBody(0.1), Spin())
     for x in (-0.6, 0.0, 0.6):

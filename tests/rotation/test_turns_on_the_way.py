@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -80,13 +82,15 @@ def test_boxes_that_turn_and_fall_through_more_than_a_floor_in_a_step_stay_above
     random, boxes = np.random.default_rng(0), 30
     physics, settings = Physics(d, gravity=(0, -9.81, 0)[:d]), Settings(dt=0.4, collision=mode, on_fault="ignore")
     with World(physics, Rotation(), settings=settings) as world:
-        material = {"restitution": 0.5, "friction": 0.5}
+        material: dict[str, Any] = {"restitution": 0.5, "friction": 0.5}
         world.create_entity(Transform((0, -1, 0)[:d]), BoxCollider((1e4, 1.0, 1e4)[:d], **material))
         for k in range(boxes):
-            angle = random.uniform(-3, 3) if d == 2 else random.normal(size=4)
-            spin = random.uniform(-6, 6, d) if d == 3 else random.uniform(-6, 6)
-            angle = angle / np.linalg.norm(angle) if d == 3 else angle
-            place = Transform((k * APART, random.uniform(2, 10), 0)[:d], angle)
+            angle, spin = random.uniform(-3, 3), random.uniform(-6, 6)
+            turned: Any = angle
+            if d == 3:
+                spin, turned = random.uniform(-6, 6, d), random.normal(size=4)
+                turned /= np.linalg.norm(turned)
+            place = Transform((k * APART, random.uniform(2, 10), 0)[:d], turned)
             world.create_entity(place, RigidBody(), Spin(spin), BoxCollider(random.uniform(0.3, 0.7, d), **material))
         for _ in range(40):
             world.step()
