@@ -10,16 +10,13 @@ import itertools
 import weakref
 from collections import deque
 from collections.abc import Collection, ItemsView, Iterable, Iterator, KeysView, ValuesView
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from .change_log import Arrival, ChangeLog, Stores
 from .component import Component, RowStore
 from .table import FEW, HAS_OBJECTS
-
-if TYPE_CHECKING:
-    from .members import Members
 
 TRAIL = 32  # snapshots: a game over a network goes back by fewer
 
@@ -43,7 +40,7 @@ class Entities(dict[int, dict[type[Any], Any]]):
     def __init__(self, content: dict[int, dict[type[Any], Any]], log: ChangeLog) -> None:
         super().__init__(content)
         self.log, self.table, self.stop, self.version = log, None, 0, 0
-        self.members: dict[type[Any], Members] = {}
+        self.members: dict[type[Any], Any] = {}  # see members.WatchedComponents
         self.saved: Any = None
         self.unshared: set[int] | None = None
         self._trail: deque[tuple[Any, set[int]]] = deque(maxlen=TRAIL)  # what was shared, and what changed before it

@@ -166,7 +166,11 @@ def passes_unseen(state, a, b, path, touch, dt):
     if count[a] == 0 and count[b] == 0:
         if touchdown_time > 0.0 and inverse_mass[a] * inverse_mass[b] == 0.0:
             until = touchdown_time
-        elif turns_far(state, a, b) or not turning_travel(state, dt, a, b) > FAST * smaller_extent(bodies, a, b):
+        elif (
+            not state.spinning
+            or turns_far(state, a, b)
+            or not turning_travel(state, dt, a, b) > FAST * smaller_extent(bodies, a, b)
+        ):
             return False
     return dot(sub(start, along(path, until)), normal) > FAST * smaller_extent(bodies, a, b)
 
