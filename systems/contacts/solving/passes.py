@@ -10,17 +10,19 @@ from ..constants import AGREED, AGREED_SHARE, HARD_PASSES, SUBSTEP_WORK
 from .chunks import solve_chunks
 from .rows import closing_speed, relax_listed, solve_friction, solve_normals, solve_rolling
 
+FEW = 6  # rows of a chunk: fewer are as fast one by one, with the same bits
+
 
 @part
 def solve_pass(solver, bias, pushes, span):
     """One pass over the rows of a range: along their normals and along their surfaces."""
-    if len(span[4]) > 0:
-        if solver.has_rolling:
-            solve_rolling(solver, span)
+    if len(span[4]) > 0 and solver.has_rolling:
+        solve_rolling(solver, span)
+    if len(span[4]) > 0 and solver.chunks * FEW < span[1] - span[0]:
         solve_chunks(solver, bias, pushes, span)
     else:
         solve_normals(solver, bias, pushes, span)
-        if solver.has_friction:
+        if len(span[4]) == 0 and solver.has_friction:
             solve_friction(solver, span)
     solver.visits += span[1] - span[0]
 

@@ -123,7 +123,7 @@ def apply_impulse(solver, k, impulse, arms):
 
 @part
 def solve_normals(solver, bias, pushes, span):
-    """One pass over the rows of a range, along their normals, where nothing spins.
+    """One pass over the rows of a range, along their normals; where bodies spin each along its surface after that.
 
     bias: speed at which each row may close, below 0 at which it is to open; softly where this pass ``pushes``.
     """
@@ -137,6 +137,8 @@ def solve_normals(solver, bias, pushes, span):
         new = max(0.0, old + excess)
         apply_impulse(solver, k, scale(solver.normal[k], new - old), arms)
         impulse[k] = new
+        if len(arms) > 0 and solver.friction[k] != 0.0:
+            solve_friction_of(solver, k, arms)
 
 
 @inlined
@@ -159,7 +161,7 @@ def solve_friction_of(solver, k, arms):
 
 @part
 def solve_friction(solver, span):
-    """The same along their surfaces."""
+    """One pass along their surfaces, where nothing spins."""
     start, stop, _, _, arms = span
     for k in range(start, stop):
         if solver.friction[k] != 0.0:
