@@ -11,11 +11,13 @@ body, and the impulses.
 2. ``apply_warm_start``: the impulses of the last substep.
 3. ``solve_pass`` that pushes: closing rows stop, overlapping rows part like an overdamped spring.
 4. ``move``, ``measure``: the bodies move; what each row may close from there.
-5. ``solve_pass`` that relaxes, two times, four in the last substep: the speed of pushing is taken back.
+5. ``solve_pass`` that relaxes, two times, four in the last substep, once where bodies spin: the speed of pushing is
+   taken back.
 6. ``guard.finish_substep``: further passes over islands that gained energy, or whose rows are far from solved; then
    the bound on their energy.
 
-A pass is ``rows.solve_normals`` and ``rows.solve_friction``. How a row moves its bodies is ``rows.closing_speed`` and
-``rows.apply_impulse``, nowhere else. ``hard`` chooses contacts that do not sag. ``warm_start`` keeps impulses between
+A pass (``passes``) is ``rows.solve_normals`` and ``rows.solve_friction``. How a row moves its bodies is
+``rows.closing_speed`` and ``rows.apply_impulse``, and for many spinning bodies at once, with the same bits,
+``chunks.solve_rows``; nowhere else. ``hard`` chooses contacts that do not sag. ``warm_start`` keeps impulses between
 steps, ``prediction`` applies them before the impacts.
 """

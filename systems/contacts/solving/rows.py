@@ -1,4 +1,5 @@
-"""Rows of the solver: points where two bodies touch. How a row moves its bodies stands here, and nowhere else.
+"""Rows of the solver: points where two bodies touch. How a row moves its bodies stands here, and in
+``chunks`` for many at once.
 
 Where bodies spin, each row has an arm to each of its bodies. ``arms`` is ARMS or NO_ARMS, which differ in type: each
 part is compiled as if there were no other, and a world without rotation pays nothing for it. Where bodies are joined
