@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from ...components.spin import UNKNOWN, inertia_about
-from ...framework.compilation import part
+from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...systems.compounds.inertia import inertia_of_compound
 from ...systems.compounds.rows import has_parts
@@ -55,6 +55,12 @@ def limited(w, most):
     return w[0] * by, w[1] * by, w[2] * by
 
 
+@inlined
+def at_most(w, most):
+    """A number, no larger than the limit; nan: none."""
+    return math.copysign(most, w) if abs(w) > most else w
+
+
 @part
 def torque_on(state, spin, turns, i, k):
     """Along one axis."""
@@ -81,19 +87,19 @@ def torques_on(state, spin, turns, i):
 @part
 def turn_in_plane(state, spin, turns, i, h):
     """The angle and the angular velocity of a dynamic body after a step."""
-    moment, damping, w = inertia_of(state, spin, i)[2], spin.angular_damping[i], spin.angular_velocity[i, 0]
+    moment, z, most = inertia_of(state, spin, i)[2], -spin.angular_damping[i] * h, spin.max_angular_speed[i]
     acceleration = torque_on(state, spin, turns, i, 0) / moment if moment > 0.0 else 0.0
-    w, z, most = limited((w, 0.0, 0.0), spin.max_angular_speed[i])[0], -damping * h, spin.max_angular_speed[i]
-    new = w * math.exp(z) + acceleration * h * phi1(z)
+    w = at_most(spin.angular_velocity[i, 0], most)
+    new = w + acceleration * h
+    if z != 0.0:
+        new = w * math.exp(z) + acceleration * h * phi1(z)
     turn = h * new
     if state.usual_path_degree > LINE:
         turn = h * (w * phi1(z) + acceleration * h * phi2(z))
     elif state.moves_with_old_velocity:
         turn = h * w
-    new = limited((new, 0.0, 0.0), most)[0]
-    if abs(turn) > most * h:
-        turn = math.copysign(most * h, turn)
-    spin.angular_velocity[i, 0] = new
+    spin.angular_velocity[i, 0] = at_most(new, most)
+    turn = at_most(turn, most * h)
     state.bodies.rotation[i] += turn
 
 

@@ -54,22 +54,20 @@ def change_of_spin(bodies, i, turned):
 
 
 @inlined
-def spin_energy(bodies, i, u, v):
-    """u . I v of a body: twice the energy of spin u, if v is the same; 0 of what contacts do not turn."""
+def momentum_of_spin(bodies, i, spin):
+    """The angular momentum of a body that spins so; 0 of what contacts do not turn."""
     d, p = bodies.inverse_inertia[i], bodies.inverse_products[i]
-    if len(u) == 2:
+    if len(spin) == 2:
         w = item(d, 0)
-        return item(u, 0) * item(v, 0) / w if w > 0.0 else 0.0
-    last = len(u) - 1
+        return scale(spin, 1.0 / w if w > 0.0 else 0.0)
+    last = len(spin) - 1
     a, b, c, f, g, h = item(d, 0), item(d, 1), item(d, last), item(p, 0), item(p, 1), item(p, last)
     aa, bb, cc = b * c - h * h, a * c - g * g, a * b - f * f
     ab, ac, bc = g * h - f * c, f * h - g * b, f * g - a * h
     size = a * aa + f * ab + g * ac
-    if not size > 0.0:
-        return 0.0
     diagonal = replace(replace(replace(d, 0, aa), 1, bb), last, cc)
     products = replace(replace(replace(p, 0, ab), 1, ac), last, bc)
-    return dot(u, symmetric(diagonal, products, v)) / size
+    return scale(symmetric(diagonal, products, spin), 1.0 / size if size > 0.0 else 0.0)
 
 
 @inlined
@@ -77,9 +75,9 @@ def shares_of_turn(turn):
     """(sin(t) / t, (1 - cos(t)) / t^2) of a turn by the angle t."""
     s = dot(turn, turn)
     if s < SERIES:
-        sine = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0))))
-        versine = 1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0 * (1.0 - s / 132.0))))
-        return sine, 0.5 * versine
+        sine = 1.0 - s * (1 / 6 - s * (1 / 120 - s * (1 / 5_040 - s * (1 / 362_880 - s * (1 / 39_916_800)))))
+        versine = 0.5 - s * (1 / 24 - s * (1 / 720 - s * (1 / 40_320 - s * (1 / 3_628_800 - s * (1 / 479_001_600)))))
+        return sine, versine
     t = math.sqrt(s)
     return math.sin(t) / t, (1.0 - math.cos(t)) / s
 

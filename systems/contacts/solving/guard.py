@@ -11,7 +11,7 @@ import math
 
 from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, dot, scale, sub
-from ...integration.turning import cross_spin, spin_energy
+from ...integration.turning import cross_spin, momentum_of_spin
 from ..constants import (
     DEEP,
     FADING,
@@ -95,9 +95,10 @@ def weigh(solver, span, islands):
         if len(arms) > 0:
             before = solver.spin_before[q]
             change = sub(solver.spin[q], before)
-            slope[t] += spin_energy(solver, q, before, change)
-            curvature[t] += spin_energy(solver, q, change, change)
-            energy[t] += spin_energy(solver, q, before, before)
+            momentum = momentum_of_spin(solver, q, before)
+            slope[t] += dot(momentum, change)
+            curvature[t] += dot(momentum_of_spin(solver, q, change), change)
+            energy[t] += dot(momentum, before)
     for k in range(start, stop if solver.movers > 0 else start):
         a, b = solver.first[k], solver.second[k]
         if (island[a] < 0 or island[b] < 0) and solver.listed_of[island_of(solver, k)] > 0:
