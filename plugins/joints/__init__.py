@@ -11,9 +11,9 @@ from ...components.part_of import PartOf
 from ...framework import NoPhysicsError, Plugin, PluginError, World
 from ...framework.jit.lazy import errors
 from ...framework.plugins.joints import Placed, numbers_of, rows_of
-from ...systems.contacts.solving.joints import DRIVE, GIVEN, HOLD, LIMIT, POINT, SERVO, SPRING, TURN
-from ...systems.contacts.solving.linked_joint import linked_joint
-from ...systems.contacts.solving.records import JOINTS
+from ...systems.contacts.solving.joints.linked import linked_joint
+from ...systems.contacts.solving.joints.records import JOINTS
+from ...systems.contacts.solving.joints.rows import DRIVE, GIVEN, HOLD, LIMIT, POINT, SERVO, SPRING, TURN
 from ...systems.tracking import BEFORE_STEP
 from .arms import arm_of, moment
 from .joint import WORLD, Changes, Driven, Joint, Place, Row

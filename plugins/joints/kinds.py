@@ -9,7 +9,7 @@ import numpy as np
 
 from ...framework.data.columns import special_column
 from ...framework.typing import Vector
-from ...systems.contacts.solving.joints import CONE, DRIVE, HOLD, LIMIT, LINE, POINT, SERVO, SLIDE, SPRING
+from ...systems.contacts.solving.joints.rows import CONE, DRIVE, HOLD, LIMIT, LINE, POINT, SERVO, SLIDE, SPRING
 from .joint import FREE, LEAST, MOST, WORLD, Driven, Joint, Place, Row, optional
 
 SQUARE = 1e-6  # cosine between directions that are at right angles

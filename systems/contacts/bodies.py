@@ -14,7 +14,7 @@ from ..integration.turning import size_of_turn
 from .constants import FREQUENCY, SAG, TIPPING_FREQUENCY, TIPPING_SAG
 from .points import points_of
 from .solving.islands import order_rows
-from .solving.joined import lay_joints
+from .solving.joints.bodies import lay_joints
 from .solving.prediction import drop_support
 from .solving.rows import turn_body
 

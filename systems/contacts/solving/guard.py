@@ -23,8 +23,8 @@ from ..constants import (
     SOLVED,
     SWEEPS,
 )  # fmt: skip
-from .given import rates_of_given
-from .joints import GIVEN, POINT, TURN, relax_open
+from .joints.given import rates_of_given
+from .joints.rows import GIVEN, POINT, TURN, relax_open
 from .rows import closing_speed, relax_listed, velocity_at
 
 

@@ -37,7 +37,7 @@ from ..constants import (
     STRUCK,
     SUBSTEP_WORK,
 )  # fmt: skip
-from .joints import HOLD, LIMIT, LINE, POINT, TURN
+from .joints.rows import HOLD, LIMIT, LINE, POINT, TURN
 
 COLOURS = 62  # bits of a mask; rows of a body beyond them share the last one
 

@@ -37,7 +37,7 @@ from ..constants import (
 from .chunks import find_chunks
 from .guard import excess_speed, finish_substep, island_of, islands_of, open_all
 from .hard import choose_hard, leave_open
-from .joints import add_joints, keep_joints, measure_joints, solve_joints, start_joints, warm_start_joints
+from .joints.rows import add_joints, keep_joints, measure_joints, solve_joints, start_joints, warm_start_joints
 from .passes import close_in_order, converge, note_impulses, solve_pass
 from .rows import ARMS, JOINTED, NO_ARMS, apply_impulse, room_of, turn_body, weigh_row
 

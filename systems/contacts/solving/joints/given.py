@@ -1,8 +1,8 @@
 """Rows whose value a function of a plugin gives, see docs/write-a-joint.md: how their bodies move with them.
 
 A row has four vectors, ``along_a``, ``turn_a``, ``normal`` and ``turn_b``: what the velocity and the spin of each body
-change of its value per second, and along which its impulse pushes and turns them. The function is linked, see
-linked_joint, and called in each substep. Where it tells no value this is the sum of these changes.
+change of its value per second, and along which its impulse pushes and turns them. The function is linked (see
+linked) and called in each substep. Where it tells no value this is the sum of these changes.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from ....framework.compilation import inlined, part
-from ....framework.jit.lazy import types
-from ....framework.jit.records.record_type import record_type
-from ....framework.vectors import add, add_scaled, dot, scale
-from ...integration.turning import change_of_spin
-from ...shapes.linking.signatures import call_in_dimension, vector_type
-from .records import SOLVER
+from .....framework.compilation import inlined, part
+from .....framework.jit.lazy import types
+from .....framework.jit.records.record_type import record_type
+from .....framework.vectors import add, add_scaled, dot, scale
+from ....integration.turning import change_of_spin
+from ....shapes.linking.signatures import call_in_dimension, vector_type
+from ..records import SOLVER
 
 
 @cache

@@ -9,17 +9,17 @@ the passes that do not push; limits are not soft, so that no motor is stronger. 
 pushes alone. One that swings faster than substeps can follow holds its value.
 
 Joints come before the contacts of their range, in the pass that pushes and once in those that do not. Their bodies have
-the columns of bodies that spin, as contacts of such bodies have: see rows.JOINTED.
+the columns of bodies that spin, as contacts of such bodies have: see solving.rows.JOINTED.
 """
 
 from __future__ import annotations
 
 import math
 
-from ....framework.compilation import inlined, part
-from ....framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
-from ...integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
-from ..constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY, SPRING_FREQUENCY
+from .....framework.compilation import inlined, part
+from .....framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
+from ....integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
+from ...constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY, SPRING_FREQUENCY
 from .given import measure_given, push_given, speed_of_given
 
 POINT, LINE, SLIDE, TURN, ALIGN, CONE, GIVEN = range(7)

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 
-from ....framework.compilation import inlined, part
-from ....framework.jit.records.record_type import zero_of
-from ....framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
-from ...codes import NEED_COLUMNS, OK
-from ...compounds.rows import owner_of, place_of
-from ...integration.turning import change_of_spin, cross_spin
-from ...narrow_phase.stages import layers_meet
-from ...shapes.tolerances import reach_of
-from .joints import DRIVE, GIVEN, POINT, SLIDE, TURN
-from .rows import turn_body
-from .warm_start import row_of
+from .....framework.compilation import inlined, part
+from .....framework.jit.records.record_type import zero_of
+from .....framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
+from ....codes import NEED_COLUMNS, OK
+from ....compounds.rows import owner_of, place_of
+from ....integration.turning import change_of_spin, cross_spin
+from ....narrow_phase.stages import layers_meet
+from ....shapes.tolerances import reach_of
+from ..rows import turn_body
+from ..warm_start import row_of
+from .rows import DRIVE, GIVEN, POINT, SLIDE, TURN
 
 
 @inlined

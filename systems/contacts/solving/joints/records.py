@@ -1,0 +1,89 @@
+"""Rows of joints, which a plugin writes where joints or their fields change; see rows."""
+
+from __future__ import annotations
+
+from .....framework.jit.records.schema import Schema, flags, floats, integer, ints, number, vectors
+
+JOINTS = Schema(
+    "Joints",
+    count=integer(),
+    joint=ints(),  # the entity of a row's joint
+    kind=ints("int8"),  # POINT, LINE, SLIDE, TURN, ALIGN, CONE, GIVEN
+    rule=ints("int8"),  # HOLD, LIMIT, DRIVE, SPRING, SERVO
+    entity_a=ints(),  # 0: the world
+    entity_b=ints(),
+    anchor_a=vectors(),  # m from the body's position, along its own axes, of the world a place; of angles in space unit
+    anchor_b=vectors(),  # vectors, likewise
+    axis=vectors(),  # along the axes of a, of what slides or turns; of what turns in a plane (1, 0)
+    low=floats(),  # m or rad: the least, or the only one,
+    high=floats(),  # and the most
+    target=floats(),  # m/s or rad/s
+    most=floats(),  # N or N m
+    frequency=floats(),  # Hz, of springs
+    damping_ratio=floats(),
+    function=ints(),  # of a GIVEN: address of the function of a plugin,
+    part=ints("int8"),  # which of its rows,
+    numbers_at=ints("int32"),  # and where the fields of the joint begin
+    numbers=floats(),
+    # what is kept from step to step
+    load=floats(),  # N or N m in the last substep,
+    pull=vectors(),  # and N of a POINT
+    total=floats(),  # N s or N m s in the step
+    thrust=vectors(),
+    normal=vectors(),  # along which it acts, or about which
+    along_a=vectors(),  # of a GIVEN: the same for the first body
+    value=floats(),  # m or rad of a GIVEN, after the last substep
+    old_load=floats(),  # the same before the step
+    old_pull=vectors(),
+    old_normal=vectors(),
+    old_along_a=vectors(),
+    old_value=floats(),
+    # pairs of bodies that joints keep from touching, the smaller id first, in order
+    apart=integer(),
+    apart_a=ints(),
+    apart_b=ints(),
+    # in a step
+    kept_in=integer(),  # 1 + the number of the step that these were kept in
+    rows_version=integer(),  # of the rows of bodies
+    row_a=ints("int32"),  # -1: the world, or a body that is gone
+    row_b=ints("int32"),
+    active=integer(),  # rows that take part, in the order of their ranges:
+    order=ints("int32"),
+    open_row=ints("int32"),  # of these, those that further passes go over: so many
+    opened=integer(),
+    first=ints("int32"),  # places of the two bodies
+    second=ints("int32"),
+    base_a=vectors(),  # anchors where the step has turned the bodies
+    base_b=vectors(),
+    rail=vectors(),  # axis, likewise
+    between=vectors(),  # m, from a to b where the step starts
+    angle=floats(),  # rad, likewise as the step has turned the bodies
+    axes_a=vectors(),  # of the bodies of a GIVEN, likewise: as many rows as there are dimensions
+    axes_b=vectors(),
+    # in a range
+    begin=integer(),  # places in ``order``
+    end=integer(),
+    step=number(),  # s of a substep
+    fastest=number(),  # Hz: springs above it hold
+    moved_for=number(),  # s since the joints were measured
+    asked=integer(),  # the joint whose function runs now; 0: none
+    push_rate=floats(),  # 1/s at which error is pushed out,
+    mass_scale=floats(),  # and what makes it soft
+    impulse_scale=floats(),
+    # in a substep
+    arm_a=vectors(),
+    arm_b=vectors(),
+    gap=vectors(),  # m, of a POINT
+    turn_a=vectors(),  # of a GIVEN: about which it turns them
+    turn_b=vectors(),
+    mass=floats(),  # kg or kg m^2
+    inverse=vectors(),  # of the masses of a POINT: diagonal,
+    inverse_products=vectors(),  # and beside it
+    pushing=floats(),  # m/s or rad/s that the passes ask for,
+    opening=floats(),  # and those that do not push
+    soft=flags(),  # where a pass pushes
+    least=floats(),  # N s or N m s
+    greatest=floats(),
+    impulse=floats(),
+    push=vectors(),  # N s of a POINT
+)
