@@ -239,7 +239,9 @@ def linearise(state, dt):
             normal = struck_along  # coincident centres have parted: not back again
             forget_manifold(pairs, c)
         solver.normal[k], pairs.normal[c] = normal, normal
-        solver.gap[k], solver.apart[k] = gap, apart
+        fixed = a if bodies.inverse_mass[a] == 0.0 else b
+        round_floor = state.spinning and bodies.rolling_radius[fixed] > 0.0  # no corner to slide past
+        solver.gap[k], solver.apart[k] = gap, apart and not round_floor
         # After an impact at time t the body seems to come from dv t behind: no overlap to be pushed out.
         solver.parting[k] = parting == PARTS or (pairs.impulse[c] > 0.0 and gap > 0.0)
         solver.extent[k] = extent
