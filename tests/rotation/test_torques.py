@@ -66,6 +66,7 @@ def spring(bodies):
     bodies.torque -= STIFFNESS * bodies.rotation
 
 
+@pytest.mark.compiled
 @methods
 @pytest.mark.parametrize("damping", [0.0, 0.9])
 def test_a_torsion_spring_in_a_plane(method, damping):
@@ -92,6 +93,7 @@ def test_a_pendulum_that_goes_over_the_top(method):
     )
 
 
+@pytest.mark.compiled
 @methods
 def test_a_force_that_the_angle_changes_and_a_torque_that_the_place_changes(method):
     """Two oscillators of one body, coupled: the exponential of a matrix."""
@@ -109,6 +111,7 @@ def test_a_force_that_the_angle_changes_and_a_torque_that_the_place_changes(meth
     )
 
 
+@pytest.mark.compiled
 @methods
 def test_a_torsion_spring_about_a_principal_axis(method):
     def twist(bodies):
