@@ -21,7 +21,8 @@ test-all: .venv/test
 test-long: .venv/test  # more cases and steps of what the others test, before a release
 	$(PYTEST) -m long $(ARGS)
 coverage: .venv/test  # which lines of the engine the tests run: kernels as plain Python, with the same bits as compiled
-	NUMBA_DISABLE_JIT=1 $(PYTEST) -m "plain and not slow and not compiled" --cov --cov-report=term $(ARGS)
+	NUMBA_DISABLE_JIT=1 $(PYTEST) -m "plain and not slow and not compiled" --cov --cov-report=term $(ARGS) \
+	  $$(grep -rl --include="test_*.py" "mark\.plain" tests | sort)  # all others would be collected in vain
 wheel: .venv/plot  # for this platform and Python, with compiled kernels, into dist/
 	rm -rf framework/prebuilt build/lib build/bdist*
 	$(BIN)/carom warm-up --portable framework/prebuilt

@@ -271,6 +271,7 @@ def test_parts_of_parts_and_fields_that_change():
     assert body_of(world, arm).kind == "static"
 
 
+@pytest.mark.compiled
 def test_a_foot_and_a_cone_of_sight_report_as_themselves():
     world = World(Physics(dimensions=2, gravity=(0, -G)), Rotation(), Parts(), convex_polygon.plugin)
     ground = floor(world)
@@ -318,6 +319,7 @@ def test_plain_esper_calls_and_bulk_creation_make_parts():
     esper.switch_world("default")
 
 
+@pytest.mark.compiled
 def test_forces_and_joints_at_a_part_move_the_body():
     world, parts = parts_world()
     world.add_plugin(Joints())

@@ -254,6 +254,7 @@ def test_edges_lie_on_faces_and_along_each_other_in_two_points():
                 assert gaps.max() == pytest.approx(0.4 - math.sqrt(0.16 - aside**2), rel=0.01, abs=1e-12)
 
 
+@pytest.mark.compiled
 def test_points_keep_their_order_while_a_box_turns():
     """On the ground, through a whole turn in small steps: the same place in the list, but for a few starts anew."""
     places, jumps = None, 0

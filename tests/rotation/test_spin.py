@@ -392,6 +392,7 @@ def test_bodies_made_at_once_have_an_inertia_of_their_own_or_that_of_their_shape
             world.create_entities(3, Spin.many(inertia=[None, "heavy", None]), *parts)
 
 
+@pytest.mark.compiled
 def test_a_small_torque_turns_what_could_sleep():
     with space(sleeping=True) as world:
         entity = world.create_entity(
