@@ -176,14 +176,14 @@ def test_a_file_gets_its_reference_from_two_methods_that_agree(tmp_path):
 
 def test_errors_against_an_own_reference_are_the_true_ones(tmp_path):
     """A spring in a file, whose solution only the test knows: cos(w t), displacement 2."""
-    case = case_of(scene_file(tmp_path, SPRING.format(stiffness=15.0)), seconds=0.9, repeats=1, steps=(1 / 60,))
+    case = case_of(scene_file(tmp_path, SPRING.format(stiffness=135.0)), seconds=0.3, repeats=1, steps=(1 / 60,))
     assert case.kind == SMOOTH
     x, v = np.array([1.0]), np.array([0.0])
-    for _ in range(54):
-        force = -15.0 * x
+    for _ in range(18):
+        force = -135.0 * x
         x = x + v / 60 + force / 7200
-        v = v + (force - 15.0 * x) / 120
-    true = abs(x[0] - math.cos(math.sqrt(15.0) * 0.9)) / 2
+        v = v + (force - 135.0 * x) / 120
+    true = abs(x[0] - math.cos(math.sqrt(135.0) * 0.3)) / 2
     assert errors(case, "position")["velocity verlet", 1 / 60] == pytest.approx(true, rel=1e-3)
 
 

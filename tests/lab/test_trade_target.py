@@ -51,7 +51,7 @@ WANTED = {
     "billiards": Wanted(1e-3, "position", {"seconds": 1.0}),
 }
 each_scene = pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.long if name in ("thermal_gas", "spring") else ()) for name in WANTED]
+    "name", [pytest.param(name, marks=[pytest.mark.long] * (name not in ("jump", "stack"))) for name in WANTED]
 )
 
 
