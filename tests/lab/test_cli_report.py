@@ -83,12 +83,12 @@ def test_the_worlds_faults_are_shown(carom, ball):
 
 def test_the_progress_says_what_compiles(tmp_path):
     """The names of kernels appear while they compile; of two here, the others are in the cache."""
-    cache = copied_cache(tmp_path / "cache", "sum_forces", "solve_contacts")
+    cache = copied_cache(tmp_path / "cache", "sum_forces", "match_warm_start")
     arguments = ("run", "jump", "--no-pictures", "--steps", "60")
     result = run_carom(*arguments, cwd=tmp_path, FORCE_COLOR="1", **cache)  # rich then animates into the pipe
     assert result.returncode == 0, result.stderr
     assert "compiling" in result.stderr
-    assert "solve_contacts" in result.stderr
+    assert "match_warm_start" in result.stderr
     assert "100%" in result.stderr
 
 
