@@ -22,7 +22,7 @@ from carom.plugins.springs import Springs
 
 MODES = ("discrete", "continuous", "event_driven")
 METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
-STEPS = 14
+STEPS = 10
 
 gems = Plugin("gems")
 

@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 from helpers_motion import METHODS, NOISE, Oscillator, SpringAndDrag, all_methods, oscillators
+from helpers_pairwise import pairwise
 from oracles import integrators_naive as naive
 from worlds import make_world
 
@@ -251,9 +252,7 @@ def turning(d, method, stiffness, drag, damping=0.0, dt=1 / 60):
     return world
 
 
-@all_methods
-@pytest.mark.parametrize("d", [2, 3])
-@pytest.mark.parametrize("column", range(5))
+@pytest.mark.parametrize(("d", "method", "column"), pairwise((2, 3), METHODS, range(len(COLUMNS))))
 def test_turns_have_the_limits_of_places(d, method, column):
     """Of the same oscillator, with moments of inertia for masses."""
     (stiffness, drag), w = COLUMNS[column], 40.0
