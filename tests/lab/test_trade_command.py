@@ -36,6 +36,12 @@ def carom(tmp_path, monkeypatch):
     return run
 
 
+@pytest.fixture
+def no_charts(monkeypatch):
+    """For what other tests have drawn."""
+    monkeypatch.setattr(trade_command, "drawing_if_there", lambda *_: None)
+
+
 def trade_in(folder: Path) -> Trade:
     return Trade.from_dict(json.loads((folder / "trade.json").read_text()))
 
@@ -80,6 +86,7 @@ def test_what_it_prints(made):
     assert "solver loops" not in result.stdout  # a terminal is too narrow
 
 
+@pytest.mark.usefixtures("no_charts")
 def test_json_alone_goes_to_stdout_and_nothing_runs_twice(carom, monkeypatch):
     first = carom("jump", *SHORT)
     assert first.exit_code == 0, first.output
@@ -123,6 +130,7 @@ FEW = (
 )  # fmt: skip
 
 
+@pytest.mark.usefixtures("no_charts")
 def test_it_answers_in_five_lines_first_and_then_from_more_runs(carom, monkeypatch):
     shown = []
     monkeypatch.setattr(trade_command, "answer", lambda *known: shown.append(known[0]) or answer(*known))
@@ -151,6 +159,7 @@ def test_without_matplotlib_everything_but_pictures(carom, monkeypatch):
     assert {path.name for path in Path("out/trade").iterdir()} == WRITTEN
 
 
+@pytest.mark.usefixtures("no_charts")
 def test_an_interruption_says_what_is_kept_and_how_to_go_on(carom, monkeypatch):
     ran = []
 
