@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, length, row, scale, store, sub
 from ..ccd.search_bounds import FAST
-from ..ccd.turning_touch import first_touch_of_turn, turn_of_path
+from ..ccd.turning_touch import FOLLOWED, first_touch_of_turn, turn_of_path
 from ..integration.turning import cross_spin, is_turned, size_of_turn, turn_of_arm
 from ..narrow_phase.manifolds import centre_offset_at_start, evaluate_pair, forget_manifold, has_manifold
 from ..shapes.convex.points import MOST_POINTS, contact_points, is_same
@@ -15,8 +17,8 @@ from ..shapes.linking.convex_by_address import convex_at, rounding_by_address, s
 from ..shapes.tolerances import reach_of, smaller_extent, turning_margin
 from .constants import UNREACHED
 
-FOLLOWED = 0.5  # rad: so far a face that turns is followed to the end of the step
 INWARDS, LEVEL = 0.2, 1.0 - 1e-6  # extents: that nearer to the middle the normal of a face is the same, to this cosine
+SAME_FACE = 0.9  # cosine between the normals of a first touch and of the end: other points of the end count, too
 TILT = 0.1  # rad: faces whose normals are so near that of the contact touch along their length, or soon will
 
 
@@ -53,6 +55,7 @@ def lay_arms(state, dt, r, gap):
     gaps[0] = gap
     if rows > 1:
         tilt = TILT + dt * (size_of_turn(bodies.spin[a]) + size_of_turn(bodies.spin[b]))
+        tilt += max(0.0, -gap) / extent  # no end of a face that overlaps is left out
         margin = turning_margin(state, dt, a, b)
         count = contact_points(state, (a, b), d, (-gap, normal, point), (margin, tilt), places, gaps)
     round_a, round_b = rounding_of(state, a), rounding_of(state, b)
@@ -111,6 +114,18 @@ def lies_on_face(state, sides, d, turn, normal):
 
 
 @part
+def nearest_row(solver, r, rows, core_a, core_b):
+    """Of the rows of a pair, which begin with r, the one whose point is nearest to that of these arms."""
+    nearest, at = math.inf, r
+    for one in range(r, r + rows):
+        k = solver.slot[one]
+        away = length(sub(solver.core_a[k], core_a)) + length(sub(solver.core_b[k], core_b))
+        if away < nearest and solver.gap[k] < 0.5 * UNREACHED * solver.extent[k]:
+            nearest, at = away, one
+    return at
+
+
+@part
 def lay_first_touch(state, dt, r):
     """The rows of a pair of which one body turns far, if it touches on the way: at one point, as they are turned then.
 
@@ -149,10 +164,15 @@ def lay_first_touch(state, dt, r):
     core_b = add(core_b, turn_of_arm(scale(left_b, -1.0), core_b))
     before = add(add(way, sub(begin, start)), sub(turn_of_arm(left_b, core_b), turn_of_arm(left_a, core_a)))
     apart = dot(add(start, sub(arm_b, arm_a)), normal) if led else gap - dot(before, normal)
-    for e in range(points_of(state, c)):
-        one = solver.slot[r + e]
-        solver.normal[one], solver.apart[one], solver.parting[one] = normal, True, False
-        solver.arm_a[one], solver.arm_b[one], solver.core_a[one], solver.core_b[one] = arm_a, arm_b, core_a, core_b
-        solver.gap[one] = apart if e == 0 else UNREACHED * solver.extent[one]
-    solver.place[k], pairs.normal[c] = point, normal
+    same_face, rows = dot(solver.normal[k], normal) > SAME_FACE, points_of(state, c)
+    at = nearest_row(solver, r, rows, core_a, core_b) if same_face else r
+    for one in range(r, r + rows):
+        k = solver.slot[one]
+        solver.apart[k], solver.parting[k] = True, False
+        if one == at:
+            solver.normal[k], solver.place[k], solver.gap[k] = normal, point, apart
+            solver.arm_a[k], solver.arm_b[k], solver.core_a[k], solver.core_b[k] = arm_a, arm_b, core_a, core_b
+        elif not same_face:
+            solver.gap[k] = UNREACHED * solver.extent[k]
+    pairs.normal[c] = normal
     forget_manifold(pairs, c)

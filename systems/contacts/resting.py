@@ -8,7 +8,7 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add_scaled, dot, item, length, replace, sub
 from ..ccd.search_bounds import FAST, is_swept, turns_far
-from ..ccd.turning_touch import first_touch_of_turn
+from ..ccd.turning_touch import first_touch_of_turn, is_followed
 from ..codes import OK
 from ..impacts.impulses import STOPPED, is_beyond_cap, is_rattling
 from ..integration.turning import arms_to, closing_by_spin, size_of_turn
@@ -71,7 +71,8 @@ def deepest(state, dt, c, d):
     a, b = pairs.a[c], pairs.b[c]
     if state.spinning and turns_far(state, a, b):
         touches, _, _, normal, _, _, _ = first_touch_of_turn(state, dt, a, b)
-        return 2.0 * slop_of(state, a, b) if touches else -math.inf, normal, touches
+        if touches or not is_followed(bodies, a, b):
+            return 2.0 * slop_of(state, a, b) if touches else -math.inf, normal, touches
     far, gap, normal = touch_of_long_way(state, dt, a, b, d)
     if far:
         return -gap - dot(sub(d, centre_offset_at_start(bodies, a, b)), normal), normal, True

@@ -40,6 +40,7 @@ def test_a_thin_bar_passes_through_no_ball_and_strikes_none_that_it_does_not_mee
     free = least_gaps(places, velocities, angles, spins, radii, 0.0) > 0.02  # apart where the step starts
     spins, angles, velocities, radii, places = (x[free] for x in (spins, angles, velocities, radii, places))
     gaps = least_gaps(places, velocities, angles, spins, radii, dt)
+    soon = least_gaps(places, velocities, angles, spins, radii, 1.25 * dt)  # a usual substep looks ahead as far
     with World(Physics(2, gravity=0), Rotation(), settings=Settings(collision=mode, on_fault="ignore")) as world:
         balls = []
         for k, place in enumerate(places):
@@ -53,7 +54,7 @@ def test_a_thin_bar_passes_through_no_ball_and_strikes_none_that_it_does_not_mee
         after = np.array([world.component_for_entity(entity, RigidBody).linear_velocity for entity in balls])
     struck = np.abs(after - velocities).max(axis=1) > 1e-9
     assert struck[gaps < -1e-3].all()
-    assert not struck[gaps > 5e-3].any()
+    assert not struck[soon > 5e-3].any()
     assert min((gaps < -1e-3).sum(), (gaps > 1e-3).sum()) > 15
 
 
@@ -96,3 +97,25 @@ def test_boxes_that_turn_and_fall_through_more_than_a_floor_in_a_step_stay_above
             world.step()
             assert world.bodies.dynamic.position[:, 1].min() > -1.0
         assert world.bodies.dynamic.position[:, 1].min() > 0.0
+
+
+@pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
+def test_what_turns_fast_does_not_sink_into_what_the_floor_stops(mode):
+    """A box that turns and the bar below it fall as fast: on their free ways they may not touch, but the bar is
+    stopped. Neither that nor the box's second corner in a step leads in by more than a fifth of its half side."""
+    for seed in range(30):
+        random = np.random.default_rng((seed, 5))
+        speed, below = random.uniform(2, 8), 0.25 + random.uniform(0, 0.2) * 8 / 60
+        with World(Physics(2, gravity=0), Rotation(), settings=Settings(collision=mode, on_fault="ignore")) as world:
+            world.create_entity(Transform((0, -1)), BoxCollider((20, 1)))
+            bar = world.create_entity(
+                Transform((0, below)), RigidBody(1, linear_velocity=(0, -speed)), Spin(), BoxCollider((1, 0.25))
+            )
+            above = below + 0.25 + np.sqrt(0.125) + random.uniform(0, 0.1)
+            place = Transform((random.uniform(-0.3, 0.3), above), random.uniform(0, 1))
+            spin = Spin(random.choice([-1, 1]) * random.uniform(15, 25))
+            box = world.create_entity(place, RigidBody(1, linear_velocity=(0, -speed)), spin, BoxCollider((0.25, 0.25)))
+            for _ in range(6):
+                world.step()
+                met = (world.contacts.entity_a == bar) & (world.contacts.entity_b == box)
+                assert (world.contacts.depth[met] < 0.2 * 0.25).all(), seed

@@ -114,7 +114,7 @@ def test_thrown_ragdolls_are_not_torn_nor_go_through_stairs(seeds, share, mode):
             gaps_of_all += worst.tolist()
     assert max(gaps_of_all) < 0.15
     assert np.quantile(gaps_of_all, 0.98) < 0.1
-    assert np.mean(np.array(gaps_of_all) > 0.05) < share  # as what strikes them fast is solved in short substeps
+    assert np.mean(np.array(gaps_of_all) > 0.05) <= share  # as what strikes them fast is solved in short substeps
 
 
 def test_the_car_drives_over_the_hills():
