@@ -17,6 +17,7 @@ from .quaternions import product
 
 SWEEPS = 16  # of Jacobi rotations: each squares what is off the diagonal
 SPHERICAL = 1e-24  # square of the sine between momentum and angular velocity: less is none
+ENERGY_ROUNDING = 1e-14  # of the energy
 DIAGONAL = 1e-15  # of the trace: what is off the diagonal by less is rounding
 PIECE, MOST_PIECES = 0.25, 64  # rad: as far as unlike moments turn a body in one of the pieces of its way
 
@@ -40,9 +41,31 @@ def turned_about(q, m, k, angle):
 
 
 @part
+def of_axis(v, k):
+    """The k-th of three."""
+    return v[0] if k == 0 else (v[1] if k == 1 else v[2])
+
+
+@part
 def energy_of(m, inverse):
     """Twice the kinetic energy."""
     return m[0] * m[0] * inverse[0] + m[1] * m[1] * inverse[1] + m[2] * m[2] * inverse[2]
+
+
+@part
+def turn_about_one(q, m, inverse, gained):
+    """As :func:`turn_to_energy`, but about one axis of the body: the one that takes the least of the momentum along
+    another. What swings far about two axes has states of its energy that no turn towards its velocity leads to."""
+    axis, least, angle = 0, math.inf, 0.0
+    for k in range(3):
+        a, b = (k + 1) % 3, (k + 2) % 3
+        x, y, steep = of_axis(m, a), of_axis(m, b), of_axis(inverse, a) - of_axis(inverse, b)
+        change = gained / steep if steep != 0.0 else math.inf
+        if abs(change) < least and -y * y <= change <= x * x:
+            axis, least = k, abs(change)
+            to_x, to_y = math.sqrt(x * x - change), math.sqrt(y * y + change)
+            angle = math.atan2(y, x) - math.atan2(math.copysign(to_y, y), math.copysign(to_x, x))
+    return turned_about(q, m, axis, angle)
 
 
 @part
@@ -65,8 +88,12 @@ def turn_to_energy(q, m, inverse, gained):
     share, half = tangent * cosine / steep, math.sqrt(0.5 + 0.5 * cosine)
     back = -share / (2.0 * half * square)
     axis = back * (m[1] * z - m[2] * y), back * (m[2] * x - m[0] * z), back * (m[0] * y - m[1] * x)
-    turned = product(q, (half, axis[0], axis[1], axis[2]))
-    return turned, (m[0] * cosine + x * share, m[1] * cosine + y * share, m[2] * cosine + z * share)
+    turned, wanted = product(q, (half, axis[0], axis[1], axis[2])), energy_of(m, inverse) - gained
+    m = m[0] * cosine + x * share, m[1] * cosine + y * share, m[2] * cosine + z * share
+    excess = energy_of(m, inverse) - wanted
+    if left >= 0.0 or abs(excess) <= ENERGY_ROUNDING * wanted:
+        return turned, m
+    return turn_about_one(turned, m, inverse, excess)
 
 
 @part
@@ -76,12 +103,6 @@ def most_similar(inverse):
     if x <= y and x <= z:
         return 1, 2, 0
     return (2, 0, 1) if y <= z else (0, 1, 2)
-
-
-@part
-def of_axis(v, k):
-    """The k-th of three."""
-    return v[0] if k == 0 else (v[1] if k == 1 else v[2])
 
 
 @part
