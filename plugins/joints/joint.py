@@ -122,7 +122,7 @@ class Joint(Component, abstract=True):
                 raise
             if name in self.fixed:
                 self._values["attached"] = False
-            elif np.isscalar(value) and before.get(name) == self._values[name]:
+            elif np.isscalar(value) and np.all(before.get(name) == self._values[name]):
                 return  # a game may set its motors in each step
             self._values["changed"] = True
             Changes.count += 1
