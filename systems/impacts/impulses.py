@@ -140,11 +140,16 @@ def is_deflected(state, i):
     return length(sub(bodies.origin[i], bodies.previous_position[i])) > FAST * bodies.min_extent[i]
 
 
+@inlined
+def most_caught(state):
+    """The impacts of a body in a row with what stands still after which it is caught."""
+    return CAUGHT if state.mode == EVENT_DRIVEN else max(FEW, min(CAUGHT, state.max_impacts))
+
+
 @part
 def is_rattling(state, a, b):
     """Whether one of the two bounces for ever between things that stand still, of which the other is one."""
-    bodies, caught = state.bodies, state.bodies.caught
-    most = CAUGHT if state.mode == EVENT_DRIVEN else max(FEW, min(CAUGHT, state.max_impacts))
+    bodies, caught, most = state.bodies, state.bodies.caught, most_caught(state)
     return (caught[a] >= most and stands_still(bodies, b)) or (caught[b] >= most and stands_still(bodies, a))
 
 
@@ -221,10 +226,13 @@ def hand_over(state, event, dt):
         bounce(state, event, dt)
     else:
         count_capped(state, a, b)
-    if landing or (restitution_of(state, a, b) == 1.0 and is_rattling(state, a, b)):
+    caught = restitution_of(state, a, b) == 1.0 and is_rattling(state, a, b)
+    if landing or (caught and max(bodies.caught[a], bodies.caught[b]) < 2 * most_caught(state)):
         if bodies.inverse_mass[a] * bodies.inverse_mass[b] == 0.0:
-            rate = mill_speed(state, event) if state.spinning else 0.0
-            slide(state, a if bodies.inverse_mass[a] > 0.0 else b, impacts.event_normal[event], rate, dt)
+            i, rate = a if bodies.inverse_mass[a] > 0.0 else b, mill_speed(state, event) if state.spinning else 0.0
+            slide(state, i, impacts.event_normal[event], rate, dt)
+            if not landing:  # what turns may touch again at once, whatever it slides along
+                note_caught(state, i, True)
         return
     pairs.crossed[c] = True
     forget_manifold(pairs, c)

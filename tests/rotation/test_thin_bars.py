@@ -75,3 +75,17 @@ def test_no_thin_bar_passes_through_ground(count, ground, mode):
         passed, deepest = count_passed(mode, ground, e, friction, 13, count)
         assert passed == 0
         assert deepest < 0.1
+
+
+@pytest.mark.parametrize("mode", ["continuous", "event_driven"])
+def test_a_step_ends_for_a_bar_that_is_caught_in_a_thin_wall(mode):
+    """It reaches through one wall beside another one, and turns: what it slides along it touches again at once."""
+    settings, rough = Settings(dt=0.05, collision=mode, on_fault="ignore"), {"restitution": 1.0, "friction": 0.5}
+    with World(Physics(2, gravity=0), Rotation(), settings=settings) as world:
+        for place, half in (((4.01, 0), (0.01, 4.02)), ((0, -4.01), (4.02, 0.01))):
+            world.create_entity(Transform(place), RigidBody(kind="static"), BoxCollider(half, **rough))
+        bar, body = BoxCollider((0.3257, 0.01), **rough), RigidBody(linear_velocity=(12.987, 0))
+        place = Transform((3.366, -3.812), 8.542)
+        world.create_entity(place, body, Spin(2.126), bar)
+        world.step()
+        assert 0 < world.stats().counters["capped_impacts"] < 1000
