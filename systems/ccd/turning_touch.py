@@ -30,6 +30,7 @@ MOST_STRIDES = 4096  # looks at shapes whose gap does not tell the next one;
 STRIDE, SHORTER = 0.02, 0.1  # extents between these; of the stride of others: that of a thin box which is turned is
 # the extent of the box around it
 FOLLOWED = 0.5  # rad in a step
+MOST_SUNK = 0.5  # slops, or a graze: deeper nothing sinks in before a touch
 GRAZE = 0.125  # slops: as far as points move between looks at a pair that touches and parts, or after EXACT_LOOKS
 
 
@@ -98,7 +99,7 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
         d = add(along(path, t), sub(sub(bodies.offset[b], bodies.offset[a]), ends))
         _, depth, normal, point = evaluate(state, shape_a, a, shape_b, b, d)
         w = rate_along(path, t)
-        least = max(0.0, depth + grazes * graze) if look == 0 else least
+        least = max(0.0, depth + min(grazes * graze, max(graze, MOST_SUNK * slop))) if look == 0 else least
         depth -= least
         near = max(near, graze) if look == EXACT_LOOKS + strides else near
         fastest, touches = turning + length(w) + bend * (until - t), -depth <= near

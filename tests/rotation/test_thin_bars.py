@@ -89,3 +89,23 @@ def test_a_step_ends_for_a_bar_that_is_caught_in_a_thin_wall(mode):
         world.create_entity(place, body, Spin(2.126), bar)
         world.step()
         assert 0 < world.stats().counters["capped_impacts"] < 1000
+
+
+def test_no_bar_is_pushed_through_a_thin_wall_by_another_one():
+    """Six elastic bars at 5 rad a step in a room whose walls are as thin: one strikes another against a wall, again and
+    again within a step."""
+    random, settings = np.random.default_rng(891), Settings(dt=0.05, collision="event_driven", on_fault="ignore")
+    with World(Physics(2, gravity=0), Rotation(), settings=settings) as world:
+        for axis in range(2):
+            for side in (-1, 1):
+                place, half = np.zeros(2), np.full(2, 3.02)
+                place[axis], half[axis] = 3.01 * side, 0.01
+                wall = BoxCollider(half, restitution=1.0, friction=0.5)
+                world.create_entity(Transform(place), RigidBody(kind="static"), wall)
+        for _ in range(6):
+            place = Transform(random.uniform(-2, 2, 2), random.uniform(-3, 3))
+            body, spin = RigidBody(linear_velocity=20 * random.normal(size=2)), Spin(50 * random.normal())
+            world.create_entity(place, body, spin, BoxCollider((0.33, 0.01), restitution=1.0, friction=0.5))
+        for _ in range(40):
+            world.step()
+            assert abs(world.bodies.dynamic.position).max() < 3.0
