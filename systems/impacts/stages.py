@@ -12,9 +12,9 @@ from ..linking.parts import FIRST_TOUCH, TAKE_TOGETHER, call_take_together
 from ..narrow_phase.stages import find_hasty
 from .find import queue_next_impact
 from .heap import heap_pop, holds
-from .impulses import CROSSING, IMPACT, STOPPED, bounce, hand_over, lands, stop
-from .together import EQUAL
-from .worklist import lacks_room, list_contacts, list_landings, list_neighbours, list_pair, list_pairs_of
+from .impulses import CROSSING, IMPACT, STOPPED, bounce, hand_over, stop
+from .together import EQUAL, put_back
+from .worklist import lacks_room, list_contacts, list_landings, list_neighbours, list_pairs_of
 
 BLOCK = 256  # bodies that are looked at before one that bounces is enough
 FAR = 1 << 15  # bodies from which their columns do not fit into the second-level cache
@@ -105,17 +105,17 @@ def next_event(state):
 
 @part
 def touches_down_first(state, event):
-    """Whether a body of this impact may have to land on something thin before: then that is searched, and the impact
-    once more."""
+    """Whether a body of this event may have to land on something thin before: then that is searched, and the event
+    waits once more."""
     impacts = state.impacts
     c, now = impacts.event_pair[event], impacts.event_time[event]
     looked, impacts.touchdown_time = impacts.touchdown_pair == c, 0.0
-    if looked or not impacts.may_sink or impacts.event_kind[event] == CROSSING or lands(state, event):
+    if looked or not impacts.may_sink or impacts.event_kind[event] == CROSSING:
         return False
     list_landings(state, c, now)
     if impacts.listed == 0:
         return False
-    list_pair(impacts, c, 0.0)
+    put_back(impacts, event)
     impacts.touchdown_pair, impacts.touchdown_time = c, now
     return True
 

@@ -30,9 +30,11 @@ def cases(every, few=None, missed=()):
     ]
 
 
-def seeds(few, every):
-    """Seeds for ``parametrize``: the first ``few`` always run, those up to ``every`` are marked long."""
-    return cases(range(every), few)
+def seeds(few, every, known=()):
+    """Seeds for ``parametrize``: the first ``few`` always run, as do those ``known`` to have failed once; the others up
+    to ``every`` are marked long."""
+    first = [*range(few), *known]
+    return cases([*first, *(seed for seed in range(few, every) if seed not in known)], len(first))
 
 
 def walls(world, half, thickness, *, open_top=False, **collider):
