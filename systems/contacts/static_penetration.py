@@ -113,9 +113,11 @@ def is_moved_by_solver(state, i):
 
 @part
 def may_have_sunk(state, c, i):
-    """Whether body i of pair c may be deeper than it may: the solver has moved it, what has struck it turns on, or so
-    many impacts in which it turns have stopped it: from one to the next it sinks in a little."""
-    if is_moved_by_solver(state, i):
+    """Whether body i of pair c may be deeper than it may: the solver has moved it, or has left it on its path, which is
+    not quite that of the substeps; what has struck it turns on, or so many impacts in which it turns have stopped it:
+    from one to the next it sinks in a little."""
+    rests = state.impacts.sweeps and state.solver.contacts > 0 and state.pairs.rests[c]
+    if rests or is_moved_by_solver(state, i):
         return True
     struck = state.spinning and state.pairs.impulse[c] > 0.0
     if struck and turns_far(state, state.pairs.a[c], state.pairs.b[c]):
