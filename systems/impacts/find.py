@@ -320,7 +320,7 @@ def queue_touch(state, c, path, found, touch, e, dt):
                 return
     if kind not in (CROSSING, NONE) and is_beyond_cap(state, a, b):
         kind = kind_beyond_cap(state, a, b, path, t, speed, e, dt) if impacts.sweeps else NONE
-        if kind != HAND_OVER:
+        if kind != HAND_OVER and e > 0.0:  # else it is what it would have been
             count_capped(state, a, b)
         e = 0.0 if kind == IMPACT else e
     if kind != NONE:
