@@ -9,7 +9,18 @@ import numpy as np
 
 from ...framework.data.columns import special_column
 from ...framework.typing import Vector
-from ...systems.contacts.solving.joints.rows import CONE, DRIVE, HOLD, LIMIT, LINE, POINT, SERVO, SLIDE, SPRING
+from ...systems.contacts.solving.joints.rows import (
+    CONE,
+    DRIVE,
+    HOLD,
+    LIMIT,
+    LINE,
+    POINT,
+    SERVO,
+    SLIDE,
+    SPRING,
+    TWIST,
+)  # fmt: skip
 from .joint import FREE, LEAST, MOST, WORLD, Driven, Joint, Place, Row, optional
 
 SQUARE = 1e-6  # cosine between directions that are at right angles
@@ -321,7 +332,7 @@ class Cone(Joint):
         rows, twist = [Row(POINT, HOLD)], self.in_order("twist", self.lower, self.upper)
         rows.append(Row(CONE, LIMIT, -math.inf, self.swing, axis=self.side_a, ends=(self.axis_a, self.axis_b)))
         if twist != FREE:
-            rows.append(self.turn(dimensions)._replace(rule=LIMIT, low=twist[0], high=twist[1]))
+            rows.append(self.turn(dimensions)._replace(kind=TWIST, rule=LIMIT, low=twist[0], high=twist[1]))
         return rows
 
 

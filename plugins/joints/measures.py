@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...systems.contacts.solving.joints.rows import FOLDED
 from .joint import Joint
 from .kinds import Cone, Distance, Hinge, Motor, Slider, Weld, Wheel
 
@@ -21,6 +22,7 @@ class Holds(NamedTuple):
     at_a: np.ndarray  # (n, d)
     at_b: np.ndarray
     axis: np.ndarray  # of a
+    axis_b: np.ndarray
     side_a: np.ndarray
     side_b: np.ndarray
     start: np.ndarray  # (n,)
@@ -90,18 +92,27 @@ def _angle(of: Holds, a: Moving, b: Moving) -> tuple[np.ndarray, np.ndarray]:
     return np.arctan2(_dot(axis, _cross(side_a, side_b)), _dot(side_a, side_b)), _dot(axis, b.spin - a.spin)
 
 
+def _twist(of: Holds, a: Moving, b: Moving) -> tuple[np.ndarray, np.ndarray]:
+    """About the axes where the shortest way has brought b's to a's."""
+    axis, side_a, side_b = a.turned(of.axis), a.turned(of.side_a), b.turned(of.side_b)
+    between = axis + b.turned(of.axis_b)
+    rate = between / np.maximum(FOLDED, _dot(between, axis))[:, None]
+    side_b = side_b - _dot(axis, side_b)[:, None] * rate
+    return np.arctan2(_dot(axis, _cross(side_a, side_b)), _dot(side_a, side_b)), _dot(rate, b.spin - a.spin)
+
+
 def _travel(of: Holds, a: Moving, b: Moving) -> tuple[np.ndarray, np.ndarray]:
     return _way(of._replace(axis=of.side_a), a, b)
 
 
 MEASURES = {
-    Distance: _length, Slider: _way, Wheel: _travel, Hinge: _angle, Weld: _angle, Motor: _angle, Cone: _angle,
+    Distance: _length, Slider: _way, Wheel: _travel, Hinge: _angle, Weld: _angle, Motor: _angle, Cone: _twist,
 }  # fmt: skip
 
 
 def holds(joints: Collection[Joint]) -> list[Holds]:
     """Of these joints as they are now."""
-    names, kinds = ("a", "b", "at_a", "at_b", "axis_a", "side_a", "side_b", "start"), {}
+    names, kinds = ("a", "b", "at_a", "at_b", "axis_a", "axis_b", "side_a", "side_b", "start"), {}
     for index, joint in enumerate(joints):
         function = MEASURES.get(type(joint))
         if function is not None:

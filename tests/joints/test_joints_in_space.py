@@ -119,6 +119,31 @@ def test_cone_bounds_swing_and_twist():
     assert math.atan2(math.hypot(x, y), z) == pytest.approx(0.5, abs=0.01)
 
 
+def test_a_wide_cone_bounds_its_twist_and_holds():
+    """The twist is 2 atan2(q . axis, q_w) of the turn q of b against a, at any swing; without gravity, energy falls."""
+    for seed in range(12):
+        random = np.random.default_rng(seed)
+        swing, most, axis = random.uniform(0.5, 2.5), random.uniform(0.2, 1.0), random.normal(size=3)
+        axis /= np.linalg.norm(axis)
+        world, joints = space(gravity=0.0)
+        a, b = block(world, (0, 0, 0)), block(world, (1.5, 0, 0))
+        for body in (a, b):
+            world.component_for_entity(body, Spin).angular_velocity = random.normal(0.0, 3.0, 3)
+        cone = world.create_entity(Cone(a, b, anchor=(0.75, 0, 0), axis=axis, swing=swing, twist=(-most, most)))
+        first = world.kinetic_energy()
+        for _ in range(90):
+            world.step()
+            one, other = joints.anchors()
+            assert np.linalg.norm(one - other) < 0.02, seed
+            (p, *u), (q, *v) = (np.array(at(world, body).rotation) for body in (a, b))
+            real, turn = p * q + np.dot(u, v), p * np.array(v) - q * np.array(u) - np.cross(u, v)
+            twist = math.remainder(2.0 * math.atan2(turn @ axis, real), 2.0 * math.pi)
+            assert abs(twist) < most + 0.05, seed
+            assert joints.state(cone).value == pytest.approx(twist, abs=1e-9)
+        assert world.kinetic_energy() <= first * 1.001
+        world.close()
+
+
 def test_gyroscope_precesses():
     """A wheel at the end of a horizontal arm goes round at m g r / (I w)."""
     world, _ = space(dt=1 / 240)

@@ -8,7 +8,7 @@ JOINTS = Schema(
     "Joints",
     count=integer(),
     joint=ints(),  # the entity of a row's joint
-    kind=ints("int8"),  # POINT, LINE, SLIDE, TURN, ALIGN, CONE, GIVEN
+    kind=ints("int8"),  # POINT, LINE, SLIDE, TURN, ALIGN, CONE, TWIST, GIVEN
     rule=ints("int8"),  # HOLD, LIMIT, DRIVE, SPRING, SERVO
     entity_a=ints(),  # 0: the world
     entity_b=ints(),

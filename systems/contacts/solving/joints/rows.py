@@ -2,11 +2,12 @@
 
 A joint is a few rows, which stand next to each other. POINT holds two anchors together, LINE the length between them,
 SLIDE how far b's anchor is along an axis of a. Others are angles: TURN about an axis; in space ALIGN, by how much an
-axis of b leads away from one of a in one direction, and CONE, by how much in all. GIVEN is what a plugin says, see
-given. A row HOLDs its value, keeps it within LIMITs, DRIVEs it at a speed, brings it there as a SERVO, or is a SPRING.
-What holds is as soft as a spring of a frequency that follows the rate of the substeps, and is solved without that in
-the passes that do not push; limits are not soft, so that no motor is stronger. Springs are solved in the pass that
-pushes alone. One that swings faster than substeps can follow holds its value.
+axis of b leads away from one of a in one direction, CONE, by how much in all, and TWIST, behind a CONE, how far b turns
+about its axis beyond the shortest way there. GIVEN is what a plugin says, see given. A row HOLDs its value, keeps it
+within LIMITs, DRIVEs it at a speed, brings it there as a SERVO, or is a SPRING. What holds is as soft as a spring of a
+frequency that follows the rate of the substeps, and is solved without that in the passes that do not push; limits are
+not soft, so that no motor is stronger. Springs are solved in the pass that pushes alone. One that swings faster than
+substeps can follow holds its value.
 
 Joints come before the contacts of their range, in the pass that pushes and once in those that do not. Their bodies have
 the columns of bodies that spin, as contacts of such bodies have: see solving.rows.JOINTED.
@@ -22,8 +23,9 @@ from ....integration.turning import change_of_spin, compliance, cross_spin, end_
 from ...constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY, SPRING_FREQUENCY
 from .given import measure_given, push_given, speed_of_given
 
-POINT, LINE, SLIDE, TURN, ALIGN, CONE, GIVEN = range(7)
+POINT, LINE, SLIDE, TURN, ALIGN, CONE, TWIST, GIVEN = range(8)
 HOLD, LIMIT, DRIVE, SPRING, SERVO = range(5)
+FOLDED = 1e-2  # 1 + cosine of a swing: beyond it a twist is nearly any angle
 LEAST_SHARE = 1e-9  # of its mass that a spring without damping takes part with
 BRAKES = 0.9  # of the speed from which a servo could just stop in time
 
@@ -151,13 +153,18 @@ def multiplied(diagonal, others, v):
 
 @inlined
 def angle_of(solver, j):
-    """(axis, angle) of a row of angles."""
+    """(along which a spin changes it, angle) of a row of angles: of most the axis."""
     joints = solver.joints
     a, b, rail = joints.first[j], joints.second[j], joints.rail[j]
     if len(rail) == 2:
         return rail, joints.angle[j] + item(solver.turn[b], 0) - item(solver.turn[a], 0)
     axis = turned_with(solver, a, rail)
     end_a, end_b = turned_with(solver, a, joints.base_a[j]), turned_with(solver, b, joints.base_b[j])
+    if joints.kind[j] == TWIST:  # what is left where the shortest way has brought b's axis, of the row before, to a's
+        between = add(axis, turned_with(solver, b, joints.base_b[j - 1]))
+        rate = scale(between, 1.0 / max(FOLDED, dot(between, axis)))
+        end_b = add_scaled(end_b, rate, -dot(axis, end_b))
+        return rate, math.atan2(dot(axis, cross_spin(end_a, end_b)), dot(end_a, end_b))
     across = cross_spin(end_a, end_b)
     if joints.kind[j] == ALIGN:
         return axis, dot(axis, across)
