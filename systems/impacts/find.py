@@ -26,7 +26,7 @@ from ..integration.turning import arms_to, closing_by_spin, is_turned
 from ..linking.parts import FIRST_TOUCH, call_first_touch
 from ..narrow_phase.manifolds import is_at_manifold
 from ..narrow_phase.stages import rank_rows
-from ..shapes.dispatch import both_convex, evaluate, friction_of, is_corner_touch, restitution_of
+from ..shapes.dispatch import both_convex, evaluate, friction_of, has_corner_rule, is_corner_touch, restitution_of
 from ..shapes.poses import lead_on, motion_of, set_motion
 from ..shapes.tolerances import is_turning, slop_of, smaller_extent, turning_travel
 from .heap import heap_push
@@ -198,9 +198,15 @@ def closing_speed(state, a, b, path, touch, kind, dt):
         if state.spinning and not speed < -ROUNDING * turning_travel(state, 1.0, a, b):  # it has landed
             return NONE, speed
         return HAND_OVER if passes_unseen(state, a, b, path, touch, dt) else NONE, speed
+    turns = turning_travel(state, dt, a, b) > slop_of(state, a, b)
     slides = kind == SWEPT and (bodies.warm_started[a] or bodies.warm_started[b])
-    slides &= turning_travel(state, dt, a, b) <= slop_of(state, a, b)  # what turns reaches the edge by that as well
-    if slides and is_held_by_edge(state, a, b, path, touch, speed, dt):
+    if has_corner_rule(state, bodies.shape[a], bodies.shape[b]):  # what turns reaches the edge by that as well
+        slides &= not turns
+    if slides and turns:  # a supported body that tips over lands on the next of its corners while others hold it
+        slides = -speed * dt <= smaller_extent(bodies, a, b)
+    elif slides:
+        slides = is_held_by_edge(state, a, b, path, touch, speed, dt)
+    if slides:
         return NONE, speed
     return IMPACT, speed
 
