@@ -164,9 +164,10 @@ def stdout_kept_clean() -> contextlib.AbstractContextManager[Any]:
 
 
 def load(target: str) -> Loaded:
-    """The scene named ``target``, or the file at that path; Problem if neither exists."""
-    if target in scenes.names():
-        scene = scenes.get(target)
+    """The scene named ``target``, with hyphens if one likes, or the file at that path; Problem if neither exists."""
+    name = target.replace("-", "_")
+    if name in scenes.names():
+        scene = scenes.get(name)
         return Loaded(scene.name, scene.build, seconds=scene.seconds, view=scene.view, settings=scene.settings)
     path = Path(target)
     if path.is_dir():

@@ -72,6 +72,12 @@ def test_ctrl_c_while_compiling_is_one_line(tmp_path):
     assert output.splitlines()[-1] == "carom: stopped"
 
 
+def test_a_scene_may_be_named_with_hyphens():
+    from carom.lab.cli.loading import load
+
+    assert load("billiards-spin").name == "billiards_spin"
+
+
 # -- modules beside a file ------------------------------------------------------------------------
 
 SIBLING = FALLING_BALL.replace("def build", "import params\n\ndef build").replace("(seed, 10)", "(0, params.HEIGHT)")
