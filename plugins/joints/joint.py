@@ -177,8 +177,11 @@ class Joint(Component, abstract=True):
             raise ValueError(f"{name} joins entity {self.a} and entity {self.b}, which are both of one body, {body}")
 
     def in_order(self, name: str, low: float | None, high: float | None) -> tuple[float, float]:
-        """Two limits, none where they are None; ValueError if the first is the larger."""
-        least, most = -math.inf if low is None else low, math.inf if high is None else high
+        """Two limits, none where they are None; ValueError if the first is the larger, or one is no number."""
+        try:
+            least, most = -math.inf if low is None else float(low), math.inf if high is None else float(high)
+        except (TypeError, ValueError):
+            raise ValueError(f"{type(self).__name__}.{name} must be numbers, got {low!r} and {high!r}") from None
         if least > most:
             raise ValueError(f"{type(self).__name__}.{name} must be (least, most), got ({low}, {high})")
         return least, most

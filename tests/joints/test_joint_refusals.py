@@ -164,6 +164,11 @@ def test_fields_that_do_not_fit_leave_the_joint_as_it_is():
     hinge.lower = -1.0
     run(world, 300)
     assert at(world, leaf).rotation == pytest.approx(-1.0, abs=2e-3)
+    rope = Distance(1, 2, length=2.0)
+    for wrong in ({}, "x", (1.0, {})):
+        with pytest.raises(ValueError, match=r"Distance\.length must be numbers, got"):
+            rope.length = wrong
+    assert rope.length == 2.0
 
 
 def test_one_number_is_for_all_of_a_vector():
