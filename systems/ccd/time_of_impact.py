@@ -76,7 +76,7 @@ def first_touch(state, a, b, path, since, until, limits):
     shape_a, shape_b = state.bodies.shape[a], state.bodies.shape[b]
     if state.spinning and is_turning(state, until, a, b):
         spins, near = (state.bodies.spin[a], state.bodies.spin[b]), NEAR * smaller_extent(state.bodies, a, b)
-        near_limits = limits[0], near, limits[2], limits[3], SHORTER * limits[1], False
+        near_limits = limits[0], near, limits[2], limits[3], SHORTER * limits[1]
         found, (t, normal, point, at), _ = touch_of_turning(state, a, b, path, spins, (since, until), near_limits)
         # Offsets of colliders stand as where the step ends: seen from there, so that arms are right.
         shift_a, shift_b = shift_of_offset(state, a, t - until), shift_of_offset(state, b, t - until)

@@ -76,10 +76,9 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
     with those spins; shapes stand as at the second of these. limits: (slop; gap of a touch; speed of approach of the
     point below which a touch is one only if no faster one follows; -inf: any is one, at corners too; by how many grazes
     they have to be deeper than at the first time; -inf: by none; time between looks at a pair with a rule for corners,
-    whose gap holds only as they are turned now: there the touch is bisected; whether what touches at the first time and
-    parts there touches nowhere, if any is a touch)."""
+    whose gap holds only as they are turned now: there the touch is bisected)."""
     bodies, (spin_a, spin_b), (since, until) = state.bodies, spins, times
-    (slop, near, threshold, grazes, stride, parts), shape_a, shape_b = limits, bodies.shape[a], bodies.shape[b]
+    (slop, near, threshold, grazes, stride), shape_a, shape_b = limits, bodies.shape[a], bodies.shape[b]
     holds = not has_corner_rule(state, shape_a, shape_b)  # its gap, however they are turned meanwhile
     stride = max(stride, (until - since) / MOST_STRIDES)
     strides = 0 if holds else int((until - since) / stride)
@@ -107,8 +106,6 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
             rate = 0.0
             if threshold > -math.inf:
                 rate, point = closing_point(state, a, b, d, (depth + least, normal, point), near - least, w)
-            elif parts and look == 0 and closing_point(state, a, b, d, (depth, normal, point), near, w)[0] > 0.0:
-                break  # it parts, and another corner may come in: the points at the end tell more
             closes = rate < -threshold or (rate < 0.0 and not found)
             if closes and (corners or not is_corner_touch(state, shape_a, a, shape_b, b, d, slop)):
                 touch, found, gap = (t, normal, point, d), True, -depth
@@ -143,10 +140,13 @@ def turn_of_path(state, i, dt):
     return scale(state.bodies.spin[i], dt) if struck else state.bodies.turn[i]
 
 
-@inlined
-def is_followed(bodies, a, b):
+@part
+def is_followed(state, a, b, dt):
     """Whether two bodies turn so little that the points in which they touch where the step ends tell of all of it."""
-    return size_of_turn(bodies.turn[a]) + size_of_turn(bodies.turn[b]) <= FOLLOWED
+    turn = 0.0
+    for i in (a, b):
+        turn += size_of_turn(turn_of_path(state, i, dt)) if state.bodies.rolling_radius[i] == 0.0 else 0.0
+    return turn <= FOLLOWED
 
 
 @part
@@ -164,6 +164,6 @@ def first_touch_of_turn(state, dt, a, b):
     spins = turn_of_path(state, a, dt), turn_of_path(state, b, dt)
     way = length(travel) + way_of_turning(bodies, a, spins[0]) + way_of_turning(bodies, b, spins[1])
     stride = STRIDE * smaller_extent(bodies, a, b) / way if way > 0.0 else 1.0
-    limits = (slop, BESIDE * slop, -math.inf, -math.inf, stride, is_followed(bodies, a, b))
+    limits = (slop, BESIDE * slop, -math.inf, -math.inf, stride)
     found, (share, normal, point, _), gap = touch_of_turning(state, a, b, path, spins, (since, 1.0), limits)
     return found, share, gap, normal, point, start, scale(travel, share)

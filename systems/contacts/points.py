@@ -127,12 +127,13 @@ def nearest_row(solver, r, rows, core_a, core_b):
 
 @part
 def lay_first_touch(state, dt, r):
-    """The rows of a pair of which one body turns far, if it touches on the way: at one point, as they are turned then.
+    """The rows of a pair of which one body turns far, if it touches on the way: one is that of the touch, as they are
+    turned then. Others stay as at the end if the face is the same, and are out of reach if it is not.
 
-    The gap and the arms are those of the moment of touch, led back to where the shapes stand in the other rows.
+    The gap and the arms of the touch are led back to where the shapes stand in the other rows.
     """
     solver, pairs, bodies = state.solver, state.pairs, state.bodies
-    c, k = solver.pair[r], solver.slot[r]
+    c = solver.pair[r]
     a, b = pairs.a[c], pairs.b[c]
     touches, share, gap, normal, point, begin, way = first_touch_of_turn(state, dt, a, b)
     if not touches:
@@ -164,7 +165,7 @@ def lay_first_touch(state, dt, r):
     core_b = add(core_b, turn_of_arm(scale(left_b, -1.0), core_b))
     before = add(add(way, sub(begin, start)), sub(turn_of_arm(left_b, core_b), turn_of_arm(left_a, core_a)))
     apart = dot(add(start, sub(arm_b, arm_a)), normal) if led else gap - dot(before, normal)
-    same_face, rows = dot(solver.normal[k], normal) > SAME_FACE, points_of(state, c)
+    same_face, rows = dot(solver.normal[solver.slot[r]], normal) > SAME_FACE, points_of(state, c)
     at = nearest_row(solver, r, rows, core_a, core_b) if same_face else r
     for one in range(r, r + rows):
         k = solver.slot[one]

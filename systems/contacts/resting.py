@@ -37,7 +37,7 @@ from ..shapes.tolerances import (
     turning_travel,
 )  # fmt: skip
 from .approach import first_touch_on_segment, meets_at_corner, segment_start
-from .points import lay_arms, lay_first_touch, points_of
+from .points import is_ball, lay_arms, lay_first_touch, points_of
 
 ENTRY_ITERATIONS = 24
 APART = 1e-11  # of the extent: a smaller gap is none, not even as seen past a round corner
@@ -71,7 +71,7 @@ def deepest(state, dt, c, d):
     a, b = pairs.a[c], pairs.b[c]
     if state.spinning and turns_far(state, a, b):
         touches, _, _, normal, _, _, _ = first_touch_of_turn(state, dt, a, b)
-        if touches or not is_followed(bodies, a, b):
+        if touches or not is_followed(state, a, b, dt):
             return 2.0 * slop_of(state, a, b) if touches else -math.inf, normal, touches
     far, gap, normal = touch_of_long_way(state, dt, a, b, d)
     if far:
@@ -240,9 +240,9 @@ def linearise(state, dt):
             normal = struck_along  # coincident centres have parted: not back again
             forget_manifold(pairs, c)
         solver.normal[k], pairs.normal[c] = normal, normal
-        fixed = a if bodies.inverse_mass[a] == 0.0 else b
-        round_floor = state.spinning and bodies.rolling_radius[fixed] > 0.0  # no corner to slide past
-        solver.gap[k], solver.apart[k] = gap, apart and not round_floor
+        if apart and state.spinning and is_ball(state, a, normal) and is_ball(state, b, normal):
+            apart = False  # neither has a corner to slide past
+        solver.gap[k], solver.apart[k] = gap, apart
         # After an impact at time t the body seems to come from dv t behind: no overlap to be pushed out.
         solver.parting[k] = parting == PARTS or (pairs.impulse[c] > 0.0 and gap > 0.0)
         solver.extent[k] = extent

@@ -150,7 +150,7 @@ def keep_out_of_all(state, dt, i):
 
 
 def resolve_static_penetration(state, dt):
-    """Put the bodies that the solver has moved out of what cannot be moved."""
+    """Put the bodies that the solver has moved, and in swept modes those that rest, out of what cannot be moved."""
     pairs, bodies = state.pairs, state.bodies
     pushed = state.solver.contacts > 0 or state.any_warm_started or (state.spinning and state.impacts.logged > 0)
     if not pushed or state.count == state.dynamic:

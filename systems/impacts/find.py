@@ -45,7 +45,8 @@ from .turning import respond
 
 QUICK = 1e-3  # of the step: inelastic impacts closer than this in time are treated as inelastic collapse
 GRAZES = 4  # impacts of two bodies in a step after which they sink in before the next one,
-SINKS, PLASTIC_SINKS = 4.0, 1.0  # by so many grazes: elastic ones at 8, 16, ... impacts, others at each
+SINKS, PLASTIC_SINKS = math.inf, 1.0  # by so many grazes, up to MOST_SUNK: elastic ones at 8, 16, ... impacts, others
+# at each
 MOST_PLASTIC = 1000  # impacts of a body in a step after which those beyond the cap are none any more
 
 NO_TOUCH, OVERLAPS_AT_END, SWEPT = range(3)
@@ -185,9 +186,10 @@ def is_held(state, a, b):
 
 
 @part
-def closing_speed(state, a, b, path, touch, kind, dt):
+def closing_speed(state, c, path, touch, kind, dt):
     """Of a solid pair: (NONE, HAND_OVER if it lands, too slow to bounce, or IMPACT; speed along the normal)."""
     bodies, impacts, (t, normal, point, apart) = state.bodies, state.impacts, touch
+    a, b = state.pairs.a[c], state.pairs.b[c]
     speed = dot(rate_along(path, t), normal)
     if state.spinning:
         speed += closing_by_spin(bodies, a, b, arms_to(bodies, a, b, normal, point, apart), normal)
@@ -202,8 +204,9 @@ def closing_speed(state, a, b, path, touch, kind, dt):
     slides = kind == SWEPT and (bodies.warm_started[a] or bodies.warm_started[b])
     if has_corner_rule(state, bodies.shape[a], bodies.shape[b]):  # what turns reaches the edge by that as well
         slides &= not turns
-    if slides and turns:  # a supported body that tips over lands on the next of its corners while others hold it
-        slides = -speed * dt <= smaller_extent(bodies, a, b)
+    if slides and turns:  # what tips over on another body lands on its next corner while the one before holds it
+        slides = state.pairs.early[c] and restitution_of(state, a, b) == 0.0
+        slides &= -speed * dt <= smaller_extent(bodies, a, b)
     elif slides:
         slides = is_held_by_edge(state, a, b, path, touch, speed, dt)
     if slides:
@@ -316,7 +319,7 @@ def queue_touch(state, c, path, found, touch, e, dt):
     touch = (t, normal, point, apart)
     speed, kind = dot(w, normal), CROSSING
     if not passive:
-        kind, speed = closing_speed(state, a, b, path, touch, found, dt)
+        kind, speed = closing_speed(state, c, path, touch, found, dt)
         e = 0.0 if kind == HAND_OVER else e
     if state.path_degree == 1 and e != 1.0 and kind == IMPACT:
         speed = correct_speed(state, a, b, touch, speed, dt)

@@ -217,7 +217,7 @@ def count_capped(state, a, b):
 @part
 def hand_over(state, event, dt):
     """Leave a touch to the solver. What lands loses its approach and slides along what cannot be moved, as does what is
-    caught there; what else is beyond the cap stays where it is."""
+    caught there, until it is caught twice as often; what else is beyond the cap stays where it is."""
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
     c = impacts.event_pair[event]
     a, b = pairs.a[c], pairs.b[c]
@@ -229,7 +229,8 @@ def hand_over(state, event, dt):
     caught = restitution_of(state, a, b) == 1.0 and is_rattling(state, a, b)
     if landing or (caught and max(bodies.caught[a], bodies.caught[b]) < 2 * most_caught(state)):
         if bodies.inverse_mass[a] * bodies.inverse_mass[b] == 0.0:
-            i, rate = a if bodies.inverse_mass[a] > 0.0 else b, mill_speed(state, event) if state.spinning else 0.0
+            i = a if bodies.inverse_mass[a] > 0.0 else b
+            rate = mill_speed(state, event) if state.spinning else 0.0
             slide(state, i, impacts.event_normal[event], rate, dt)
             if not landing:  # what turns may touch again at once, whatever it slides along
                 note_caught(state, i, True)

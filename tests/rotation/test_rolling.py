@@ -232,6 +232,20 @@ def test_follow_stun_and_draw(kind, spin):
 # -- what turns by itself, and heaps --------------------------------------------------------------
 
 
+@pytest.mark.parametrize("fixed", [{}, {"kind": "kinematic"}], ids=["static", "kinematic"])
+def test_a_ball_between_two_that_stand_still_comes_to_rest(fixed):
+    with World(Physics(2, gravity=(0, -G)), Rotation()) as world:
+        for x in (-0.8, 0.8):
+            body = [RigidBody(**fixed)] if fixed else []
+            world.create_entity(Transform((x, 0)), *body, SphereCollider(0.7, friction=1.0))
+        entity = ball(world, (0.02, 0.95), r=0.5, friction=1.0)
+        for _ in range(600):
+            world.step()
+        v, w = motion(world, entity)
+        assert np.abs(v).max() < 1e-9
+        assert abs(w[2]) < 1e-9
+
+
 @pytest.mark.parametrize("mode", MODES)
 def test_a_wheel_that_turns_drives_what_lies_on_it(mode):
     """A ball between two kinematic wheels that turn alike comes to turn the other way, as fast at its surface."""

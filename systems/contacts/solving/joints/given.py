@@ -2,7 +2,7 @@
 
 A row has four vectors, ``along_a``, ``turn_a``, ``normal`` and ``turn_b``: what the velocity and the spin of each body
 change of its value per second, and along which its impulse pushes and turns them. The function is linked (see
-linked) and called in each substep. Where it tells no value this is the sum of these changes.
+``linked``) and called in each substep. Where it tells no value this is the sum of these changes.
 """
 
 from __future__ import annotations

@@ -153,7 +153,7 @@ def multiplied(diagonal, others, v):
 
 @inlined
 def angle_of(solver, j):
-    """(along which a spin changes it, angle) of a row of angles: of most the axis."""
+    """(along which a spin changes it, angle) of a row of angles: for most rows the axis."""
     joints = solver.joints
     a, b, rail = joints.first[j], joints.second[j], joints.rail[j]
     if len(rail) == 2:
