@@ -29,7 +29,7 @@ TILT = 0.1  # rad, between faces that may touch in several points
 MOST_STRIDES = 4096  # looks at shapes whose gap does not tell the next one;
 STRIDE, SHORTER = 0.02, 0.1  # extents between these; of the stride of others: that of a thin box which is turned is
 # the extent of the box around it
-FOLLOWED = 0.5  # rad in a step
+FOLLOWED = 0.5  # rad in a step: up to that the end of the step tells where what turns touches
 MOST_SUNK = 0.5  # slops, or a graze: deeper nothing sinks in before a touch
 GRAZE = 0.125  # slops: as far as points move between looks at a pair that touches and parts, or after EXACT_LOOKS
 

@@ -312,3 +312,15 @@ def test_what_rests_does_not_notice_that_another_one_wakes():
             place, motion = (world.component_for_entity(other, one) for one in (Transform, RigidBody))
             ends.append((place.position.tolist(), place.rotation, motion.linear_velocity.tolist()))
     assert ends[0] == ends[1]
+
+
+def test_no_end_of_a_face_that_overlaps_is_left_out():
+    """A box that is a quarter deep in another one, and askew: both of its lower corners push, else it would tip."""
+    for turn in (0.05, 0.09, 0.12, 0.14):
+        with World(Physics(2, gravity=0), Rotation()) as world:
+            world.create_entity(Transform((0, 0)), RigidBody(1.0), Spin(), BoxCollider((1, 0.5)))
+            half_height = 0.5 * (math.cos(turn) + math.sin(turn))
+            place = Transform((0, 0.5 + half_height - 0.25), turn)
+            world.create_entity(place, RigidBody(1.0), Spin(), BoxCollider((0.5, 0.5)))
+            world.step()
+            assert len(world.contacts.manifold) == 2, turn
