@@ -16,7 +16,7 @@ from .broad_phase.uniform_grid import reserve_grid
 from .impacts import records as impact_records
 from .scene import Scene
 
-COLOURS = 64
+COLOURS = 128
 SPARE = 1 << 16  # rows at most that are reserved beyond what is asked for
 # What these stages need of the bodies before they do anything.
 COLUMNS_OF = {

@@ -4,7 +4,8 @@ An island is what contacts join, without what cannot be moved; islands do not kn
 substeps as the settings say: these are one range of rows, sorted by colour. Special ones have more, as their masses
 and what strikes them ask for, or are hard: each is a range by itself, behind the others.
 
-Rows of one colour share no body that moves, so that the processor can work on several at once.
+Pairs of one colour share no body that moves, so that the processor can work on several at once. Where bodies spin their
+rows are chunks: those of the first points of some pairs, then those of the second points of the same.
 """
 
 from __future__ import annotations
@@ -37,9 +38,11 @@ from ..constants import (
     STRUCK,
     SUBSTEP_WORK,
 )  # fmt: skip
+from ..points import points_of
 from .joints.rows import HOLD, LIMIT, LINE, POINT, TURN
 
-COLOURS = 62  # bits of a mask; rows of a body beyond them share the last one
+COLOURS = 62  # bits of a mask; pairs of a body beyond them share the last one
+CHUNK = 64  # pairs at most: their columns stay in the processor's first cache
 
 
 @part
@@ -56,13 +59,18 @@ def number_body(state, i):
 
 @part
 def colour_rows(state):
-    """Number the bodies of the rows, join them into islands and choose the colours."""
+    """Number the bodies of the rows, join them into islands and choose the colours, odd ones of pairs with several
+    points."""
     solver, pairs, inverse_mass = state.solver, state.pairs, state.bodies.inverse_mass
     used, starts, island = solver.used, solver.starts, solver.island
-    solver.bodies = 0
-    for k in range(COLOURS + 2):
+    solver.bodies = chosen = 0
+    for k in range(2 * COLOURS + 1):
         starts[k] = 0
     for r in range(solver.contacts):
+        if solver.point[r] > 0:
+            solver.colour[r] = chosen
+            starts[chosen + 1] += 1
+            continue
         c, taken = solver.pair[r], 0
         a, b = pairs.a[c], pairs.b[c]
         p, q = number_body(state, a), number_body(state, b)
@@ -79,9 +87,10 @@ def colour_rows(state):
         if moves_a and moves_b:
             one, other = root_of(island, p), root_of(island, q)
             island[max(one, other)] = min(one, other)
-        solver.colour[r] = colour
-        starts[colour + 1] += 1
-    for k in range(1, COLOURS + 1):
+        chosen = 2 * colour + (r + 1 < solver.contacts and solver.point[r + 1] > 0)
+        solver.colour[r] = chosen
+        starts[chosen + 1] += 1
+    for k in range(1, 2 * COLOURS + 1):
         starts[k] += starts[k - 1]
 
 
@@ -271,6 +280,31 @@ def place_rows(state):
 
 
 @part
+def lay_chunks(state):
+    """Divide the rows of each range and colour into chunks, and place those of a chunk point by point."""
+    solver, listed, colour, ends = state.solver, state.solver.listed, state.solver.colour, state.solver.row_ends
+    for r in range(solver.contacts):
+        listed[solver.slot[r]] = r
+    start = s = 0
+    solver.chunks = 0
+    while start < solver.contacts:
+        while ends[s] <= start:
+            s += 1
+        chosen = colour[listed[start]]
+        points = points_of(state, solver.pair[listed[start]]) if chosen % 2 == 1 else 1
+        most = min(ends[s], start + points * (CHUNK if chosen < 2 * COLOURS - 2 else 1))
+        stop = start
+        while stop < most and colour[listed[stop]] == chosen:
+            stop += points
+        pairs = (stop - start) // points
+        for t in range(stop - start):
+            solver.slot[listed[start + t]] = start + t % points * pairs + t // points
+        solver.ends[solver.chunks], solver.points[solver.chunks] = stop, points
+        solver.chunks += 1
+        start = stop
+
+
+@part
 def place_joints(state):
     """The rows of joints by range, those of each in their order."""
     solver, joints, ends = state.solver, state.solver.joints, state.solver.joint_ends
@@ -307,4 +341,6 @@ def order_rows(state, dt):
             solver.range_of[t], solver.special[solver.ranges] = solver.ranges, t
             solver.ranges += 1
     place_rows(state)
+    if state.spinning:
+        lay_chunks(state)
     place_joints(state)

@@ -18,7 +18,7 @@ def solve_pass(solver, bias, pushes, span):
     """One pass over the rows of a range: along their normals and along their surfaces."""
     if len(span[4]) > 0 and solver.has_rolling:
         solve_rolling(solver, span)
-    if len(span[4]) > 0 and solver.chunks * FEW < span[1] - span[0]:
+    if len(span[4]) > 0 and (solver.end_chunk - solver.first_chunk) * FEW < span[1] - span[0]:
         solve_chunks(solver, bias, pushes, span)
     else:
         solve_normals(solver, bias, pushes, span)

@@ -13,7 +13,7 @@ SOLVER = Schema(
     slot=ints("int32"),  # the row of contact r,
     pair=ints("int32"),  # its pair,
     point=ints("int8"),  # and which of the points of that
-    colour=ints("int8"),  # of contact r
+    colour=ints("int8"),  # of contact r: twice that of its pair, one more if that has several points
     listed=ints("int32"),  # some rows
     first=ints("uint32"),  # places of the two bodies
     second=ints("uint32"),
@@ -49,7 +49,7 @@ SOLVER = Schema(
     tangent_mass=floats(),  # kg, that an impulse along the surface moves
     rolling=floats(),  # m, of rolling friction
     rolled=vectors(),  # N m s in a substep, by that
-    # of the bodies of each row while its chunk is solved:
+    # of the bodies of each pair while its chunk is solved, where the row of its first point is:
     mass_a=floats(),  # inverse masses,
     mass_b=floats(),
     inertia_a=vectors(),  # inverse moments,
@@ -60,8 +60,11 @@ SOLVER = Schema(
     velocity_b=vectors(),
     spin_a=vectors(),
     spin_b=vectors(),
-    ends=ints("int32"),  # where each chunk ends
+    ends=ints("int32"),  # where each chunk ends,
+    points=ints("int8"),  # and how many rows each of its pairs has
     chunks=integer(),
+    first_chunk=integer(),  # of a range,
+    end_chunk=integer(),  # and the one behind its last
     visits=integer(),  # rows solved in this step
     starts=ints(),  # where each colour begins
     # bodies, in the order of their ranges
@@ -150,6 +153,7 @@ SOLVER = Schema(
 ARMS = (
     "place", "arm_a", "arm_b", "core_a", "core_b", "tangent_mass", "rolling", "rolled", "mass_a", "mass_b", "inertia_a",
     "inertia_b", "products_a", "products_b", "velocity_a", "velocity_b", "spin_a", "spin_b", "ends",
+    "points",
 )  # fmt: skip
 TURNS = ("spin", "spin_before", "turn", "sine", "versine", "inverse_inertia", "inverse_products", "reach")
 
