@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...framework.compilation import part
+from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add_scaled, dot, length, sub
 from ..integration.trajectory import ROUNDING, along, relative_path
@@ -15,6 +15,13 @@ LOOKS = 24
 STAYS_SLOPS = 1e-3  # slops: two bodies that go less far past each other in a step stay where they are
 
 
+@inlined
+def stays(end, start, slop):
+    """Whether two bodies that come from one place to another beside each other stay where they are; false for nan."""
+    travel = sub(end, start)
+    return dot(travel, travel) < STAYS_SLOPS * STAYS_SLOPS * slop * slop
+
+
 @part
 def meets_at_corner(state, a, b, d, slop):
     """Whether the two touch at a corner only. Shapes without a rule of their own are looked at if they move past each
@@ -25,8 +32,7 @@ def meets_at_corner(state, a, b, d, slop):
     if not has_corner_rule(state, shape[a], shape[b]):
         if not both_sharp(state, shape[a], shape[b]):
             return False
-        travel = sub(centre_offset(bodies, a, b), centre_offset_at_start(bodies, a, b))
-        if length(travel) < STAYS_SLOPS * slop:
+        if stays(centre_offset(bodies, a, b), centre_offset_at_start(bodies, a, b), slop):
             return False
     return is_corner_touch(state, shape[a], a, shape[b], b, d, slop)
 

@@ -36,7 +36,7 @@ from ..shapes.tolerances import (
     turning_margin,
     turning_travel,
 )  # fmt: skip
-from .approach import first_touch_on_segment, meets_at_corner, segment_start
+from .approach import first_touch_on_segment, meets_at_corner, segment_start, stays
 from .points import is_ball, lay_arms, lay_first_touch, points_of
 
 ENTRY_ITERATIONS = 24
@@ -230,7 +230,7 @@ def linearise(state, dt):
         gap, normal = -depth_by_plane(pairs, c, d), pairs.normal[c]
         apart, convex = gap > APART * extent, both_convex(state, bodies.shape[a], bodies.shape[b])
         solver.varies[k] = not convex and normal_varies(state, a, b, d, normal)
-        moves = not is_at_manifold(pairs, c, end, extent)
+        moves = not stays(end, d, slop)
         if moves and (apart or parting != STAYS or meets_at_corner(state, a, b, d, slop)):
             far, gap, normal = touch_of_long_way(state, dt, a, b, end)
             if not far or parting != STAYS:
@@ -278,7 +278,7 @@ def find_touching(state, dt):
             continue
         a, b, pushed, normal = pairs.a[c], pairs.b[c], pairs.impulse[c] > 0.0, pairs.normal[c]
         d, extent = centre_offset(bodies, a, b), smaller_extent(bodies, a, b)
-        if not is_at_manifold(pairs, c, d, extent):
+        if not (is_at_manifold(pairs, c, d, extent) or (pushed and stays(d, pairs.at[c], slop_for(state, extent)))):
             if solid and not pushed and not crossed and deepest_possible(pairs, c, d) < -SAME_PLACE * extent:
                 continue
             make_manifold(state, c, d)
