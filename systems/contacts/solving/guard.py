@@ -182,13 +182,15 @@ def find_unsolved(solver, turn, any_struck, dt, span, islands):
     """The rows of struck islands that are not solved, and all of islands that gain, come first in ``listed``; returns
     how many. An island has as many passes as its own size allows: what is solved elsewhere changes none of its bits."""
     unsolved, struck, passes, extent = solver.unsolved, solver.struck, solver.passes, solver.extent
-    any_gain, most, count = False, 0, 0
+    any_gain, most, count, used = False, 0, 0, solver.used
     for t in range(islands[0], islands[1]):
         solver.listed_of[t] = 0
         unsolved[t] = gains(solver, t) and not solver.jointed[t]  # what joints give passes over contacts do not take
         any_gain |= unsolved[t]
         most = max(most, passes[t] if struck[t] else 0)
     for k in range(span[0], span[1] if any_gain or any_struck else span[0]):
+        if turn > 0 and not any_gain and used[solver.first[k]] != turn and used[solver.second[k]] != turn:
+            continue  # no pass since the last look has changed what it asks
         excess, least = excess_speed(solver, k, span[4]) * dt, SOLVED * FURTHER_PASSES * extent[k]
         if excess * most > least or any_gain:  # seldom
             t = island_of(solver, k)
@@ -198,6 +200,18 @@ def find_unsolved(solver, turn, any_struck, dt, span, islands):
                 count += 1
     close_solved(solver, span[4])
     return count
+
+
+@part
+def note_changed(solver, turn, count, arms):
+    """``used`` of the bodies that further passes have changed becomes the number of these passes."""
+    for e in range(count):
+        k = solver.listed[e]
+        for q in (solver.first[k], solver.second[k]):
+            if solver.island[q] >= 0:
+                solver.used[q] = turn
+    for e in range(solver.opened if len(arms) > 1 else 0):
+        solver.used[solver.open_body[e]] = turn
 
 
 @part
@@ -277,6 +291,7 @@ def finish_substep(solver, bias_rate, any_struck, h, dt, span):
             relax_listed(solver, count, span[4])
         weigh(solver, span, islands)
         turn += SWEEPS
+        note_changed(solver, turn, count, span[4])
         count = find_unsolved(solver, turn, any_struck, dt, span, islands)
     restrain(solver, span, islands)
     settle(solver, islands)

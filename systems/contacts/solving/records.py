@@ -70,7 +70,7 @@ SOLVER = Schema(
     # bodies, in the order of their ranges
     bodies=integer(),
     body_row=ints("int32"),
-    used=ints(),  # colours of its rows; later a row
+    used=ints(),  # colours of its rows; later a row, or after how many further passes it was changed
     number=ints("int32"),
     island=ints("int32"),  # -1: cannot be moved
     velocity=vectors(),
