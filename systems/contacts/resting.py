@@ -278,7 +278,8 @@ def find_touching(state, dt):
             continue
         a, b, pushed, normal = pairs.a[c], pairs.b[c], pairs.impulse[c] > 0.0, pairs.normal[c]
         d, extent = centre_offset(bodies, a, b), smaller_extent(bodies, a, b)
-        if not (is_at_manifold(pairs, c, d, extent) or (pushed and stays(d, pairs.at[c], slop_for(state, extent)))):
+        known = pushed and pairs.rests[c] and stays(d, pairs.at[c], slop_for(state, extent))
+        if not (known or is_at_manifold(pairs, c, d, extent)):
             if solid and not pushed and not crossed and deepest_possible(pairs, c, d) < -SAME_PLACE * extent:
                 continue
             make_manifold(state, c, d)
