@@ -110,11 +110,9 @@ def depth_at(state, c, d, extent, exact):
 def mark_early(state):
     """Pairs that rested in the step before, and touched, are taken where this one starts. Both lists are in canonical
     order."""
-    pairs, contacts, entity, memory = state.pairs, state.contacts, state.bodies.entity, state.warm_start
-    now, k = contacts.now, 0
-    any_rested = state.moved and memory.counts[memory.now] > 0
-    count = contacts.counts[now] if any_rested else 0
-    for c in range(pairs.count if any_rested else 0):
+    pairs, contacts, entity, now, k = state.pairs, state.contacts, state.bodies.entity, state.contacts.now, 0
+    count = contacts.counts[now] if state.moved else 0
+    for c in range(pairs.count if count > 0 else 0):
         first, second = entity[pairs.a[c]], entity[pairs.b[c]]
         while k < count and (
             contacts.entity_a[now, k] < first
