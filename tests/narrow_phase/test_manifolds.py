@@ -11,6 +11,7 @@ from carom.plugins import Physics, half_space
 from carom.plugins.half_space import HalfSpaceCollider
 
 TOLERANCE = 1e-9  # of the extents, which are 1
+STAYS = 5e-6  # of them, a thousandth of the slop: what rests and moves by less keeps its point
 
 
 def overlap(world: World, a: int, b: int) -> tuple[float, np.ndarray, np.ndarray]:
@@ -52,7 +53,7 @@ def test_contacts_of_a_step_are_those_at_its_end(slope, collision):
                 if contact.normal_impulse == 0.0:  # else that along which they pushed
                     np.testing.assert_allclose(contact.normal, normal, atol=TOLERANCE)
                 if contact.depth > 0.0:
-                    np.testing.assert_allclose(contact.point, point, atol=TOLERANCE)
+                    np.testing.assert_allclose(contact.point, point, atol=STAYS if contact.normal_impulse else TOLERANCE)
                 depths.append(depth)
                 seen += 1
     assert seen > 500
