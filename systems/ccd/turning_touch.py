@@ -90,11 +90,10 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
     corners = threshold < 0.0 or (is_turned(bodies, a) and is_turned(bodies, b))  # of others, too
     poses = pose_of(state, a), pose_of(state, b)
     touch, found, gap = (until, zero_of(state), zero_of(state), zero_of(state)), False, 0.0
-    t, posed, least, low, high = since, until, 0.0, since, math.inf
+    t, least, low, high = since, 0.0, since, math.inf
     for look in range(LOOKS + strides):
-        turn_to(state, a, poses[0], spin_a, (until, posed, t))
-        turn_to(state, b, poses[1], spin_b, (until, posed, t))
-        posed = t
+        turn_to(state, a, poses[0], spin_a, until, t)
+        turn_to(state, b, poses[1], spin_b, until, t)
         d = add(along(path, t), sub(sub(bodies.offset[b], bodies.offset[a]), ends))
         _, depth, normal, point = evaluate(state, shape_a, a, shape_b, b, d)
         w = rate_along(path, t)
@@ -121,8 +120,8 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
             if convex and high == math.inf:  # what is beside the other one is looked at when it may be there
                 further = max(further, t + clear_along(state, a, b, d, normal) / (fastest + abs(dot(w, normal))))
         t = further if further < until else until
-    turn_to(state, a, poses[0], spin_a, (until, posed, until))
-    turn_to(state, b, poses[1], spin_b, (until, posed, until))
+    turn_to(state, a, poses[0], spin_a, until, until)
+    turn_to(state, b, poses[1], spin_b, until, until)
     return found, touch, gap
 
 

@@ -133,21 +133,19 @@ def turn_on(state, i, spin, h):
 
 
 @part
-def turn_to(state, i, end, spin, times):
-    """Body i is turned, and spins, as it does at the last of three times: from how it stands at the one before, or, if
-    it tumbles, from its pose ``end`` at the first: so there is one way on which it turns, at whatever times it is seen.
-    """
-    until, posed, t = times
-    if not tumbles(state, i):
-        turn_shape(state, i, scale(spin, t - posed))
-        return
+def turn_to(state, i, end, spin, until, t):
+    """Body i is turned, and spins, as it does at time t, from its pose ``end`` at another: so there is one way on which
+    it turns, at whatever times it is seen, and to the bit its pose then."""
     motion, offset, rows = end
-    axes, d = state.bodies.axes, len(spin)
-    for k in range(d if len(axes) > 0 else 0):
+    bodies, axes, d = state.bodies, state.bodies.axes, len(spin)
+    if len(axes) == 0 or length(motion[0]) + length(spin) == 0.0:
+        return
+    for k in range(d):
         for j in range(d):
             axes[(i * d + k) * d + j] = item(rows[k], j)
-    state.bodies.offset[i] = offset
+    bodies.offset[i] = offset
     set_motion(state, i, motion)
-    turn_on(state, i, spin, t - until)
-    if t == until and len(axes) > 0 and state.bodies.shape[i] >= 0:
-        write_rotated(state, state.bodies.shape[i], i, state.rotated)
+    if t != until:
+        turn_on(state, i, spin, t - until)
+    elif bodies.shape[i] >= 0:
+        write_rotated(state, bodies.shape[i], i, state.rotated)
