@@ -13,8 +13,8 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.stack_arrays import stack_array
-from ...framework.vectors import add, dot, length, negative, row, scale, sub
-from ..integration.trajectory import ROUNDING, along, rate_along, travel_of
+from ...framework.vectors import add, add_scaled, dot, length, negative, row, scale, sub
+from ..integration.trajectory import ROUNDING, along, path_of, rate_along, travel_of
 from ..integration.turning import arms_to, closing_by_spin, is_turned, size_of_turn
 from ..shapes.convex.points import MOST_POINTS, contact_points
 from ..shapes.dispatch import both_convex, evaluate, has_corner_rule, is_corner_touch
@@ -149,20 +149,30 @@ def is_followed(state, a, b, dt):
 
 
 @part
+def place_on_way(state, i, share, dt):
+    """Where body i is after that share of the step: on its path, if it is struck there, for what has moved it since did
+    so at the end; else on the straight way to where it is now."""
+    bodies = state.bodies
+    if is_struck(state, i):
+        return along(path_of(state, i), share * dt)
+    return add_scaled(bodies.previous_position[i], sub(bodies.position[i], bodies.previous_position[i]), share)
+
+
+@part
 def first_touch_of_turn(state, dt, a, b):
     """(whether they touch on the way, share of the step before that, gap then, normal, point from a's centre, from a's
     body to b's where that path starts, and how far that has gone), as the step leads and turns them since their last
     impacts; they need not approach."""
     bodies, slop, still, since = state.bodies, slop_of(state, a, b), zero_of(state), 0.0
-    start = sub(bodies.previous_position[b], bodies.previous_position[a])
     for i in (a, b):
         if is_struck(state, i):
-            start, since = sub(bodies.origin[b], bodies.origin[a]), max(since, bodies.last_impact[i] / dt)
+            since = max(since, bodies.last_impact[i] / dt)
+    start, left = sub(place_on_way(state, b, since, dt), place_on_way(state, a, since, dt)), 1.0 - since
     travel = sub(sub(bodies.position[b], bodies.position[a]), start)
     path = add(start, sub(bodies.offset[b], bodies.offset[a])), travel, still, still
-    spins = turn_of_path(state, a, dt), turn_of_path(state, b, dt)
+    spins = scale(turn_of_path(state, a, dt), left), scale(turn_of_path(state, b, dt), left)
     way = length(travel) + way_of_turning(bodies, a, spins[0]) + way_of_turning(bodies, b, spins[1])
     stride = STRIDE * smaller_extent(bodies, a, b) / way if way > 0.0 else 1.0
     limits = (slop, BESIDE * slop, -math.inf, -math.inf, stride)
-    found, (share, normal, point, _), gap = touch_of_turning(state, a, b, path, spins, (since, 1.0), limits)
-    return found, share, gap, normal, point, start, scale(travel, share)
+    found, (share, normal, point, _), gap = touch_of_turning(state, a, b, path, spins, (0.0, 1.0), limits)
+    return found, since + left * share, gap, normal, point, start, scale(travel, share)
