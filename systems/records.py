@@ -125,7 +125,8 @@ SPINS = Section(
     rolling_friction=floats(),  # m
     turn=vectors(),  # rad, in the step
     reach=floats(),  # m: how far turning moves points of the last level that has been measured, per rad, at most
-    driven=floats(default=0.0),  # m, by which motors may move its points farther than that
+    driven=floats(default=0.0),  # m, by which motors may move it, about where joints hold it, farther than that
+    driven_turn=floats(default=0.0),  # rad, by which they may turn it
     joined=flags(default=False),  # by joints, if any are active
 )  # fmt: skip
 FAILS = "the start of the step, for one that fails"

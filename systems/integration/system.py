@@ -87,7 +87,7 @@ class Integration(StagedSystem):
         ),
         Stage(
             begin_joints, "which joints hold a body that may move; how far motors may turn these",
-            ("inverse_mass", "still", "spin"), ("solver", "driven"), "joints",
+            ("inverse_mass", "still", "spin"), ("solver", "driven", "driven_turn"), "joints",
         ),
         Stage(
             note_path, "the path within the step, on which impacts are found", MOTION, ("path_velocity",), "colliders",

@@ -8,10 +8,9 @@ from .....framework.compilation import inlined, part
 from .....framework.jit.records.record_type import zero_of
 from .....framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 from ....codes import NEED_COLUMNS, OK
-from ....compounds.rows import owner_of, place_of
+from ....compounds.rows import next_row, owner_of, place_of
 from ....integration.turning import change_of_spin, cross_spin
 from ....narrow_phase.stages import layers_meet
-from ....shapes.tolerances import reach_of
 from ..rows import turn_body
 from ..warm_start import row_of
 from .rows import DRIVE, GIVEN, POINT, SLIDE, TURN
@@ -81,16 +80,19 @@ def begin_joints(state, dt):
 
 @part
 def find_driven(state, dt):
-    """How far motors, which act in the solver, may move points of each body in the step beyond what its spin does."""
+    """By how much motors, which act in the solver, may turn each body in the step beyond what its spin does, and how
+    far that moves its position. How far its points are from there is known later in the step."""
     joints, bodies = state.solver.joints, state.bodies
     for i in range(state.count):
-        bodies.driven[i] = 0.0
+        bodies.driven[i] = bodies.driven_turn[i] = 0.0
     for e in range(joints.active):
         j = joints.order[e]
         if not (joints.kind[j] == TURN and joints.rule[j] == DRIVE):
             continue
         a, b = joints.row_a[j], joints.row_b[j]
-        axis, missing = turned(state, a, joints.axis[j]) if a >= 0 else joints.axis[j], joints.target[j]
+        axis, missing = joints.axis[j], joints.target[j]
+        if a >= 0 and len(axis) == 3:
+            axis = turned(state, a, axis)
         missing -= dot(axis, bodies.spin[b]) if b >= 0 else 0.0
         missing += dot(axis, bodies.spin[a]) if a >= 0 else 0.0
         hold = j  # the first row of the joint: the point about which they turn
@@ -98,11 +100,13 @@ def find_driven(state, dt):
             hold -= 1
         for i, anchor in ((a, joints.anchor_a[hold]), (b, joints.anchor_b[hold])):
             if may_move(state, i):
-                most = joints.most[j] * dt * dot(axis, change_of_spin(bodies, i, axis))
-                reach = length(anchor) if joints.kind[hold] == POINT else 0.0
-                if bodies.rolling_radius[i] == 0.0:
-                    reach += reach_of(bodies.half_extents[i], bodies.offset[i])
-                bodies.driven[i] += min(abs(missing), most) * dt * reach
+                k = owner_of(state, i)
+                angle = min(abs(missing), joints.most[j] * dt * dot(axis, change_of_spin(bodies, k, axis))) * dt
+                way = angle * length(anchor) if joints.kind[hold] == POINT else 0.0
+                while k >= 0:
+                    bodies.driven[k] += way
+                    bodies.driven_turn[k] += angle
+                    k = next_row(state, k)
 
 
 @part
