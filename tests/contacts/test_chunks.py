@@ -40,13 +40,18 @@ def passes(d):
 
 
 def heap(d, random):
-    """Boxes on a floor, some in no contact with others, with and without friction."""
+    """Boxes on a floor, some in no contact with others, with and without friction; and more on a plank than there are
+    colours."""
     world = World(Physics(d), Rotation())
     world.create_entity(Transform((0.0, -1.0, 0.0)[:d]), BoxCollider((50.0, 1.0, 50.0)[:d], friction=0.4))
     for k in range(120):
         place = np.array((k % 12 - 6.0, 0.5 + 0.99 * (k // 24), k // 12 % 2)[:d])
         box = BoxCollider(random.uniform(0.4, 0.55, d), friction=float(random.choice([0.0, 0.5])))
         world.create_entity(Transform(place), RigidBody(mass=random.uniform(0.5, 2.0)), Spin(), box)
+    plank = BoxCollider((45.0, 0.5, 1.0)[:d], friction=0.5)
+    world.create_entity(Transform((0.0, 20.0, 0.0)[:d]), RigidBody(mass=9.0), Spin(), plank)
+    for x in range(-40, 40):
+        world.create_entity(Transform((x, 20.75, 0.0)[:d]), RigidBody(), Spin(), BoxCollider((0.25,) * d, friction=0.5))
     return world
 
 
