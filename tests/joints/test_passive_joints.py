@@ -10,7 +10,7 @@ from helpers_joints import energy, joint_world
 
 from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World
 from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Slider, Weld
-from carom.plugins.rotation import Rotation, Spin
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 SUBSTEPS = (1, 2, 4, 8, 16)
 
@@ -74,6 +74,37 @@ def test_no_chain_gains_energy(d, gravity):
         if not (gravity or hangs):
             np.testing.assert_allclose(world.momentum(), momentum, atol=1e-9 * sum(abs(momentum)))
         world.close()
+
+
+def chain_in_a_room(seed: int, d: int) -> World:
+    """The same with boxes and balls, which rub the walls of a room and each other."""
+    random, mode = np.random.default_rng((seed, d)), ("discrete", "continuous")[seed % 2]
+    settings = Settings(substeps=SUBSTEPS[seed % 5], collision=mode, on_fault="ignore")
+    world, ends = World(Physics(dimensions=d), Rotation(), Joints(), settings=settings), []
+    for outward in (*np.eye(d), *-np.eye(d)):
+        world.create_entity(Transform(4.0 * outward), BoxCollider(5.0 - 4.0 * abs(outward), friction=0.5))
+    for k in range(int(random.integers(3, 9))):
+        place, spin = random.uniform(-2.5, 2.5, d), Spin(random.normal(0, 4, None if d == 2 else 3))
+        body = RigidBody(mass=10.0 ** random.uniform(-1.5, 1.5), linear_velocity=random.normal(0, 4, d))
+        collider = BoxCollider((0.3,) * d, friction=0.5) if random.random() < 0.6 else SphereCollider(0.3, friction=0.5)
+        ends.append((world.create_entity(Transform(place), body, spin, collider), place))
+        if k > 0:
+            world.create_entity(random_joint(random, d, ends[int(random.integers(0, k))], ends[k]))
+    return world
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_no_chain_gains_energy_from_what_it_touches(d):
+    touched = 0
+    for seed in range(8):
+        with chain_in_a_room(seed, d) as world:
+            start = lowest = world.kinetic_energy()
+            for _ in range(150):
+                world.step()
+                assert world.kinetic_energy() <= lowest + 1e-9 * start
+                lowest = min(lowest, world.kinetic_energy())
+                touched += len(world.contacts)
+    assert touched > 500
 
 
 @pytest.mark.parametrize("substeps", SUBSTEPS)

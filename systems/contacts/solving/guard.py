@@ -146,8 +146,9 @@ def gains(solver, t):
 @part
 def allow(solver, bias_rate, h, dt, span, islands):
     """What each island may gain in a substep: what forces give from rest, more of that where it is pushed out, and a
-    small share of its motion and of the energy at the speed of pushing."""
-    start, stop, begin, end, _ = span
+    small share of its motion and of the energy at the speed of pushing. Joints would use such a share in each substep:
+    where there are some, it may give back what it has taken, and no more."""
+    start, stop, begin, end, arms = span
     allowed, motion = solver.allowed, solver.momentum
     share, zero = h / dt, scale(solver.velocity[begin], 0.0)  # of what a step may give
     for t in range(islands[0], islands[1]):
@@ -159,15 +160,13 @@ def allow(solver, bias_rate, h, dt, span, islands):
     for t in range(islands[0], islands[1]):
         mass, force = solver.mass_of[t], solver.force_of[t] * h / dt
         energy = max(0.0, solver.energy[t] - dot(motion[t], motion[t]) / mass)
-        touches = solver.size_of[t] > 0
-        allowed[t] = (0.5 + GAIN_WEIGHT * (dt / h if touches else 1.0)) * force * force / mass
-        if touches:
-            allowed[t] += share * GAIN_MOTION * energy
-        if solver.jointed[t]:
-            allowed[t] += solver.credit[t]
+        rate = dt / h if solver.size_of[t] > 0 else 1.0
+        allowed[t] = (0.5 + GAIN_WEIGHT * rate) * force * force / mass
+        allowed[t] += solver.credit[t] if solver.jointed[t] else share * GAIN_MOTION * energy
     for k in range(start, stop):
-        speed = bias_rate * DEEP * solver.extent[k]
-        allowed[island_of(solver, k)] += share * GAIN_PUSH * solver.mass[k] * speed * speed
+        t, speed = island_of(solver, k), bias_rate * DEEP * solver.extent[k]
+        if len(arms) < 2 or not solver.jointed[t]:
+            allowed[t] += share * GAIN_PUSH * solver.mass[k] * speed * speed
 
 
 @inlined
