@@ -210,7 +210,7 @@ def turn_with_contacts(state, spin, i, angle):
 
 
 @spinning.stage(
-    after="resolve_static_penetration",
+    after="put_back",
     records=(Spin,),
     reads=("spin", "turn", "quarantined", "spin.max_angular_speed"),
     writes=("spin.angular_velocity", "rotation", "axes"),

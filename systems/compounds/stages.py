@@ -134,12 +134,14 @@ def share_prediction(state):
 
 @part
 def share_places(state):
-    """Parts are where their bodies are, and as fast."""
-    for k in range(state.parts.count if state.compound else 0):
+    """Parts are where their bodies are, and as fast, and have turned as far."""
+    bodies, parts = state.bodies, state.parts
+    for k in range(parts.count if state.compound else 0):
         if takes_part(state, k):
-            i, body = state.parts.row[k], state.parts.body_row[k]
-            state.bodies.position[i] = state.bodies.position[body]
-            state.bodies.linear_velocity[i] = state.bodies.linear_velocity[body]
+            i, body = parts.row[k], parts.body_row[k]
+            bodies.position[i], bodies.linear_velocity[i] = bodies.position[body], bodies.linear_velocity[body]
+            if state.spinning:
+                bodies.spin[i], bodies.turn[i] = bodies.spin[body], bodies.turn[body]
 
 
 def carry_parts(state, dt):

@@ -75,12 +75,12 @@ class Response(StagedSystem):
         ),
         Stage(put_back, "where the resting bodies are at the end", ("solver",), MOTION, EITHER, REST),
         Stage(
-            resolve_static_penetration, "what is in what cannot be moved, or through it, as that turns or the solver "
-            "has pushed, is put back", ("pairs",), MOTION, "colliders", NEAR,
-        ),
-        Stage(
             carry_parts, "parts go where contacts have sent and turned their bodies", MOTION, (*MOTION, "rotation"),
             "parts",
+        ),
+        Stage(
+            resolve_static_penetration, "what is in what cannot be moved, or through it, as that turns or the solver "
+            "has pushed, is put back", ("pairs",), MOTION, "colliders", NEAR,
         ),
         Stage(store_warm_start, "the impulses, for the next step", ("solver",), ("warm_start",), "colliders", REST),
         Stage(find_touching, "which pairs touch in the end", MOTION, ("pairs",), "colliders", NEAR),

@@ -15,6 +15,7 @@ import math
 
 from ...framework.compilation import part
 from ...framework.vectors import add, add_scaled, dot, item, length, scale, sub
+from ..broad_phase.boxes import find_extents
 from ..ccd.search_bounds import FAST, turns_far
 from ..ccd.turning_touch import first_touch_of_turn, turn_of_path
 from ..codes import OK
@@ -149,12 +150,24 @@ def keep_out_of_all(state, dt, i):
     return moved
 
 
+@part
+def measure_turned(state):
+    """The extents of what contacts have turned, as it stands now."""
+    bodies = state.bodies
+    for i in range(state.first, state.dynamic):
+        if bodies.held[owner_of(state, i)] or bodies.impact_count[i] > 0:
+            for level in range(state.level_count):
+                find_extents(state, level, i, i + 1)
+
+
 def resolve_static_penetration(state, dt):
     """Put the bodies that the solver has moved, and in swept modes those that rest, out of what cannot be moved."""
     pairs, bodies = state.pairs, state.bodies
     pushed = state.solver.contacts > 0 or state.any_warm_started or (state.spinning and state.impacts.logged > 0)
     if not pushed or state.count == state.dynamic:
         return OK
+    if state.spinning:
+        measure_turned(state)
     for turn in range(ROUNDS):
         first, moved = state.moving if turn == ROUNDS - 1 else state.dynamic, False
         for c in range(pairs.count):

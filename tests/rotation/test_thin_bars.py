@@ -109,3 +109,28 @@ def test_no_bar_is_pushed_through_a_thin_wall_by_another_one():
         for _ in range(40):
             world.step()
             assert abs(world.bodies.dynamic.position).max() < 3.0
+
+
+@pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
+@pytest.mark.parametrize("dt", [1 / 20, 1 / 60])
+def test_what_contacts_have_turned_is_put_out_of_walls_as_it_stands_then(dt, mode):
+    """Bars that spin fall in a room: where a step ends no corner is deeper in a wall than half of their width."""
+    settings = Settings(dt=dt, collision=mode, on_fault="ignore")
+    for seed in range(6):
+        random, half = np.random.default_rng([seed, 5]), []
+        with World(Physics(2, gravity=(0, -9.81)), Rotation(), settings=settings) as world:
+            for place in ((3.5, 0), (-3.5, 0), (0, 3.5), (0, -3.5)):
+                wall = BoxCollider((0.5, 4) if place[0] else (4, 0.5), friction=0.5)
+                world.create_entity(Transform(place), RigidBody(kind="static"), wall)
+            for k in range(8):
+                half.append((random.uniform(0.2, 0.5), random.uniform(0.02, 0.05)))
+                place = Transform((-2.1 + 1.4 * (k % 4), -1 + 2 * (k // 4)), random.uniform(-3, 3))
+                body, spin = RigidBody(linear_velocity=random.normal(0, 4, 2)), Spin(random.normal(0, 60))
+                world.create_entity(place, body, BoxCollider(half[-1], friction=0.5), spin)
+            h = np.array(half)
+            for _ in range(round(1.5 / dt)):
+                world.step()
+                c, s = np.cos(world.bodies.dynamic.rotation)[:, None], np.sin(world.bodies.dynamic.rotation)[:, None]
+                reach = np.hstack((abs(c), abs(s))) * h[:, :1] + np.hstack((abs(s), abs(c))) * h[:, 1:]
+                deep = (abs(world.bodies.dynamic.position) + reach).max(axis=1) - 3.0
+                assert (deep < h[:, 1]).all()

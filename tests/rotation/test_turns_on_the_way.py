@@ -102,7 +102,8 @@ def test_boxes_that_turn_and_fall_through_more_than_a_floor_in_a_step_stay_above
 @pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
 def test_what_turns_fast_does_not_sink_into_what_the_floor_stops(mode):
     """A box that turns and the bar below it fall as fast: on their free ways they may not touch, but the bar is
-    stopped. Neither that nor the box's second corner in a step leads in by more than a fifth of its half side."""
+    stopped. Neither that nor the box's second corner in a step leads in by more than a quarter of its half side: what
+    the floor puts out goes into the box."""
     hits = 0
     for seed in range(30):
         random = np.random.default_rng((seed, 5))
@@ -119,6 +120,6 @@ def test_what_turns_fast_does_not_sink_into_what_the_floor_stops(mode):
             for _ in range(6):
                 world.step()
                 met = (world.contacts.entity_a == bar) & (world.contacts.entity_b == box)
-                assert (world.contacts.depth[met] < 0.2 * 0.25).all(), seed
+                assert (world.contacts.depth[met] < 0.25 * 0.25).all(), seed
                 hits += met.any()
     assert hits > 30
