@@ -77,6 +77,37 @@ def close_solved(solver, arms):
 
 
 @part
+def work_of_mover(solver, k, arms):
+    """What moves by itself gives to the other body of row k, J."""
+    a, b = solver.first[k], solver.second[k]
+    if solver.island[a] >= 0 and solver.island[b] >= 0:
+        return 0.0
+    push = scale(solver.normal[k], solver.impulse[k])
+    if solver.has_friction:
+        push = add(push, solver.tangent[k])
+    if solver.island[a] >= 0:
+        return dot(push, velocity_at(solver, b, solver.arm_b, k, arms))
+    return -dot(push, velocity_at(solver, a, solver.arm_a, k, arms))
+
+
+@part
+def work_at_joint(solver, j):
+    """The same, of a row of joints."""
+    joints, island = solver.joints, solver.island
+    a, b = joints.first[j], joints.second[j]
+    if island[a] >= 0 and island[b] >= 0:
+        return 0.0
+    q, arm, away = (a, joints.arm_a[j], -1.0) if island[a] < 0 else (b, joints.arm_b[j], 1.0)
+    if joints.kind[j] == GIVEN:
+        at_a, at_b = rates_of_given(solver, j)
+        return joints.impulse[j] * (at_a if q == a else at_b)
+    if joints.kind[j] >= TURN:
+        return away * joints.impulse[j] * dot(joints.normal[j], solver.spin[q])
+    push = joints.push[j] if joints.kind[j] == POINT else scale(joints.normal[j], joints.impulse[j])
+    return away * dot(push, add(solver.velocity[q], cross_spin(solver.spin[q], arm)))
+
+
+@part
 def weigh(solver, span, islands):
     """What contacts do to the energy of each open island if a share s of all that they have changed acts: E(s) =
     slope s + curvature s^2 / 2, which is exact. What moves by itself gives its work to the island, not the contacts."""
@@ -100,40 +131,15 @@ def weigh(solver, span, islands):
             curvature[t] += dot(momentum_of_spin(solver, q, change), change)
             energy[t] += dot(momentum, before)
     for k in range(start, stop if solver.movers > 0 else start):
-        a, b = solver.first[k], solver.second[k]
-        if (island[a] < 0 or island[b] < 0) and solver.listed_of[island_of(solver, k)] > 0:
-            push = scale(solver.normal[k], solver.impulse[k])
-            if solver.has_friction:
-                push = add(push, solver.tangent[k])
-            work = -dot(push, velocity_at(solver, a, solver.arm_a, k, arms))
-            if island[a] >= 0:
-                work = dot(push, velocity_at(solver, b, solver.arm_b, k, arms))
-            slope[island_of(solver, k)] += work
+        if solver.listed_of[island_of(solver, k)] > 0:
+            slope[island_of(solver, k)] += work_of_mover(solver, k, arms)
     if len(arms) > 1:
-        weigh_movers(solver)
+        for e in range(solver.joints.opened if solver.movers > 0 else 0):
+            j = solver.joints.open_row[e]
+            slope[max(island[solver.joints.first[j]], island[solver.joints.second[j]])] += work_at_joint(solver, j)
         for t in range(islands[0], islands[1]):
             if solver.driven[t]:
                 slope[t] = -math.inf
-
-
-@part
-def weigh_movers(solver):
-    """The work of what moves by itself at the other ends of joints is none of theirs."""
-    joints, island = solver.joints, solver.island
-    for e in range(joints.opened if solver.movers > 0 else 0):
-        j = joints.open_row[e]
-        a, b = joints.first[j], joints.second[j]
-        if island[a] < 0 or island[b] < 0:
-            q, arm, away = (a, joints.arm_a[j], -1.0) if island[a] < 0 else (b, joints.arm_b[j], 1.0)
-            if joints.kind[j] == GIVEN:
-                at_a, at_b = rates_of_given(solver, j)
-                work = away * joints.impulse[j] * (at_a if q == a else at_b)
-            elif joints.kind[j] >= TURN:
-                work = joints.impulse[j] * dot(joints.normal[j], solver.spin[q])
-            else:
-                push = joints.push[j] if joints.kind[j] == POINT else scale(joints.normal[j], joints.impulse[j])
-                work = dot(push, add(solver.velocity[q], cross_spin(solver.spin[q], arm)))
-            solver.slope[max(island[a], island[b])] += away * work
 
 
 @part

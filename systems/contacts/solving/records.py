@@ -79,6 +79,7 @@ SOLVER = Schema(
     acceleration=vectors(),
     inverse_mass=floats(),
     heft=floats(),  # kg; 0 for what cannot be moved
+    yields=floats(),  # share that moves it of what moves a body as light as it counts
     spin=vectors(),  # where bodies spin, as in the records of the bodies
     spin_before=vectors(),  # of a substep
     turn=vectors(),
@@ -143,6 +144,7 @@ SOLVER = Schema(
     # faults: how many bodies, and the row of the first
     squeezed=integer(),  # there is no room where they are pushed
     squeezed_row=integer(),
+    lightened=flag(),  # the range has some
     overloaded=integer(),  # they count as lighter than they are
     overloaded_row=integer(),
     restrained=integer(),  # first bodies of islands to which contacts would have given much energy

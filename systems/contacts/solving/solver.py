@@ -38,6 +38,7 @@ from .chunks import find_chunks
 from .guard import excess_speed, finish_substep, island_of, islands_of, open_all
 from .hard import choose_hard, leave_open
 from .joints.rows import add_joints, keep_joints, measure_joints, solve_joints, start_joints, warm_start_joints
+from .overload import lighten, weigh_down
 from .passes import close_in_order, converge, note_impulses, solve_pass
 from .rows import ARMS, JOINTED, NO_ARMS, apply_impulse, room_of, turn_body, weigh_row
 
@@ -145,6 +146,8 @@ def solve_substep(solver, springs, most, dt, h, kind, ends, span):
     if stiff:
         converge(solver, True, h, span)
     move(solver, h, span)
+    if solver.lightened:
+        weigh_down(solver, h, span)
     any_struck = measure(solver, h, springs, dt, stiff, ends, span)
     if ends and solver.any_hard:
         leave_open(solver, h, span)
@@ -155,6 +158,8 @@ def solve_substep(solver, springs, most, dt, h, kind, ends, span):
     if stiff:
         converge(solver, False, h, span)
     finish_substep(solver, springs[0][1], any_struck, h, dt, span)
+    if solver.lightened:
+        weigh_down(solver, 0.0, span)
     for k in range(start, stop):
         solver.total[k] += solver.impulse[k]
         solver.had_impulse[k] |= solver.impulse[k] > 0.0
@@ -255,24 +260,6 @@ def solve_range(solver, substeps, kind, dt, span):
 
 
 @part
-def lighten(solver, t, span):
-    """What an island cannot bear with the most substeps counts as no heavier than it can, in the solver only."""
-    least = solver.lightest[t] / solver.bears[t]
-    for q in range(span[2], span[3]):
-        if solver.inverse_mass[q] < least:
-            if solver.overloaded == 0:
-                solver.overloaded_row = solver.body_row[q]
-            solver.overloaded += 1
-            if len(span[4]) > 0:
-                by = least / solver.inverse_mass[q]
-                solver.inverse_inertia[q] = scale(solver.inverse_inertia[q], by)
-                solver.inverse_products[q] = scale(solver.inverse_products[q], by)
-            solver.inverse_mass[q], solver.heft[q] = least, 1.0 / least
-    for k in range(span[0], span[1]):
-        weigh_row(solver, k, span[4])
-
-
-@part
 def count_work(state, dt):
     """Counters of the step, and what faults will tell: islands that contacts would have given much energy."""
     solver = state.solver
@@ -302,7 +289,7 @@ def advance(state, dt, arms):
     omega = 2.0 * math.pi * solver.frequency * state.substeps / dt
     solver.push_rate = omega / (2.0 * DAMPING_RATIO + omega * dt / state.substeps)
     choose_hard(state, dt, zero_of(state), arms)
-    start = begin = 0
+    start, begin, solver.lightened = 0, 0, False
     for s in range(solver.ranges):
         span = start, solver.row_ends[s], begin, solver.body_ends[s], arms
         t, special = solver.special[s], s > 0
@@ -312,8 +299,9 @@ def advance(state, dt, arms):
                 solver.shift[q] = zero_of(state)
                 if len(arms) > 0:
                     turn_body(solver, q, scale(solver.spin[q], -dt))
-            if solver.bears[t] < 1.0:
-                lighten(solver, t, span)
+            solver.lightened = solver.bears[t] < 1.0
+            if solver.lightened:
+                lighten(solver, t, dt, span)
         any_joint = False
         if len(arms) > 1:
             solver.joints.begin = solver.joints.end if special else 0

@@ -1,0 +1,97 @@
+"""Bodies too heavy for what they lie on: rows take them as lighter, but what they find moves them as what they are.
+
+An impulse that was found for a lighter body keeps momentum where it moves the heavier one, and takes the more energy
+the heavier that is. It does not hold its weight: what holds the island from outside does, see ``find_support``.
+"""
+
+from __future__ import annotations
+
+from ....framework.compilation import inlined, part
+from ....framework.vectors import add, add_scaled, dot, length, scale, sub
+from ...integration.turning import momentum_of_spin
+from ..constants import GAIN_ROUNDING
+from .guard import work_at_joint, work_of_mover
+from .rows import turn_body, weigh_row
+
+
+@part
+def lighten(solver, t, dt, span):
+    """What island t cannot bear with the most substeps counts as no heavier than it can."""
+    least = solver.lightest[t] / solver.bears[t]
+    solver.mass_of[t] = solver.force_of[t] = 0.0
+    for q in range(span[2], span[3]):
+        by = solver.inverse_mass[q] / least
+        solver.yields[q] = min(1.0, by)
+        if by < 1.0:
+            if solver.overloaded == 0:
+                solver.overloaded_row = solver.body_row[q]
+            solver.overloaded += 1
+            if len(span[4]) > 0:
+                solver.inverse_inertia[q] = scale(solver.inverse_inertia[q], 1.0 / by)
+                solver.inverse_products[q] = scale(solver.inverse_products[q], 1.0 / by)
+            solver.inverse_mass[q], solver.heft[q] = least, 1.0 / least
+        solver.mass_of[t] += solver.heft[q]
+        solver.force_of[t] += solver.heft[q] * length(solver.acceleration[q]) * dt
+    for k in range(span[0], span[1]):
+        weigh_row(solver, k, span[4])
+
+
+@part
+def find_support(solver, span):
+    """What pushes an island from outside in a substep: (direction, speed of that along it, what the heavy bodies have
+    of the momentum that it gives: 0 to 1)."""
+    total = scale(solver.velocity[span[2]], 0.0)
+    motion = given = work = 0.0
+    for q in range(span[2], span[3]):  # among themselves they give none
+        total = add_scaled(total, sub(solver.velocity[q], solver.velocity_before[q]), solver.heft[q])
+        motion += solver.heft[q] * length(solver.velocity_before[q])
+    size = length(total)
+    if not size > GAIN_ROUNDING * motion:
+        return total, 0.0, 0.0
+    way = scale(total, 1.0 / size)
+    for q in range(span[2], span[3]):
+        if solver.yields[q] < 1.0:
+            given += max(0.0, dot(way, sub(solver.velocity[q], solver.velocity_before[q]))) * solver.heft[q]
+    for k in range(span[0], span[1] if solver.movers > 0 else span[0]):
+        work += work_of_mover(solver, k, span[4])
+    if len(span[4]) > 1 and solver.movers > 0:
+        for e in range(solver.joints.begin, solver.joints.end):
+            work += work_at_joint(solver, solver.joints.order[e])
+    return way, work / size, size / max(size, given)
+
+
+@inlined
+def stopping(rest, held, motion, change):
+    """The share of a change that stops what moves against it, where its ``rest`` has not acted, and of that at most as
+    much as is ``held``. motion, change: the momentum of the change times the motion with all of it, and times itself.
+    """
+    return min(max(0.0, rest - motion / change), held * rest) if change > 0.0 else 0.0
+
+
+@part
+def weigh_down(solver, h, span):
+    """In the h of a substep bodies have moved as if they were light; where h is 0 velocities are as if they were.
+
+    What is outside of the island stops them as if it were so: it can bear anything. It throws none.
+    """
+    way, speed, held = find_support(solver, span)
+    for q in range(span[2], span[3]):
+        rest = 1.0 - solver.yields[q]
+        if rest > 0.0:
+            change = sub(solver.velocity[q], solver.velocity_before[q])
+            along = max(0.0, dot(change, way))
+            stop = stopping(rest, held, along * (dot(solver.velocity[q], way) - speed), along * along)
+            change = add_scaled(scale(way, stop * along), change, -rest)
+            if h > 0.0:
+                solver.shift[q] = add_scaled(solver.shift[q], change, h)
+            else:
+                solver.velocity[q] = add(solver.velocity[q], change)
+        if rest > 0.0 and len(span[4]) > 0:
+            change = sub(solver.spin[q], solver.spin_before[q])
+            momentum = momentum_of_spin(solver, q, change)
+            stop = stopping(rest, held, dot(momentum, solver.spin[q]), dot(momentum, change))
+            change = scale(change, stop - rest)
+            if h > 0.0:
+                turn_body(solver, q, add_scaled(solver.turn[q], change, h))
+            else:
+                solver.spin[q] = add(solver.spin[q], change)
