@@ -13,6 +13,7 @@ from ..framework.typing import Vector, VectorField
 from ..framework.vectors import item, replace, scale
 
 ALL_LAYERS = -1  # every bit set
+LONGEST = 1e150  # m: squares of it, and of distances of such shapes that meet, are finite
 # Arguments, checked like fields.
 LOWER = Column(item="vector", owner="AABBCollider", name="from_bounds lower")
 UPPER = Column(item="vector", owner="AABBCollider", name="from_bounds upper")
@@ -52,6 +53,7 @@ class Collider(Component, abstract=True):
     __slots__ = ()
 
     makes_body: ClassVar[bool] = True
+    _largest: ClassVar[float] = LONGEST
     stack: ClassVar[str] = "collider"
     stacked_columns: ClassVar[tuple[str, ...]] = ("offset", "restitution", "friction", "sensor", "layer", "mask")
 

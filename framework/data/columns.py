@@ -50,6 +50,7 @@ class Column:
     def __set_name__(self, owner: type, name: str) -> None:
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "owner", owner.__name__)
+        object.__setattr__(self, "largest", min(self.largest, getattr(owner, "_largest", LARGEST)))
 
     def item_shape(self, dimensions: int) -> tuple[int, ...]:
         """Shape of one row's value in a world of that many dimensions."""

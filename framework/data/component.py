@@ -12,7 +12,7 @@ import numpy as np
 
 from ..names import did_you_mean, near_names
 from .arrays.column import ArrayColumn, array_column, hold_arrays
-from .columns import REQUIRED, Column, special_column
+from .columns import LARGEST, REQUIRED, Column, special_column
 from .columns import column as plain_column
 
 
@@ -38,6 +38,7 @@ class Component:
     plugin: ClassVar[str] = ""  # the plugin without which it does nothing
     until_frame_ends: ClassVar[tuple[str, ...]] = ()  # columns of a push from outside, and of the frame that it is of
     _abstract: ClassVar[bool] = True
+    _largest: ClassVar[float] = LARGEST  # magnitude of the numbers in its fields
     _shaped: ClassVar[tuple[Column, ...]] = ()  # columns whose shape depends on the world's dimensions
     _held: ClassVar[tuple[str, ...]] = ()  # those whose default does not fit worlds of 2 and of 3 dimensions
     _arguments: ClassVar[dict[str, Column]] = {}  # of the constructor

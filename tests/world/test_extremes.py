@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
 from helpers_pairwise import pairwise
 from worlds import EPS, Conserved, ball, both_dimensions, box, make_world, position, run, velocity
 
-from carom.components import RigidBody
+from carom.components import AABBCollider, RigidBody, SphereCollider
 from carom.framework import Settings
+from carom.plugins.capsule import CapsuleCollider
+from carom.plugins.convex_polygon import ConvexPolygonCollider
+from carom.plugins.rotation import BoxCollider
 
 DT = 1 / 60
 makers = pytest.mark.parametrize("maker", [ball, box])
@@ -84,6 +88,30 @@ def test_c12_huge_velocities(d):
     assert velocity(world, a)[0] == 1
     assert position(world, a)[0] == pytest.approx(10 * DT)
     assert len(world.bodies) == 3
+
+
+@both_dimensions
+@pytest.mark.parametrize("size", [1.1e150, 1e200])
+def test_sizes_whose_squares_overflow_are_refused_with_their_field(d, size):
+    """1e150 m meets its like; more is refused where it is given, in any collider."""
+    world = make_world(d)
+    large = ball(world, 0.0, radius=1e150)
+    box(world, 1.9e150, half=1e150)
+    run(world, 2)
+    assert len(world.contacts) == 1
+    assert np.isfinite(world.bodies.position).all()
+    for make, field in (
+        (lambda: SphereCollider(size), "SphereCollider.radius"),
+        (lambda: AABBCollider((1, size, 1)[:d]), "AABBCollider.half_extents"),
+        (lambda: BoxCollider((1, size, 1)[:d]), "BoxCollider.half_extents"),
+        (lambda: CapsuleCollider(1.0, size), "CapsuleCollider.half_height"),
+        (lambda: SphereCollider(1.0, offset=(size, 0, 0)[:d]), "SphereCollider.offset"),
+        (lambda: ConvexPolygonCollider(((0, 0), (size, 0), (0, size))), "ConvexPolygonCollider.vertices"),
+    ):
+        with pytest.raises(ValueError, match=rf"{field} must be at most 1e\+150 .*, got .*{re.escape(repr(size))}"):
+            make()
+    with pytest.raises(ValueError, match=rf"entity {large}: SphereCollider.radius must be at most 1e\+150"):
+        world.component_for_entity(large, SphereCollider).radius = size
 
 
 @both_dimensions
