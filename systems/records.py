@@ -94,6 +94,7 @@ HELD = Section(
     "body", "collisions", RESTED,
     held=flags(default=False),  # a contact at rest has pushed it
     place=ints("int32", default=-1),  # among the bodies of the solver; -1 between steps
+    turned_on=floats(),  # m, by which these have turned its points, where bodies spin
 )  # fmt: skip
 CURVES = Section(
     "body", "curved paths", "the integrator's paths are curved",

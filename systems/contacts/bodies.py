@@ -138,6 +138,8 @@ def put_back(state, dt):
     for q in range(solver.bodies if solver.contacts + solver.joints.active > 0 else 0):
         i = solver.body_row[q]
         bodies.place[i] = -1
+        if state.spinning:
+            bodies.turned_on[i] = size_of_turn(solver.turn[q]) * solver.reach[q]
         if bodies.held[i] and solver.inverse_mass[q] > 0.0:
             bodies.position[i] = add(bodies.previous_position[i], solver.shift[q])
             bodies.linear_velocity[i] = solver.velocity[q]

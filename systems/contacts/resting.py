@@ -6,10 +6,11 @@ import math
 
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add_scaled, dot, item, length, replace, sub
+from ...framework.vectors import add_scaled, dot, item, length, replace, scale, sub
 from ..ccd.search_bounds import FAST, is_swept, turns_far
 from ..ccd.turning_touch import first_touch_of_turn, is_followed
 from ..codes import OK
+from ..compounds.rows import owner_of
 from ..impacts.impulses import STOPPED, is_beyond_cap, is_rattling
 from ..integration.turning import arms_to, closing_by_spin, size_of_turn
 from ..narrow_phase.manifolds import (
@@ -36,7 +37,7 @@ from ..shapes.tolerances import (
     turning_margin,
     turning_travel,
 )  # fmt: skip
-from .approach import first_touch_on_segment, meets_at_corner, segment_start, stays
+from .approach import STAYS_SLOPS, first_touch_on_segment, meets_at_corner, segment_start, stays
 from .points import is_ball, lay_arms, lay_first_touch, points_of
 
 ENTRY_ITERATIONS = 24
@@ -259,6 +260,20 @@ def linearise(state, dt):
     return OK
 
 
+@inlined
+def turned_on(state, i):
+    """How far contacts at rest have turned points of body i."""
+    owner = owner_of(state, i)
+    return state.bodies.turned_on[owner] if state.spinning and state.bodies.inverse_mass[owner] > 0.0 else 0.0
+
+
+@inlined
+def stays_by_contacts(state, a, b, way):
+    """Whether contacts at rest, which have moved two bodies so far past each other, leave them where they were."""
+    turned, slop = turned_on(state, a) + turned_on(state, b), slop_of(state, a, b)
+    return stays(way, scale(way, 0.0), slop) and turned < STAYS_SLOPS * slop
+
+
 def find_touching(state, dt):
     """Pairs that touch now that all is done, or pushed each other in the step or crossed.
 
@@ -278,7 +293,7 @@ def find_touching(state, dt):
             continue
         a, b, pushed, normal = pairs.a[c], pairs.b[c], pairs.impulse[c] > 0.0, pairs.normal[c]
         d, extent = centre_offset(bodies, a, b), smaller_extent(bodies, a, b)
-        known = pushed and pairs.rests[c] and stays(d, pairs.at[c], slop_for(state, extent))
+        known = pushed and pairs.rests[c] and stays_by_contacts(state, a, b, sub(d, pairs.at[c]))
         if not (known or is_at_manifold(pairs, c, d, extent)):
             if solid and not pushed and not crossed and deepest_possible(pairs, c, d) < -SAME_PLACE * extent:
                 continue
