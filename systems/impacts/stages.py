@@ -221,7 +221,7 @@ def resolve_impacts(state, dt):
         else:
             break
     if impacts.logged > 0:
-        find_hasty(state, dt)
+        find_hasty(state, dt, True)
     state.impacts_counted += impacts.logged
     state.looks_counted += impacts.looked
     state.capped_counted += impacts.capped

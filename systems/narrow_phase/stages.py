@@ -142,22 +142,24 @@ def is_solid_pair(state, a, b):
 
 
 @part
-def find_hasty(state, dt):
+def find_hasty(state, dt, struck):
     """Note the body that moves farthest beyond its own extent, if that is more than the extent of the thinnest: where
-    no pair is swept, the two may have passed through each other. Once before the impacts, and once with their speeds.
+    no pair is swept, the two may have passed through each other. Once before the impacts, and once with their speeds:
+    what is ``struck`` meets others unseen until the next step, which takes it to be on the side where its centre is.
     """
     bodies, farthest, thinnest = state.bodies, 0.0, min(state.thinnest_static, state.thinnest_moving)
     any_fast = False
     if state.sweeping or not state.moved:
         return
     for i in range(state.first, state.moving):  # seldom; squares, so that there are no roots, nor divisions
-        v, room = bodies.start_velocity[i], SURE * (bodies.min_extent[i] + thinnest)
+        seen = 0.5 if struck and bodies.impact_count[i] > 0 else 1.0
+        v, room = bodies.start_velocity[i], SURE * seen * (bodies.min_extent[i] + thinnest)
         any_fast |= not dot(v, v) * (dt * dt) <= room * room
     for i in range(state.first, state.moving if any_fast else 0):
         if bodies.shape[i] >= 0:
-            extent = bodies.min_extent[i]
-            beyond = length(bodies.start_velocity[i]) * dt - extent
-            if beyond > max(farthest, thinnest):
+            seen = 0.5 if struck and bodies.impact_count[i] > 0 else 1.0
+            beyond = length(bodies.start_velocity[i]) * dt - seen * bodies.min_extent[i]
+            if beyond > max(farthest, seen * thinnest):
                 farthest, state.too_fast_for_discrete, state.too_fast_row = beyond, True, i
 
 
@@ -182,7 +184,7 @@ def select_pairs(state, dt):
     for i in range(state.first, state.moving):  # that of static bodies is always 0
         bodies.force_speed_change[i] = length(sub(velocity[i], start[i])) if changed else 0.0
     state.too_fast_for_discrete, state.turns_too_far = False, 0
-    find_hasty(state, dt)
+    find_hasty(state, dt, False)
     if state.spinning:
         find_fast_turns(state)
     shape, kind, starts = bodies.shape, candidates.kind, candidates.bucket_starts

@@ -75,6 +75,23 @@ def test_discrete_bodies_stay_inside_or_are_called_too_fast(seed):
     assert found.out == 0 or too_fast(found), found.faults[-1:]
 
 
+@pytest.mark.parametrize("share", [0.45, 0.55, 0.9])
+def test_what_is_struck_into_a_thin_wall_stays_or_is_called_too_fast(share):
+    """What is struck within a step meets nothing else until the next, which pushes it out on the side where its centre
+    is: in a step it may go half its size and that of the wall, half as far as what flies freely. Any phase, any gap."""
+    for k in range(100):
+        with make_world(2, collision="discrete", on_fault="ignore") as world:
+            box(world, (10.0, 0.0), half=(0.005, 20.0), kind="static", restitution=1.0)
+            way, gap = share * 1.01, (0.01, 0.1, 0.2, 0.3, 0.4)[k % 5]
+            ball(world, (9.495 - gap, 0.0), radius=0.5, restitution=1.0)
+            ball(world, (8.47 - gap - (3 + k / 100) * way, 0.0), (60 * way, 0.0), radius=0.5, restitution=1.0)
+            for _ in range(12):
+                world.step()
+            told = any(TOO_FAST in text for text in world.faults)
+            assert told == (share > 0.5)
+            assert told or (world.bodies.dynamic.position[:, 0] < 10.0).all()
+
+
 @pytest.mark.parametrize("mode", SWEPT)
 @pytest.mark.parametrize("seed", seeds(20, 1000, known=(508, 2073, 2905, 3539)))
 def test_what_is_swept_stays_inside_under_any_pull(seed, mode):
