@@ -28,6 +28,8 @@ DEEPEST = 0.17  # extents at most
 RELAX_PASSES = 2  # after the pass that pushes: they take back the speed that pushing has given
 LAST_RELAX_PASSES = 4  # of the last substep, whose velocities stay
 TURNING_RELAX_PASSES = 1  # of each where bodies spin: the friction of a row follows its normal, not all normals
+OVER = 1.5  # of the impulse that stops a row from sliding, in all of these but the last of a substep: what is stored is
+# as a spring without a damper, so columns sway, and the passes of a substep are all that takes energy; below 2 it does
 REFINED_PASSES = 8  # of each substep of an island with more: columns under heavy bodies sway with 2, pyramids with 12
 FURTHER_PASSES = 1000  # at most, over rows that are not solved and islands that have gained energy,
 FURTHER_WORK = 20_000  # rows of the island in all of these,

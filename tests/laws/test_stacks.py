@@ -84,6 +84,31 @@ def test_a_wide_ground_is_as_good_as_a_narrow_one(mode, d):
     assert all(answer == answers[0] for answer in answers)
 
 
+@pytest.mark.parametrize("count", [20, 30])
+def test_a_column_that_sways_comes_to_rest(count):
+    """Friction that is kept from substep to substep of h seconds is a spring without a damper, (w h)^2 = c mu with
+    mu = 2 - 2 cos(pi / (2 n + 1)), and each substep takes energy as an implicit step does: the sway fades by w^2 h / 2
+    each second. c is the passes of a substep, 3.5 in the mean; those that go beyond what stops a row make it more."""
+    with make_world(gravity=G) as world:
+        floor(world, friction=0.4)
+        for k in range(count):
+            ball(world, (0.0, 0.5 + 0.999 * k), radius=0.5, friction=0.4)
+        run(world, 300)
+        mode = np.sin(np.pi * (np.arange(count) + 1) / (2 * count + 1))
+        world.bodies.dynamic.linear_velocity[:, 0] += 1e-4 * mode
+        run(world, 30)
+        sway = []
+        for _ in range(120):
+            world.step()
+            sway.append(world.bodies.dynamic.linear_velocity[:, 0] @ mode)
+    sway, h = np.array(sway), 1 / 60 / world.settings.substeps
+    now_and_before = np.stack((sway[1:-1], sway[:-2]), axis=1)
+    (p, q), *_ = np.linalg.lstsq(now_and_before, sway[2:])
+    root = 60 * np.log(np.roots((1, -p, -q)).astype(complex))[0]
+    assert -root.real == pytest.approx(abs(root) ** 2 * h / 2, rel=0.03)
+    assert (abs(root) * h) ** 2 > 5.0 * (2 - 2 * math.cos(math.pi / (2 * count + 1)))
+
+
 # -- unequal masses ------------------------------------------------------------------------------
 
 

@@ -14,8 +14,8 @@ FEW = 6  # rows of a chunk: fewer are as fast one by one, with the same bits
 
 
 @part
-def solve_pass(solver, bias, pushes, span):
-    """One pass over the rows of a range: along their normals and along their surfaces."""
+def solve_pass(solver, bias, pushes, over, span):
+    """One pass over the rows of a range: along their normals and along their surfaces. over: see OVER."""
     if len(span[4]) > 0 and solver.has_rolling:
         solve_rolling(solver, span)
     if len(span[4]) > 0 and (solver.end_chunk - solver.first_chunk) * FEW < span[1] - span[0]:
@@ -23,7 +23,7 @@ def solve_pass(solver, bias, pushes, span):
     else:
         solve_normals(solver, bias, pushes, span)
         if len(span[4]) == 0 and solver.has_friction:
-            solve_friction(solver, span)
+            solve_friction(solver, over, span)
     solver.visits += span[1] - span[0]
 
 
@@ -59,7 +59,7 @@ def converge(solver, pushes, h, span):
     start, stop, least = span[0], span[1], least_change(solver, h, span)
     for _ in range(min(HARD_PASSES, SUBSTEP_WORK // (stop - start))):
         note_impulses(solver, span)
-        solve_pass(solver, solver.pushing if pushes else solver.opening, pushes, span)
+        solve_pass(solver, solver.pushing if pushes else solver.opening, pushes, 1.0, span)
         if agrees(solver, h, least, span):
             break
 

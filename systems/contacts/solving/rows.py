@@ -139,14 +139,15 @@ def solve_normals(solver, bias, pushes, span):
         apply_impulse(solver, k, scale(solver.normal[k], new - old), arms)
         impulse[k] = new
         if len(arms) > 0 and solver.friction[k] != 0.0:
-            solve_friction_of(solver, k, arms)
+            solve_friction_of(solver, k, 1.0, arms)
 
 
 @inlined
-def solve_friction_of(solver, k, arms):
-    """Stop what slides at row k, with at most ``friction`` times the normal impulse (Coulomb)."""
+def solve_friction_of(solver, k, over, arms):
+    """Stop what slides at row k, with at most ``friction`` times the normal impulse (Coulomb). over: times the impulse
+    that stops it; see OVER."""
     n, old, w = solver.normal[k], solver.tangent[k], relative_velocity(solver, k, arms)
-    mass = solver.tangent_mass[k] if len(arms) > 0 else solver.mass[k]
+    mass = over * (solver.tangent_mass[k] if len(arms) > 0 else solver.mass[k])
     limit = solver.friction[k] * solver.impulse[k]
     if len(n) == 2:  # a number along the one direction there is
         along = replace(replace(n, 0, -item(n, 1)), 1, item(n, 0))
@@ -161,12 +162,12 @@ def solve_friction_of(solver, k, arms):
 
 
 @part
-def solve_friction(solver, span):
+def solve_friction(solver, over, span):
     """One pass along their surfaces, where nothing spins."""
     start, stop, _, _, arms = span
     for k in range(start, stop):
         if solver.friction[k] != 0.0:
-            solve_friction_of(solver, k, arms)
+            solve_friction_of(solver, k, over, arms)
 
 
 @inlined
@@ -207,5 +208,5 @@ def relax_listed(solver, count, arms):
         apply_impulse(solver, k, scale(solver.normal[k], new - old), arms)
         solver.impulse[k] = new
         if solver.friction[k] != 0.0:
-            solve_friction_of(solver, k, arms)
+            solve_friction_of(solver, k, 1.0, arms)
     solver.visits += count

@@ -25,6 +25,7 @@ from ..constants import (
     MOST_LOAD,
     MOST_LOADED,
     OPEN,
+    OVER,
     REFINED_PASSES,
     RELAX_PASSES,
     SLOPE,
@@ -142,7 +143,7 @@ def solve_substep(solver, springs, most, dt, h, kind, ends, span):
         close_in_order(solver, h, span)
     if len(span[4]) > 1:
         solve_joints(solver, True)
-    solve_pass(solver, solver.pushing, True, span)
+    solve_pass(solver, solver.pushing, True, 1.0, span)
     if stiff:
         converge(solver, True, h, span)
     move(solver, h, span)
@@ -153,8 +154,9 @@ def solve_substep(solver, springs, most, dt, h, kind, ends, span):
         leave_open(solver, h, span)
     if len(span[4]) > 1:  # once: more often, chains give way more
         solve_joints(solver, False)
-    for _ in range(relax_passes(kind, ends, span[4])):
-        solve_pass(solver, opening, False, span)
+    last = relax_passes(kind, ends, span[4]) - 1
+    for one in range(last + 1):
+        solve_pass(solver, opening, False, OVER if one < last else 1.0, span)
     if stiff:
         converge(solver, False, h, span)
     finish_substep(solver, springs[0][1], any_struck, h, dt, span)
