@@ -111,15 +111,8 @@ class Joint(Component, abstract=True):
         if name in self.columns and self._values is not None:
             if name in ("a", "b") and value is None:
                 value = WORLD
-            before, version = dict(self._values), self._version
-            try:
-                super().__setattr__(name, value)
-                self.check()
-                if version < -1:  # of a world of so many dimensions
-                    self.fit(-version)
-            except ValueError:
-                self._values, self._version = before, version
-                raise
+            before = dict(self._values)
+            self._store_together({name: value})
             if name in self.fixed:
                 self._values["attached"] = False
             elif np.isscalar(value) and np.all(before.get(name) == self._values[name]):
@@ -128,6 +121,33 @@ class Joint(Component, abstract=True):
             Changes.count += 1
             return
         super().__setattr__(name, value)
+
+    def set_together(self, **values: Any) -> None:
+        """Set fields that only fit each other, all or none of them."""
+        before = dict(self._values or {})
+        self._store_together(values)
+        if self._values is not None and any(before.get(name) != self._values[name] for name in values):
+            self._values["changed"] = True
+            Changes.count += 1
+
+    def _store_together(self, values: dict[str, Any]) -> None:
+        """Write them; ValueError, with all as it was, if they do not fit."""
+        before, version = dict(self._values or {}), self._version
+        try:
+            for name, value in values.items():
+                super().__setattr__(name, value)
+            self.check()
+            if version < -1:  # of a world of so many dimensions
+                self.fit(-version)
+        except ValueError as error:
+            self._values, self._version = before, version
+            if str(error).startswith("entity "):
+                raise
+            raise ValueError(str(error).replace(type(self).__name__, self._name(), 1)) from None
+
+    def _name(self) -> str:
+        """For messages."""
+        return f"{'' if self._entity is None else f'entity {self._entity}: '}{type(self).__name__}"
 
     def _ends(self, name: str, value: Any) -> tuple[Any, Any]:
         try:
@@ -181,9 +201,9 @@ class Joint(Component, abstract=True):
         try:
             least, most = -math.inf if low is None else float(low), math.inf if high is None else float(high)
         except (TypeError, ValueError):
-            raise ValueError(f"{type(self).__name__}.{name} must be numbers, got {low!r} and {high!r}") from None
+            raise ValueError(f"{self._name()}.{name} must be numbers, got {low!r} and {high!r}") from None
         if least > most:
-            raise ValueError(f"{type(self).__name__}.{name} must be (least, most), got ({low}, {high})")
+            raise ValueError(f"{self._name()}.{name} must be (least, most), got ({low}, {high})")
         return least, most
 
     def attach(self, a: Place, b: Place) -> None:

@@ -67,8 +67,7 @@ class Distance(Joint):
     def length(self, value: Any) -> None:
         low, high = self._ends("length", value) if np.ndim(value) else (value, value)
         self.in_order("length", low, high)
-        for name in ("least", "most") if (self.most is None or low <= self.most) else ("most", "least"):
-            setattr(self, name, low if name == "least" else high)
+        self.set_together(least=low, most=high)
 
     def check(self) -> None:
         low, high = self.in_order("length", self.least, self.most)

@@ -56,8 +56,12 @@ def parts_from_outline(points: Any) -> Outline:
 def _sound(points: Any) -> np.ndarray:
     """The corners, counter-clockwise, without those that turn by nothing."""
     corners = np.array(points, float)
-    if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3 or not np.isfinite(corners).all():
+    if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3:
         raise ValueError(f"an outline is three or more corners (n, 2), got shape {corners.shape}")
+    bad = ~np.isfinite(corners).all(axis=1)
+    if bad.any():
+        k = int(np.argmax(bad))
+        raise ValueError(f"the corners of an outline must be finite, corner {k} is {tuple(corners[k].tolist())}")
     if len(corners) > 3 and (corners[0] == corners[-1]).all():
         corners = corners[:-1]
     crossing = _crossing(corners)

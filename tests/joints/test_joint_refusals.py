@@ -171,6 +171,25 @@ def test_fields_that_do_not_fit_leave_the_joint_as_it_is():
     assert rope.length == 2.0
 
 
+def test_the_two_ends_of_a_length_are_set_together():
+    """All of it or nothing; that of a spring, which has one, too."""
+    world, _ = joint_world(gravity=0)
+    ends = [disc(world, (x, 0)) for x in (0.0, 2.0)]
+    spring = Distance(*ends, length=2.0, frequency=2.0, damping_ratio=1.0)
+    entity = world.create_entity(spring)
+    world.step()
+    spring.length = 3.0
+    run(world, 180)
+    assert at(world, ends[1]).x - at(world, ends[0]).x == pytest.approx(3.0, abs=1e-3)
+    for wrong, why in (
+        ((0.5, math.nan), "finite, got nan"), ((0.0, 1.0), "one length"), ((2.0, 1.0), "least, most"),
+        ((-1.0, 4.0), "at least 0"),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=rf"entity {entity}: Distance.*{why}"):
+            spring.length = wrong
+        assert spring.length == 3.0
+
+
 def test_one_number_is_for_all_of_a_vector():
     world, _ = joint_world(gravity=0)
     body = disc(world, (2, 2))

@@ -73,7 +73,7 @@ def test_an_angle_is_two_boxes_and_turns_about_its_centre():
         (((0, 0), (1, 0), (1, 0), (0, 1)), "edges 0 and 2"),
         (((0, 0), (1, 0)), "three or more"),
         (((0, 0), (1, 0), (2, 0)), "no area"),
-        (((0, 0), (1, 0), (0, math.nan)), "three or more"),
+        (((0, 0), (1, 0), (0, math.nan)), "finite, corner 2"),
     ],
 )
 def test_what_is_no_outline_is_refused(points, message):
