@@ -69,7 +69,7 @@ def build(settings: Settings | None = None, seed: int = 0) -> World:
     enclose(world, (0.0, 0.0), (SIDE, SIDE), thickness=2.0)
     player = world.create_entity(
         Transform((SIDE / 2, SIDE / 2)),
-        RigidBody(mass=PLAYER_MASS),
+        RigidBody(mass=PLAYER_MASS, ccd=True),
         SphereCollider(radius=PLAYER_RADIUS, restitution=0.2),
     )
 
