@@ -13,10 +13,10 @@ from . import codes, records
 from .broad_phase.search import CandidateSearch
 from .broad_phase.static_grid import reserve_static_grid
 from .broad_phase.uniform_grid import reserve_grid
+from .contacts.solving.islands import COLOURS
 from .impacts import records as impact_records
 from .scene import Scene
 
-COLOURS = 128
 SPARE = 1 << 16  # rows at most that are reserved beyond what is asked for
 # What these stages need of the bodies before they do anything.
 COLUMNS_OF = {
@@ -36,7 +36,7 @@ class Room:
         state.warm_start.rows_version = np.full(2, -1, np.int64)
         state.warm_start.step = np.ones(2)
         state.contacts.stays, state.contacts.steps = np.zeros(2, np.int64), np.zeros(2, np.int64)
-        state.solver.starts = np.zeros(COLOURS, np.int64)
+        state.solver.starts = np.zeros(2 * COLOURS + 2, np.int64)
         state.frame = np.zeros(7)
         _grow_stacked(state.warm_start, 0)
         _grow_stacked(state.contacts, 0)

@@ -322,6 +322,8 @@ class Cone(Joint):
 
     def check(self) -> None:
         self.in_order("twist", self.lower, self.upper)
+        if self.swing > math.pi:
+            raise ValueError(f"{self._name()}.swing must be at most pi, got {self.swing!r}")
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, self.anchor)

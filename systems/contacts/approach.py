@@ -16,9 +16,8 @@ STAYS_SLOPS = 1e-3  # slops: two bodies that go less far past each other in a st
 
 
 @inlined
-def stays(end, start, slop):
-    """Whether two bodies that come from one place to another beside each other stay where they are; false for nan."""
-    travel = sub(end, start)
+def stays(travel, slop):
+    """Whether two bodies that go so far past each other stay where they are; false for nan."""
     return dot(travel, travel) < STAYS_SLOPS * STAYS_SLOPS * slop * slop
 
 
@@ -32,7 +31,7 @@ def meets_at_corner(state, a, b, d, slop):
     if not has_corner_rule(state, shape[a], shape[b]):
         if not both_sharp(state, shape[a], shape[b]):
             return False
-        if stays(centre_offset(bodies, a, b), centre_offset_at_start(bodies, a, b), slop):
+        if stays(sub(centre_offset(bodies, a, b), centre_offset_at_start(bodies, a, b)), slop):
             return False
     return is_corner_touch(state, shape[a], a, shape[b], b, d, slop)
 

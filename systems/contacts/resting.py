@@ -6,7 +6,7 @@ import math
 
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add_scaled, dot, item, length, replace, scale, sub
+from ...framework.vectors import add_scaled, dot, item, length, replace, sub
 from ..ccd.search_bounds import FAST, is_swept, turns_far
 from ..ccd.turning_touch import first_touch_of_turn, is_followed
 from ..codes import OK
@@ -231,7 +231,7 @@ def linearise(state, dt):
         gap, normal = -depth_by_plane(pairs, c, d), pairs.normal[c]
         apart, convex = gap > APART * extent, both_convex(state, bodies.shape[a], bodies.shape[b])
         solver.varies[k] = not convex and normal_varies(state, a, b, d, normal)
-        moves = not stays(end, d, slop)
+        moves = not stays(sub(end, d), slop)
         if moves and (apart or parting != STAYS or meets_at_corner(state, a, b, d, slop)):
             far, gap, normal = touch_of_long_way(state, dt, a, b, end)
             if not far or parting != STAYS:
@@ -267,13 +267,6 @@ def turned_on(state, i):
     return state.bodies.turned_on[owner] if state.spinning and state.bodies.inverse_mass[owner] > 0.0 else 0.0
 
 
-@inlined
-def stays_by_contacts(state, a, b, way):
-    """Whether contacts at rest, which have moved two bodies so far past each other, leave them where they were."""
-    turned, slop = turned_on(state, a) + turned_on(state, b), slop_of(state, a, b)
-    return stays(way, scale(way, 0.0), slop) and turned < STAYS_SLOPS * slop
-
-
 def find_touching(state, dt):
     """Pairs that touch now that all is done, or pushed each other in the step or crossed.
 
@@ -293,7 +286,9 @@ def find_touching(state, dt):
             continue
         a, b, pushed, normal = pairs.a[c], pairs.b[c], pairs.impulse[c] > 0.0, pairs.normal[c]
         d, extent = centre_offset(bodies, a, b), smaller_extent(bodies, a, b)
-        known = pushed and pairs.rests[c] and stays_by_contacts(state, a, b, sub(d, pairs.at[c]))
+        slop = slop_for(state, extent)
+        known = pushed and pairs.rests[c] and stays(sub(d, pairs.at[c]), slop)
+        known = known and turned_on(state, a) + turned_on(state, b) < STAYS_SLOPS * slop
         if not (known or is_at_manifold(pairs, c, d, extent)):
             if solid and not pushed and not crossed and deepest_possible(pairs, c, d) < -SAME_PLACE * extent:
                 continue
