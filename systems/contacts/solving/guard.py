@@ -77,11 +77,19 @@ def close_solved(solver, arms):
 
 
 @part
+def list_driven(solver, span):
+    """The rows of a range to which what moves by itself may give energy."""
+    island, count = solver.island, 0
+    for k in range(span[0], span[1] if solver.movers > 0 else span[0]):
+        solver.driven_row[count] = k
+        count += min(island[solver.first[k]], island[solver.second[k]]) < 0
+    solver.driven_rows = count
+
+
+@part
 def work_of_mover(solver, k, arms):
-    """What moves by itself gives to the other body of row k, J."""
+    """What moves by itself gives to the other body of a row of ``driven_row``, J."""
     a, b = solver.first[k], solver.second[k]
-    if solver.island[a] >= 0 and solver.island[b] >= 0:
-        return 0.0
     push = scale(solver.normal[k], solver.impulse[k])
     if solver.has_friction:
         push = add(push, solver.tangent[k])
@@ -111,7 +119,7 @@ def work_at_joint(solver, j):
 def weigh(solver, span, islands):
     """What contacts do to the energy of each open island if a share s of all that they have changed acts: E(s) =
     slope s + curvature s^2 / 2, which is exact. What moves by itself gives its work to the island, not the contacts."""
-    start, stop, _, _, arms = span
+    arms = span[4]
     slope, curvature, energy, island = solver.slope, solver.curvature, solver.energy, solver.island
     for t in range(islands[0], islands[1]):
         if solver.listed_of[t] > 0:
@@ -130,7 +138,8 @@ def weigh(solver, span, islands):
             slope[t] += dot(momentum, change)
             curvature[t] += dot(momentum_of_spin(solver, q, change), change)
             energy[t] += dot(momentum, before)
-    for k in range(start, stop if solver.movers > 0 else start):
+    for e in range(solver.driven_rows):
+        k = solver.driven_row[e]
         if solver.listed_of[island_of(solver, k)] > 0:
             slope[island_of(solver, k)] += work_of_mover(solver, k, arms)
     if len(arms) > 1:

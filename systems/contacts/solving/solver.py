@@ -36,7 +36,7 @@ from ..constants import (
     VERY_DEEP,
 )  # fmt: skip
 from .chunks import find_chunks
-from .guard import excess_speed, finish_substep, island_of, islands_of, open_all
+from .guard import excess_speed, finish_substep, island_of, islands_of, list_driven, open_all
 from .hard import choose_hard, leave_open
 from .joints.rows import add_joints, keep_joints, measure_joints, solve_joints, start_joints, warm_start_joints
 from .overload import lighten, weigh_down
@@ -237,6 +237,7 @@ def solve_range(solver, substeps, kind, dt, span):
     h, stiff, special = dt / substeps, kind == HARD, kind != ORDINARY
     springs = spring_of(solver, 1.0, substeps, h), spring_of(solver, STIFFER, substeps, h)
     open_all(solver, span)
+    list_driven(solver, span)
     if len(span[4]) > 0:
         find_chunks(solver, span)
     scale_impulses(solver, 1.0 / substeps, span)
