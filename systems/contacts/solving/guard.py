@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from ....framework.compilation import inlined, part
+from ....framework.compilation import part
 from ....framework.vectors import add, add_scaled, dot, scale, sub
 from ...integration.turning import cross_spin, momentum_of_spin
 from ..constants import (
@@ -25,7 +25,7 @@ from ..constants import (
 )  # fmt: skip
 from .joints.given import rates_of_given
 from .joints.rows import GIVEN, POINT, TURN, relax_open
-from .rows import closing_speed, relax_listed, velocity_at
+from .rows import excess_speed, relax_listed, velocity_at
 
 
 @part
@@ -182,13 +182,6 @@ def allow(solver, bias_rate, h, dt, span, islands):
         t, speed = island_of(solver, k), bias_rate * DEEP * solver.extent[k]
         if len(arms) < 2 or not solver.jointed[t]:
             allowed[t] += share * GAIN_PUSH * solver.mass[k] * speed * speed
-
-
-@inlined
-def excess_speed(solver, k, arms):
-    """The speed that a pass over row k would still change: what closes too fast, and what an impulse sends apart."""
-    excess = closing_speed(solver, k, arms) - solver.opening[k]
-    return max(excess, -excess * (solver.impulse[k] > 0.0))  # without a branch, which would be as good as random
 
 
 @part

@@ -33,6 +33,7 @@ SOLVER = Schema(
     pushing=floats(),  # and the same in the pass that pushes: below 0 where overlap is to open
     loaded=floats(),  # m of sag under the impulse of the last step
     had_impulse=flags(),  # it has pushed in this step
+    wrong=flags(),  # its speed is far from what it asks
     soft=floats(),  # share of its impulse that it gives back in the pass that pushes
     fixed=flags(),  # it has several points, and one of its bodies cannot be moved
     hard=flags(),

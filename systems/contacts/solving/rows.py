@@ -15,6 +15,7 @@ import math
 from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, divided, dot, item, replace, scale, sub
 from ...integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, shares_of_turn, twist
+from ..constants import DEEP, DEEPEST, EXCESS, OPEN, SLOPE, VERY_DEEP
 
 NO_ARMS, ARMS, JOINTED = (), (True,), (True, True)
 
@@ -104,6 +105,48 @@ def relative_velocity(solver, k, arms):
 def closing_speed(solver, k, arms):
     """The speed at which the points of row k approach each other along its normal."""
     return -dot(relative_velocity(solver, k, arms), solver.normal[k])
+
+
+@inlined
+def excess_of(closing, opening, impulse):
+    """The speed that a pass would still change: what closes too fast, and what an impulse sends apart."""
+    excess = closing - opening
+    apart = -excess if impulse > 0.0 else 0.0  # without a branch, which would be as good as random
+    return excess if excess > apart else apart
+
+
+@inlined
+def excess_speed(solver, k, arms):
+    """The speed that a pass over row k would still change."""
+    return excess_of(closing_speed(solver, k, arms), solver.opening[k], solver.impulse[k])
+
+
+@inlined
+def ask(solver, k, arms, asks):
+    """What row k asks, see ``measure``, without a branch; returns whether its speed is far from that.
+
+    asks: (s in which it may close, of a substep, of a step, springs, stiff).
+    """
+    ahead, h, dt, springs, stiff = asks
+    room, closing, impulse = room_of(solver, k, arms), closing_speed(solver, k, arms), solver.impulse[k]
+    extent, hard = solver.extent[k], solver.hard[k]
+    softness = springs[1][0] if solver.fixed[k] else springs[0][0]
+    bias_rate = springs[1][1] if solver.fixed[k] else springs[0][1]
+    opening = (room if room > 0.0 else 0.0) / ahead
+    deep, least = -(DEEP * extent + solver.loaded[k]), -DEEPEST * extent
+    beyond = SLOPE * (room + VERY_DEEP * extent)
+    beyond = beyond if beyond < 0.0 else 0.0
+    at_once = room / (h * bias_rate)
+    at_once = at_once if at_once > deep else deep
+    near = at_once if hard else room
+    push = deep + (beyond if beyond > least else least) if room < deep else near
+    soft = (room <= OPEN * extent) & (not solver.parting[k])  # what was just closed, on either side of rounding
+    wrong = excess_of(closing, opening, impulse) * dt > EXCESS * extent
+    solver.opening[k], solver.pushing[k] = opening, bias_rate * push if soft else opening
+    solver.soft[k] = 0.0 if stiff or hard or not soft else softness
+    solver.had_impulse[k] |= impulse > 0.0
+    solver.wrong[k] = wrong  # not to be read again here: several rows are asked at once
+    return wrong
 
 
 @inlined

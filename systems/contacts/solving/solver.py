@@ -18,30 +18,25 @@ from ...codes import OK
 from ..constants import (
     DAMPING_RATIO,
     DEEP,
-    DEEPEST,
-    EXCESS,
     LAST_RELAX_PASSES,
     LOADED,
     MOST_LOAD,
     MOST_LOADED,
-    OPEN,
     OVER,
     REFINED_PASSES,
     RELAX_PASSES,
-    SLOPE,
     STIFFER,
     STILL,
     TOLD_GAIN,
     TURNING_RELAX_PASSES,
-    VERY_DEEP,
 )  # fmt: skip
 from .chunks import find_chunks
-from .guard import excess_speed, finish_substep, island_of, islands_of, list_driven, open_all
+from .guard import finish_substep, island_of, islands_of, list_driven, open_all
 from .hard import choose_hard, leave_open
 from .joints.rows import add_joints, keep_joints, measure_joints, solve_joints, start_joints, warm_start_joints
 from .overload import lighten, weigh_down
 from .passes import close_in_order, converge, note_impulses, solve_pass
-from .rows import ARMS, JOINTED, NO_ARMS, apply_impulse, room_of, turn_body, weigh_row
+from .rows import ARMS, JOINTED, NO_ARMS, apply_impulse, ask, turn_body, weigh_row
 
 ORDINARY, REFINED, HARD = range(3)  # ranges: with the usual substeps, with more, with contacts that do not sag
 
@@ -54,27 +49,15 @@ def measure(solver, h, springs, dt, stiff, ends, span):
     pushing: in the pass that pushes, overlap is to open as well, softly where ``soft`` says so. Islands are ``struck``
     where the speed of some row is far from what the relaxing passes are to make of it; returns whether any is.
     """
-    ahead, any_struck, islands = dt / solver.usual if ends else h, False, islands_of(solver, span)
+    asks = dt / solver.usual if ends else h, h, dt, springs, stiff
+    any_struck, islands = False, islands_of(solver, span)
     for t in range(islands[0], islands[1]):
         solver.struck[t] = False
     for k in range(span[0], span[1]):
-        room = room_of(solver, k, span[4])
-        opening = pushing = max(0.0, room) / ahead
-        extent, soft = solver.extent[k], 0.0
-        if room <= OPEN * extent and not solver.parting[k]:  # what was just closed is soft, on either side of rounding
-            hard = solver.hard[k]
-            softness, bias_rate = springs[1] if solver.fixed[k] else springs[0]
-            deep = DEEP * extent + solver.loaded[k]
-            if room < -deep:
-                room = -deep + max(min(0.0, SLOPE * (room + VERY_DEEP * extent)), -DEEPEST * extent)
-            elif hard:  # at once
-                room = max(room / (h * bias_rate), -deep)
-            pushing = bias_rate * room
-            soft = 0.0 if stiff or hard else softness
-        solver.had_impulse[k] |= solver.impulse[k] > 0.0
-        solver.opening[k], solver.pushing[k], solver.soft[k] = opening, pushing, soft
-        if excess_speed(solver, k, span[4]) * dt > EXCESS * extent:
-            any_struck = solver.struck[island_of(solver, k)] = True
+        any_struck |= ask(solver, k, span[4], asks)
+    for k in range(span[0], span[1] if any_struck else span[0]):
+        if solver.wrong[k]:
+            solver.struck[island_of(solver, k)] = True
     if len(span[4]) > 1:
         measure_joints(solver)
     return any_struck

@@ -12,8 +12,8 @@ from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add_scaled, dot, length, scale, sub
 from ...codes import NEED_WARM_START, OK
 from ..constants import EXCESS, MOST_LOAD, NEAR_PLACE, OPEN, TURNED
-from .guard import excess_speed, island_of
-from .rows import ARMS, NO_ARMS
+from .guard import island_of
+from .rows import ARMS, NO_ARMS, excess_speed
 
 
 @part
