@@ -67,6 +67,9 @@ def how_deep(state, dt, c, a, b):
     allowed = (JOINED if joined else ALLOWED) * extent
     found, depth, normal = False, 0.0, travel
     if state.spinning and turns_far(state, a, b):  # where it started says nothing of the shapes at the end
+        turns = way_of_turning(bodies, a, bodies.turn[a]) + way_of_turning(bodies, b, bodies.turn[b])
+        if c != NO_PAIR and deepest_possible(state.pairs, c, d) + turns <= allowed:  # usual
+            return 0.0, normal
         depth, normal = depth_on_side_of_touch(state, dt, a, b, d)
         return depth - allowed, normal
     if way > FAST * extent:
@@ -151,13 +154,12 @@ def keep_out_of_all(state, dt, i):
 
 
 @part
-def measure_turned(state):
-    """The extents of what contacts have turned, as it stands now."""
+def measure_turned(state, i):
+    """The extents of body i as it stands now, if contacts have turned it."""
     bodies = state.bodies
-    for i in range(state.first, state.dynamic):
-        if bodies.held[owner_of(state, i)] or bodies.impact_count[i] > 0:
-            for level in range(state.level_count):
-                find_extents(state, level, i, i + 1)
+    if state.spinning and (bodies.held[owner_of(state, i)] or bodies.impact_count[i] > 0):
+        for level in range(state.level_count):
+            find_extents(state, level, i, i + 1)
 
 
 def resolve_static_penetration(state, dt):
@@ -166,8 +168,6 @@ def resolve_static_penetration(state, dt):
     pushed = state.solver.contacts > 0 or state.any_warm_started or (state.spinning and state.impacts.logged > 0)
     if not pushed or state.count == state.dynamic:
         return OK
-    if state.spinning:
-        measure_turned(state)
     for turn in range(ROUNDS):
         first, moved = state.moving if turn == ROUNDS - 1 else state.dynamic, False
         for c in range(pairs.count):
@@ -175,6 +175,7 @@ def resolve_static_penetration(state, dt):
             fixed, i = max(a, b), min(a, b)  # dynamic rows come first
             if not (fixed >= first and i < state.dynamic and pairs.is_solid[c] and may_have_sunk(state, c, i)):
                 continue
+            measure_turned(state, i)
             far = keep_out(state, dt, c, a, b)
             moved |= far > 0.0
             if turn == ROUNDS - 1 and far > SAME_PLACE * smaller_extent(bodies, a, b):  # more than rounding
@@ -183,6 +184,7 @@ def resolve_static_penetration(state, dt):
             break
     for i in range(state.first, state.dynamic if not state.pairs_filtered else 0):
         if bodies.shape[i] >= 0 and is_moved_by_solver(state, i) and is_astray(state, i, dt):
+            measure_turned(state, i)
             for _ in range(ROUNDS):
                 if not keep_out_of_all(state, dt, i):
                     break
