@@ -16,6 +16,7 @@ from ..integration.turning import arms_to, closing_by_spin, size_of_turn
 from ..narrow_phase.manifolds import (
     centre_offset,
     centre_offset_at_start,
+    deepest_on_way,
     deepest_possible,
     depth_at,
     depth_by_plane,
@@ -70,7 +71,7 @@ def deepest(state, dt, c, d):
     way there; else by its manifold or its function."""
     pairs, bodies = state.pairs, state.bodies
     a, b = pairs.a[c], pairs.b[c]
-    if state.spinning and turns_far(state, a, b):
+    if state.spinning and turns_far(state, a, b) and deepest_on_way(state, c) >= -slop_of(state, a, b):
         touches, _, _, normal, _, _, _ = first_touch_of_turn(state, dt, a, b)
         if touches or not is_followed(state, a, b, dt):
             return 2.0 * slop_of(state, a, b) if touches else -math.inf, normal, touches

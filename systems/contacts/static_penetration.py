@@ -23,7 +23,13 @@ from ..compounds.rows import next_row, owner_of
 from ..impacts.impulses import STOPPED
 from ..integration.trajectory import along, path_of
 from ..integration.turning import turn_of_arm
-from ..narrow_phase.manifolds import centre_offset, centre_offset_at_start, deepest_possible, evaluate_pair
+from ..narrow_phase.manifolds import (
+    centre_offset,
+    centre_offset_at_start,
+    deepest_on_way,
+    deepest_possible,
+    evaluate_pair,
+)  # fmt: skip
 from ..narrow_phase.stages import is_solid_pair, layers_meet
 from ..shapes.tolerances import SAME_PLACE, smaller_extent, way_of_turning
 from .approach import first_touch_on_segment, segment_start
@@ -67,8 +73,7 @@ def how_deep(state, dt, c, a, b):
     allowed = (JOINED if joined else ALLOWED) * extent
     found, depth, normal = False, 0.0, travel
     if state.spinning and turns_far(state, a, b):  # where it started says nothing of the shapes at the end
-        turns = way_of_turning(bodies, a, bodies.turn[a]) + way_of_turning(bodies, b, bodies.turn[b])
-        if c != NO_PAIR and deepest_possible(state.pairs, c, d) + turns <= allowed:  # usual
+        if c != NO_PAIR and deepest_on_way(state, c) <= allowed:  # usual
             return 0.0, normal
         depth, normal = depth_on_side_of_touch(state, dt, a, b, d)
         return depth - allowed, normal

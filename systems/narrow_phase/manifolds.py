@@ -13,7 +13,7 @@ from ...framework.compilation import inlined, part
 from ...framework.vectors import add, add_scaled, dot, item, length, sub
 from ..codes import OK
 from ..shapes.dispatch import both_convex, evaluate
-from ..shapes.tolerances import FLAT_SLOPS, PLANE_SIZES, SAME_PLACE, slop_for, turning_margin
+from ..shapes.tolerances import FLAT_SLOPS, PLANE_SIZES, SAME_PLACE, slop_for, turning_margin, way_of_turning
 
 
 @inlined
@@ -76,6 +76,18 @@ def deepest_possible(pairs, c, d):
     """The most that the depth may be where the centres are d apart: nothing gets deeper by more than it moves."""
     depth = pairs.depth[c]
     return depth + length(sub(d, pairs.at[c])) if depth > -math.inf else math.inf
+
+
+@part
+def deepest_on_way(state, c):
+    """The most that the depth may be anywhere on the way of the step, however the two are turned there; infinity if
+    one has had an impact, which leads it elsewhere."""
+    bodies, pairs, a, b = state.bodies, state.pairs, state.pairs.a[c], state.pairs.b[c]
+    if bodies.impact_count[a] + bodies.impact_count[b] > 0:
+        return math.inf
+    depth = deepest_possible(pairs, c, centre_offset_at_start(bodies, a, b))
+    depth = max(depth, deepest_possible(pairs, c, centre_offset(bodies, a, b)))
+    return depth + way_of_turning(bodies, a, bodies.turn[a]) + way_of_turning(bodies, b, bodies.turn[b])
 
 
 @part
