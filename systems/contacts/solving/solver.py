@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from ....framework.compilation import inlined, packed, part
+from ....framework.compilation import packed, part
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add, add_scaled, dot, scale
 from ...codes import OK
@@ -105,10 +105,11 @@ def move(solver, h, span):
         turn_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], h))
 
 
-@inlined
-def relax_passes(kind, ends, arms):
-    """How many passes take back the speed that pushing has given."""
-    if kind != ORDINARY:
+@part
+def relax_passes(solver, kind, ends, span):
+    """How many passes take back the speed that pushing has given: more would pull joints apart, which have one."""
+    arms = span[4]
+    if kind != ORDINARY and not (len(arms) > 1 and solver.jointed[solver.island[span[2]]]):
         return REFINED_PASSES
     if len(arms) > 0:
         return TURNING_RELAX_PASSES
@@ -137,7 +138,7 @@ def solve_substep(solver, springs, most, dt, h, kind, ends, span):
         leave_open(solver, h, span)
     if len(span[4]) > 1:  # once: more often, chains give way more
         solve_joints(solver, False)
-    last = relax_passes(kind, ends, span[4]) - 1
+    last = relax_passes(solver, kind, ends, span) - 1
     for one in range(last + 1):
         solve_pass(solver, opening, False, OVER if one < last else 1.0, span)
     if stiff:
