@@ -71,13 +71,20 @@ def momentum_of_spin(bodies, i, spin):
 
 
 @inlined
+def shares_of_small_turn(turn):
+    """``shares_of_turn`` where its square is below SERIES."""
+    s = dot(turn, turn)
+    sine = 1.0 - s * (1 / 6 - s * (1 / 120 - s * (1 / 5_040 - s * (1 / 362_880 - s * (1 / 39_916_800)))))
+    versine = 0.5 - s * (1 / 24 - s * (1 / 720 - s * (1 / 40_320 - s * (1 / 3_628_800 - s * (1 / 479_001_600)))))
+    return sine, versine
+
+
+@inlined
 def shares_of_turn(turn):
     """(sin(t) / t, (1 - cos(t)) / t^2) of a turn by the angle t."""
     s = dot(turn, turn)
     if s < SERIES:
-        sine = 1.0 - s * (1 / 6 - s * (1 / 120 - s * (1 / 5_040 - s * (1 / 362_880 - s * (1 / 39_916_800)))))
-        versine = 0.5 - s * (1 / 24 - s * (1 / 720 - s * (1 / 40_320 - s * (1 / 3_628_800 - s * (1 / 479_001_600)))))
-        return sine, versine
+        return shares_of_small_turn(turn)
     t = math.sqrt(s)
     return math.sin(t) / t, (1.0 - math.cos(t)) / s
 

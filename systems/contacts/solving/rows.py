@@ -14,7 +14,16 @@ import math
 
 from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, divided, dot, item, replace, scale, sub
-from ...integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, shares_of_turn, twist
+from ...integration.turning import (
+    SERIES,
+    change_of_spin,
+    compliance,
+    cross_spin,
+    end_of_turn,
+    shares_of_small_turn,
+    shares_of_turn,
+    twist,
+)  # fmt: skip
 from ..constants import DEEP, DEEPEST, EXCESS, OPEN, SLOPE, VERY_DEEP
 
 NO_ARMS, ARMS, JOINTED = (), (True,), (True, True)
@@ -35,6 +44,19 @@ def turn_body(solver, q, turn):
     """Body q is turned so far since the step began."""
     solver.turn[q] = turn
     solver.sine[q], solver.versine[q] = shares_of_turn(turn)
+
+
+@part
+def turn_on(solver, begin, end, h):
+    """Bodies go on turning for a time; several at once where none has turned far."""
+    any_far = False
+    for q in range(begin, end):
+        turn = add_scaled(solver.turn[q], solver.spin[q], h)
+        solver.turn[q] = turn
+        solver.sine[q], solver.versine[q] = shares_of_small_turn(turn)
+        any_far |= not dot(turn, turn) < SERIES
+    for q in range(begin, end if any_far else begin):
+        turn_body(solver, q, solver.turn[q])
 
 
 @inlined

@@ -36,7 +36,7 @@ from .hard import choose_hard, leave_open
 from .joints.rows import add_joints, keep_joints, measure_joints, solve_joints, start_joints, warm_start_joints
 from .overload import lighten, weigh_down
 from .passes import close_in_order, converge, note_impulses, solve_pass
-from .rows import ARMS, JOINTED, NO_ARMS, apply_impulse, ask, turn_body, weigh_row
+from .rows import ARMS, JOINTED, NO_ARMS, apply_impulse, ask, turn_body, turn_on, weigh_row
 
 ORDINARY, REFINED, HARD = range(3)  # ranges: with the usual substeps, with more, with contacts that do not sag
 
@@ -101,8 +101,8 @@ def move(solver, h, span):
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], h)
         if len(span[4]) > 0:
             turn_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], h))
-    for q in range(span[2], span[3] if len(span[4]) > 0 else span[2]):
-        turn_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], h))
+    if len(span[4]) > 0:
+        turn_on(solver, span[2], span[3], h)
 
 
 @part
@@ -182,8 +182,8 @@ def repeat_substep(solver, left, h, span):
         solver.total[k] += left * solver.impulse[k]
     for q in range(span[2], span[3]):
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], left * h)
-        if len(span[4]) > 0:
-            turn_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], left * h))
+    if len(span[4]) > 0:
+        turn_on(solver, span[2], span[3], left * h)
 
 
 @part
