@@ -305,25 +305,48 @@ def lay_chunks(state):
 
 
 @part
-def place_joints(state):
-    """The rows of joints by range, those of each in their order."""
-    solver, joints, ends = state.solver, state.solver.joints, state.solver.joint_ends
-    ends[0] = joints.active
-    if solver.ranges == 1:
-        return
+def colour_joints(state):
+    """The places of the bodies of joints, and their rows into ``open_row`` by colour: those of one share no body that
+    moves, so that none waits for another. The world has the place behind all bodies."""
+    solver, joints, ground = state.solver, state.solver.joints, state.solver.bodies
+    used, starts, island = solver.used, solver.starts, solver.island
+    island[ground] = -1
+    for q in range(ground + 1):
+        used[q] = 0
+    for k in range(COLOURS + 1):
+        starts[k] = 0
+    for e in range(joints.active):
+        j = joints.order[e]
+        a, b = joints.row_a[j], joints.row_b[j]
+        p, q = place_of(state, a) if a >= 0 else ground, place_of(state, b) if b >= 0 else ground
+        colour = min(lowest_bit(~(used[p] | used[q])), COLOURS - 1)
+        used[p] |= (island[p] >= 0) << colour
+        used[q] |= (island[q] >= 0) << colour
+        joints.first[j], joints.second[j], joints.colour[e] = p, q, colour
+        starts[colour + 1] += 1
+    for k in range(1, COLOURS + 1):
+        starts[k] += starts[k - 1]
+    for e in range(joints.active):
+        joints.open_row[starts[joints.colour[e]]] = joints.order[e]
+        starts[joints.colour[e]] += 1
+
+
+@part
+def order_joints(state):
+    """The rows of joints by range, island and colour."""
+    solver, joints, island, begins = state.solver, state.solver.joints, state.solver.island, state.solver.number
+    colour_joints(state)
+    begin = 0
     for s in range(solver.ranges):
-        ends[s] = 0
+        for t in range(0 if s == 0 else solver.special[s], solver.islands if s == 0 else solver.special[s] + 1):
+            if solver.range_of[t] == s:
+                begins[t], begin = begin, begin + solver.links[t]
+        solver.joint_ends[s] = begin
     for e in range(joints.active):
-        ends[solver.range_of[island_of_joint(state, joints.order[e])]] += 1
-    rows = 0
-    for s in range(solver.ranges):  # from how many to where each begins
-        rows, ends[s] = rows + ends[s], rows
-    for e in range(joints.active):
-        s = solver.range_of[island_of_joint(state, joints.order[e])]
-        joints.open_row[ends[s]] = joints.order[e]
-        ends[s] += 1
-    for e in range(joints.active):
-        joints.order[e] = joints.open_row[e]
+        j = joints.open_row[e]
+        t = max(island[joints.first[j]], island[joints.second[j]])
+        joints.order[begins[t]] = j
+        begins[t] += 1
 
 
 @part
@@ -343,4 +366,7 @@ def order_rows(state, dt):
     place_rows(state)
     if state.spinning:
         lay_chunks(state)
-    place_joints(state)
+    for s in range(solver.ranges):
+        solver.joint_ends[s] = 0
+    if solver.joints.active > 0:
+        order_joints(state)

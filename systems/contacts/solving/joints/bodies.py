@@ -8,7 +8,7 @@ from .....framework.compilation import inlined, part
 from .....framework.jit.records.record_type import zero_of
 from .....framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 from ....codes import NEED_COLUMNS, OK
-from ....compounds.rows import next_row, owner_of, place_of
+from ....compounds.rows import next_row, owner_of
 from ....integration.turning import change_of_spin, cross_spin
 from ....narrow_phase.stages import layers_meet
 from ..rows import turn_body
@@ -196,13 +196,11 @@ def lay_joints(state):
     ground = solver.bodies
     solver.velocity[ground], solver.shift[ground], solver.spin[ground] = zero, zero, zero
     turn_body(solver, ground, zero)
-    solver.inverse_mass[ground], solver.island[ground] = 0.0, -1
+    solver.inverse_mass[ground] = 0.0
     solver.inverse_inertia[ground], solver.inverse_products[ground] = zero, zero
     for e in range(joints.active):
         j = joints.order[e]
         a, b = joints.row_a[j], joints.row_b[j]
-        joints.first[j] = place_of(state, a) if a >= 0 else ground
-        joints.second[j] = place_of(state, b) if b >= 0 else ground
         if joints.kind[j] == GIVEN:
             lay_given(state, j)
             continue

@@ -49,6 +49,7 @@ JOINTS = Schema(
     row_b=ints("int32"),
     active=integer(),  # rows that take part, in the order of their ranges:
     order=ints("int32"),
+    colour=ints("int8"),  # of each place in that
     open_row=ints("int32"),  # of these, those that further passes go over: so many
     opened=integer(),
     first=ints("int32"),  # places of the two bodies
