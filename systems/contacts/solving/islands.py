@@ -42,6 +42,7 @@ from ..points import points_of
 from .joints.rows import HOLD, LIMIT, LINE, POINT, TURN
 
 COLOURS = 62  # bits of a mask; pairs of a body beyond them share the last one
+STREAMS = 4  # of joints: more are no faster
 CHUNK = 64  # pairs at most: their columns stay in the processor's first cache
 
 
@@ -305,48 +306,41 @@ def lay_chunks(state):
 
 
 @part
-def colour_joints(state):
-    """The places of the bodies of joints, and their rows into ``open_row`` by colour: those of one share no body that
-    moves, so that none waits for another. The world has the place behind all bodies."""
-    solver, joints, ground = state.solver, state.solver.joints, state.solver.bodies
-    used, starts, island = solver.used, solver.starts, solver.island
-    island[ground] = -1
-    for q in range(ground + 1):
-        used[q] = 0
-    for k in range(COLOURS + 1):
-        starts[k] = 0
-    for e in range(joints.active):
-        j = joints.order[e]
-        a, b = joints.row_a[j], joints.row_b[j]
-        p, q = place_of(state, a) if a >= 0 else ground, place_of(state, b) if b >= 0 else ground
-        colour = min(lowest_bit(~(used[p] | used[q])), COLOURS - 1)
-        used[p] |= (island[p] >= 0) << colour
-        used[q] |= (island[q] >= 0) << colour
-        joints.first[j], joints.second[j], joints.colour[e] = p, q, colour
-        starts[colour + 1] += 1
-    for k in range(1, COLOURS + 1):
-        starts[k] += starts[k - 1]
-    for e in range(joints.active):
-        joints.open_row[starts[joints.colour[e]]] = joints.order[e]
-        starts[joints.colour[e]] += 1
-
-
-@part
 def order_joints(state):
-    """The rows of joints by range, island and colour."""
-    solver, joints, island, begins = state.solver, state.solver.joints, state.solver.island, state.solver.number
-    colour_joints(state)
-    begin = 0
+    """The rows of joints by range and island, and the places of their bodies; the world has that behind all bodies.
+
+    What holds points comes before limits and motors, which may push it apart. Each in a few streams that are solved
+    side by side: neighbours in a chain would wait for each other.
+    """
+    solver, joints, ground = state.solver, state.solver.joints, state.solver.bodies
+    island, begins, begin = solver.island, solver.number, 0
+    island[ground] = -1
     for s in range(solver.ranges):
         for t in range(0 if s == 0 else solver.special[s], solver.islands if s == 0 else solver.special[s] + 1):
             if solver.range_of[t] == s:
                 begins[t], begin = begin, begin + solver.links[t]
         solver.joint_ends[s] = begin
-    for e in range(joints.active):
-        j = joints.open_row[e]
-        t = max(island[joints.first[j]], island[joints.second[j]])
-        joints.order[begins[t]] = j
-        begins[t] += 1
+    for others in range(2):
+        for e in range(joints.active):
+            j = joints.order[e]
+            if (joints.kind[j] != POINT) == (others == 1):
+                a, b = joints.row_a[j], joints.row_b[j]
+                joints.first[j] = place_of(state, a) if a >= 0 else ground
+                joints.second[j] = place_of(state, b) if b >= 0 else ground
+                t = max(island[joints.first[j]], island[joints.second[j]])
+                joints.open_row[begins[t]], joints.stream[begins[t]] = j, 2 * t + others
+                begins[t] += 1
+    start = 0
+    while start < joints.active:
+        stop, e = start + 1, start
+        while stop < joints.active and joints.stream[stop] == joints.stream[start]:
+            stop += 1
+        rows = (stop - start + STREAMS - 1) // STREAMS
+        for k in range(rows):
+            for one in range(start + k, stop, rows):
+                joints.order[e] = joints.open_row[one]
+                e += 1
+        start = stop
 
 
 @part
