@@ -292,9 +292,9 @@ def finish_substep(solver, bias_rate, any_struck, h, dt, span):
     allow(solver, bias_rate, h, dt, span, islands)
     turn, count = 0, find_unsolved(solver, 0, any_struck, dt, span, islands)
     while count > 0:
-        if len(span[4]) > 1:
-            relax_open(solver)
         for _ in range(SWEEPS):
+            if len(span[4]) > 1:
+                relax_open(solver)
             relax_listed(solver, count, span[4])
         weigh(solver, span, islands)
         turn += SWEEPS
