@@ -38,8 +38,8 @@ class Scene:
             Transform(tuple(place)[: self.d]), RigidBody(mass, tuple(velocity)[: self.d]), shape, *spin
         )
 
-    def tower(self, bottom):
-        return [self.add((0.0, bottom + LAID * k, 0.0), m) for k, m in enumerate((LIGHT, LIGHT, HEAVY))]
+    def tower(self, bottom, velocity=(0.0, 0.0, 0.0)):
+        return [self.add((0.0, bottom + LAID * k, 0.0), m, velocity) for k, m in enumerate((LIGHT, LIGHT, HEAVY))]
 
     def strike(self, height):
         return self.add((-1.2, height, 0.0), BLOW, (1.0, 0.0, 0.0), SphereCollider(0.5))
@@ -94,15 +94,17 @@ def test_a_floor_without_friction_takes_no_momentum_along_it(d, mode, kind):
             assert world.component_for_entity(boxes[2], Transform).position[1] == pytest.approx(2.5, abs=0.05)
 
 
-@pytest.mark.parametrize(("d", "mode"), pairwise((2, 3), MODES))
-def test_a_lift_carries_an_overloaded_tower(d, mode):
-    scene = Scene(d, mode, "glides")
+@pytest.mark.parametrize(("d", "mode", "speed"), pairwise((2, 3), MODES, (1.0, -1.0, -3.0)))
+def test_a_lift_carries_an_overloaded_tower(d, mode, speed):
+    """As a floor does, whichever way it moves."""
+    scene, velocity = Scene(d, mode, "glides"), (0.0, speed, 0.0)
     with scene.world as world:
-        lift = RigidBody(linear_velocity=(0.0, 1.0, 0.0)[:d], kind="kinematic")
+        lift = RigidBody(linear_velocity=velocity[:d], kind="kinematic")
         world.create_entity(Transform((0.0, -0.5, 0.0)[:d]), lift, scene.box((5.0, 0.5, 5.0)[:d]))
-        boxes = scene.tower(0.5)
+        top = scene.tower(0.5, velocity)[2]
         for _ in range(120):
             world.step()
-        body = world.component_for_entity(boxes[2], RigidBody)
+            height = world.component_for_entity(top, Transform).position[1] - speed * world.time
+            assert height == pytest.approx(2.5, abs=0.05)
         assert told(world)
-        assert body.linear_velocity[1] == pytest.approx(1.0, abs=1e-3)
+        assert world.component_for_entity(top, RigidBody).linear_velocity[1] == pytest.approx(speed, abs=1e-3)

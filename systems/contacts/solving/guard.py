@@ -88,7 +88,7 @@ def list_driven(solver, span):
 
 @part
 def work_of_mover(solver, k, arms):
-    """What moves by itself gives to the other body of a row of ``driven_row``, J."""
+    """The work of a row of ``driven_row`` on what moves by itself, J; what that gives to the island is minus this."""
     a, b = solver.first[k], solver.second[k]
     push = scale(solver.normal[k], solver.impulse[k])
     if solver.has_friction:

@@ -52,12 +52,12 @@ def find_support(solver, span):
     for q in range(span[2], span[3]):
         if solver.yields[q] < 1.0:
             given += max(0.0, dot(way, sub(solver.velocity[q], solver.velocity_before[q]))) * solver.heft[q]
-    for k in range(span[0], span[1] if solver.movers > 0 else span[0]):
-        work += work_of_mover(solver, k, span[4])
+    for e in range(solver.driven_rows):
+        work += work_of_mover(solver, solver.driven_row[e], span[4])
     if len(span[4]) > 1 and solver.movers > 0:
         for e in range(solver.joints.begin, solver.joints.end):
             work += work_at_joint(solver, solver.joints.order[e])
-    return way, work / size, size / max(size, given)
+    return way, -work / size, size / max(size, given)
 
 
 @inlined
