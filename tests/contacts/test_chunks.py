@@ -81,3 +81,17 @@ def test_chunks_give_the_bits_of_row_by_row(d):
                 for name in ends:
                     np.testing.assert_array_equal(found[True][name], found[False][name], name)
                     assert not np.array_equal(found[True][name], before[name])
+
+
+def test_a_turntable_may_drive_more_rows_than_there_are_bodies():
+    """In space each box on it has four."""
+    with World(Physics(3, gravity=(0.0, -9.81, 0.0)), Rotation()) as world:
+        table = BoxCollider((20.0, 1.0, 20.0), friction=0.5)
+        world.create_entity(Transform((0.0, -1.0, 0.0)), RigidBody(kind="kinematic"), Spin((0.0, 0.1, 0.0)), table)
+        for k in range(40):
+            box = BoxCollider((0.5, 0.5, 0.5), friction=0.5)
+            world.create_entity(Transform((2.0 * (k % 8) - 7.0, 0.5, 2.0 * (k // 8) - 4.0)), RigidBody(), Spin(), box)
+        world.step()
+        solver = world.physics.state.solver
+        assert solver.driven_rows == solver.contacts == 160
+        assert len(solver.driven_row) >= 160 > len(solver.body_row)
