@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from carom.components import RigidBody, SphereCollider, Transform
-from carom.framework import Settings, World
+from carom.framework import Phase, Settings, System, World
 from carom.plugins import Physics, capsule, convex_polygon, half_space
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider
@@ -345,3 +345,35 @@ def test_contacts_tell_the_depth_of_boxes_as_they_are_turned_in_the_end(spin):
                     assert contact.depth == pytest.approx(max(0.0, reach + abs(place.x) - 0.6), abs=5e-6)
                     pushes += 1
     assert pushes
+
+
+@pytest.mark.parametrize("e", [0.8, 1.0])
+def test_a_floor_whose_contact_is_disabled_holds_a_box_no_more_than_one_that_is_gone(e):
+    """Nor do any of its points while a ball strikes the box in the same step."""
+
+    class Trapdoor(System):
+        phase = Phase.NARROW
+        open = False
+
+        def process(self, dt):
+            if self.open:
+                self.world.contacts.enabled[self.world.contacts.entity_a == floor] = False
+
+    found = []
+    for deleted in (False, True):
+        with World(Physics(2, gravity=(0, -10)), Rotation(), settings=Settings(dt=1 / 30)) as world:
+            floor = world.create_entity(Transform((0, -0.5)), BoxCollider((2, 0.5)))
+            box = world.create_entity(Transform((0, 0.5)), RigidBody(), Spin(), BoxCollider((0.5, 0.5)))
+            ball = world.create_entity(Transform((0, 30)), RigidBody(), SphereCollider(0.25, restitution=e))
+            trapdoor = Trapdoor()
+            world.add_system(trapdoor)
+            for _ in range(40):
+                world.step()
+            world.component_for_entity(ball, Transform).position = (0.1, 1.37)
+            world.component_for_entity(ball, RigidBody).linear_velocity = (0, -4)
+            trapdoor.open = not deleted
+            if deleted:
+                world.delete_entity(floor)
+            world.step()
+            found.append([world.component_for_entity(body, RigidBody).linear_velocity[1] for body in (box, ball)])
+    assert found[0] == pytest.approx(found[1], abs=1e-12)

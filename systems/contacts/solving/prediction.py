@@ -34,8 +34,9 @@ def mark_disabled(state):
             memory.entity_a[now, m] < a or (memory.entity_a[now, m] == a and memory.entity_b[now, m] < b)
         ):
             m += 1
-        if m < memory.counts[now] and memory.entity_a[now, m] == a and memory.entity_b[now, m] == b:
+        while m < memory.counts[now] and memory.entity_a[now, m] == a and memory.entity_b[now, m] == b:
             memory.off[m] = True
+            m += 1
 
 
 @part
