@@ -109,33 +109,16 @@ class Joint(Component, abstract=True):
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name in self.columns and self._values is not None:
-            if name in ("a", "b") and value is None:
-                value = WORLD
-            before = dict(self._values)
-            self._store_together({name: value})
-            if name in self.fixed:
-                self._values["attached"] = False
-            elif np.isscalar(value) and np.all(before.get(name) == self._values[name]):
-                return  # a game may set its motors in each step
-            self._values["changed"] = True
-            Changes.count += 1
-            return
-        super().__setattr__(name, value)
+            self.set_together(**{name: value})
+        else:
+            super().__setattr__(name, value)
 
     def set_together(self, **values: Any) -> None:
-        """Set fields that only fit each other, all or none of them."""
-        before = dict(self._values or {})
-        self._store_together(values)
-        if self._values is not None and any(before.get(name) != self._values[name] for name in values):
-            self._values["changed"] = True
-            Changes.count += 1
-
-    def _store_together(self, values: dict[str, Any]) -> None:
-        """Write them; ValueError, with all as it was, if they do not fit."""
+        """Set fields that only fit each other; ValueError, with all as it was, if they do not."""
         before, version = dict(self._values or {}), self._version
         try:
             for name, value in values.items():
-                super().__setattr__(name, value)
+                super().__setattr__(name, WORLD if name in ("a", "b") and value is None else value)
             self.check()
             if version < -1:  # of a world of so many dimensions
                 self.fit(-version)
@@ -144,6 +127,13 @@ class Joint(Component, abstract=True):
             if str(error).startswith("entity "):
                 raise
             raise ValueError(str(error).replace(type(self).__name__, self._name(), 1)) from None
+        now = self._values or {}
+        if any(name in self.fixed for name in values):
+            self.keep(attached=False)
+        elif all(np.isscalar(value) and np.all(before.get(name) == now[name]) for name, value in values.items()):
+            return  # a game may set its motors in each step
+        self.keep(changed=True)
+        Changes.count += 1
 
     def _name(self) -> str:
         """For messages."""
