@@ -93,8 +93,8 @@ def find_driven(state, dt):
         axis, missing = joints.axis[j], joints.target[j]
         if a >= 0 and len(axis) == 3:
             axis = turned(state, a, axis)
-        missing -= dot(axis, bodies.spin[b]) if b >= 0 else 0.0
-        missing += dot(axis, bodies.spin[a]) if a >= 0 else 0.0
+        missing -= dot(axis, bodies.spin[owner_of(state, b)]) if b >= 0 else 0.0
+        missing += dot(axis, bodies.spin[owner_of(state, a)]) if a >= 0 else 0.0
         hold = j  # the first row of the joint: the point about which they turn
         while hold > 0 and joints.joint[hold - 1] == joints.joint[j]:
             hold -= 1
