@@ -6,8 +6,6 @@ n-th at T (1 + 2 e (1 - e^(n - 1)) / (1 - e)). The limit for infinitely many is 
 
 from __future__ import annotations
 
-import math
-
 from ...components import RigidBody, SphereCollider, Transform
 from ...framework import Settings, World
 from ...plugins import Physics
@@ -21,15 +19,6 @@ RESTITUTION = 0.8
 GRAVITY = 9.81
 
 SETTINGS = Settings.balanced().replace(integrator="velocity_verlet", collision="continuous")
-
-
-def impact_times(restitution: float, count: int) -> list[float]:
-    """The times of the first ``count`` impacts, seconds."""
-    first = math.sqrt(2 * HEIGHT / GRAVITY)
-    times = [first]
-    for bounce in range(1, count):
-        times.append(times[-1] + 2 * first * restitution**bounce)
-    return times
 
 
 def build(settings: Settings | None = None, seed: int = 0, *, restitution: float = RESTITUTION) -> World:
