@@ -94,7 +94,7 @@ HELD = Section(
     "body", "collisions", RESTED,
     held=flags(default=False),  # a contact at rest has pushed it
     place=ints("int32", default=-1),  # among the bodies of the solver; -1 between steps
-    turned_on=floats(),  # m, by which these have turned its points, where bodies spin
+    contact_travel=floats(),  # m, by which these have turned its points, where bodies spin
 )  # fmt: skip
 CURVES = Section(
     "body", "curved paths", "the integrator's paths are curved",
@@ -308,7 +308,6 @@ STATE = Schema(
     all_still=flag(),  # in this step nothing moves that could meet another
     asleep=integer(),  # bodies that sleep, or are about to
     due=integer(),  # bodies that do from the next step on
-    disturbed=integer(),  # marked in ``still``
     sleep_stages=integer(),  # those of sleeping that have run in this step, as bits
     fresh_statics=integer(),  # bodies that cannot move and are new, or have been changed
     quarantining=flag(),  # some body is, or was told of and may be sound again

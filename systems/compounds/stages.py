@@ -150,7 +150,4 @@ def carry_parts(state, dt):
         if takes_part(state, k):
             place_part(state, k)
             write_axes(state, state.parts.row[k])
-            if state.spinning:
-                i, body = state.parts.row[k], state.parts.body_row[k]
-                state.bodies.spin[i], state.bodies.turn[i] = state.bodies.spin[body], state.bodies.turn[body]
     return OK

@@ -139,7 +139,7 @@ def put_back(state, dt):
         i = solver.body_row[q]
         bodies.place[i] = -1
         if state.spinning:
-            bodies.turned_on[i] = size_of_turn(solver.turn[q]) * solver.reach[q]
+            bodies.contact_travel[i] = size_of_turn(solver.turn[q]) * solver.reach[q]
         if bodies.held[i] and solver.inverse_mass[q] > 0.0:
             bodies.position[i] = add(bodies.previous_position[i], solver.shift[q])
             bodies.linear_velocity[i] = solver.velocity[q]

@@ -262,10 +262,10 @@ def linearise(state, dt):
 
 
 @inlined
-def turned_on(state, i):
+def contact_travel(state, i):
     """How far contacts at rest have turned points of body i."""
     owner = owner_of(state, i)
-    return state.bodies.turned_on[owner] if state.spinning and state.bodies.inverse_mass[owner] > 0.0 else 0.0
+    return state.bodies.contact_travel[owner] if state.spinning and state.bodies.inverse_mass[owner] > 0.0 else 0.0
 
 
 def find_touching(state, dt):
@@ -289,7 +289,7 @@ def find_touching(state, dt):
         d, extent = centre_offset(bodies, a, b), smaller_extent(bodies, a, b)
         slop = slop_for(state, extent)
         known = pushed and pairs.rests[c] and stays(sub(d, pairs.at[c]), slop)
-        known = known and turned_on(state, a) + turned_on(state, b) < STAYS_SLOPS * slop
+        known = known and contact_travel(state, a) + contact_travel(state, b) < STAYS_SLOPS * slop
         if not (known or is_at_manifold(pairs, c, d, extent)):
             if solid and not pushed and not crossed and deepest_possible(pairs, c, d) < -SAME_PLACE * extent:
                 continue

@@ -249,9 +249,8 @@ class Sleepers:
     def wake_disturbed(self) -> np.ndarray:
         """Those that are marked, and their islands; returns the rows of the dynamic ones."""
         self._keep()
-        state, bodies = self._state, self._state.bodies
+        bodies = self._state.bodies
         rows = np.flatnonzero(self._still() == DISTURBED)
-        state.disturbed = 0
         standing = self.links[np.isin(self.links[:, 0], bodies.entity[rows]), 1]
         bodies.still[rows], bodies.rest_steps[rows] = AWAKE, 0
         return self._wake(np.concatenate((bodies.island[rows], standing)), rows)

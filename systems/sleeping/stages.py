@@ -85,14 +85,13 @@ def is_lively(state):
 
 def rest_sleepers(state, dt):
     """Where some are disturbed all have flown: what sleeps on is back where it rests, without speed."""
-    bodies, still, zero, disturbed, fresh = state.bodies, state.bodies.still, zero_of(state), 0, 0
+    bodies, still, zero, disturbed, fresh = state.bodies, state.bodies.still, zero_of(state), False, 0
     state.sleep_stages |= RESTED
     if state.asleep == 0:
         return OK
     for i in range(state.count if state.first == 0 else 0):
-        disturbed += still[i] == DISTURBED
-    state.disturbed = disturbed
-    if disturbed > 0:
+        disturbed |= still[i] == DISTURBED
+    if disturbed:
         return WAKE
     for i in range(state.dynamic if state.first == 0 else 0):
         if still[i] == AWAKE:
@@ -170,7 +169,7 @@ def wakes(state, dt, c, reach):
 
 def find_touched(state, dt):
     """Wake what an awake body touches, or may touch after impacts in this step."""
-    pairs, still, disturbed = state.pairs, state.bodies.still, 0
+    pairs, still, disturbed = state.pairs, state.bodies.still, False
     state.sleep_stages |= TOUCHED
     if state.asleep == 0 or pairs.count == 0:
         return OK
@@ -181,10 +180,8 @@ def find_touched(state, dt):
         if not (pairs.is_solid[c] and i < state.dynamic and still[i] == STILL and still[other] <= AWAKE):
             continue
         if pairs.near_contact[c] or wakes(state, dt, c, reach if other < state.moving else 0.0):
-            still[i] = DISTURBED
-            disturbed += 1
-    state.disturbed = disturbed
-    return WAKE_TOUCHED if disturbed > 0 else OK
+            still[i], disturbed = DISTURBED, True
+    return WAKE_TOUCHED if disturbed else OK
 
 
 # -- what falls asleep -------------------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ def lighten(solver, t, dt, span):
     solver.mass_of[t] = solver.force_of[t] = 0.0
     for q in range(span[2], span[3]):
         by = solver.inverse_mass[q] / least
-        solver.yields[q] = min(1.0, by)
+        solver.mass_ratio[q] = min(1.0, by)
         if by < 1.0:
             if solver.overloaded == 0:
                 solver.overloaded_row = solver.body_row[q]
@@ -50,7 +50,7 @@ def find_support(solver, span):
         return total, 0.0, 0.0
     way = scale(total, 1.0 / size)
     for q in range(span[2], span[3]):
-        if solver.yields[q] < 1.0:
+        if solver.mass_ratio[q] < 1.0:
             given += max(0.0, dot(way, sub(solver.velocity[q], solver.velocity_before[q]))) * solver.heft[q]
     for e in range(solver.driven_rows):
         work += work_of_mover(solver, solver.driven_row[e], span[4])
@@ -76,7 +76,7 @@ def weigh_down(solver, h, span):
     """
     way, speed, held = find_support(solver, span)
     for q in range(span[2], span[3]):
-        rest = 1.0 - solver.yields[q]
+        rest = 1.0 - solver.mass_ratio[q]
         if rest > 0.0:
             change = sub(solver.velocity[q], solver.velocity_before[q])
             along = max(0.0, dot(change, way))
