@@ -53,15 +53,21 @@ def touch_of_long_way(state, dt, a, b, end):
     that its end may say nothing; the gap is that at the start of the step.
 
     In a discrete world only as far as forces lead: what is faster than that passes through what is thin. What turns has
-    another shape on its way; its impacts are searched with that.
+    another shape on its way; its impacts are searched with that. Where it may bounce a touch is one only if they get
+    deeper than that may be wrong, and none after an impact, on a way that was no straight one.
     """
     bodies, edge, nothing = state.bodies, FAST * smaller_extent(state.bodies, a, b), zero_of(state)
     d, margin = segment_start(state, a, b), contact_margin(state, dt, a, b)
-    travel = sub(end, d)
+    travel, turns = sub(end, d), turning_travel(state, dt, a, b)
     way = length(travel)
-    if not (way > edge and (is_swept(state, a, b, way) or way <= margin)) or turning_travel(state, dt, a, b) > edge:
+    if not (way > edge and (is_swept(state, a, b, way) or way <= margin)) or turns > edge:
         return False, 0.0, nothing
-    found, gap, normal = first_touch_on_segment(state, a, b, d, travel, min(edge, margin))
+    least = min(edge, margin)
+    if is_turning(state, dt, a, b) and state.impacts.sweeps and restitution_of(state, a, b) > 0.0:
+        if bodies.impact_count[a] > 0 or bodies.impact_count[b] > 0:
+            return False, 0.0, nothing
+        least += turns
+    found, gap, normal = first_touch_on_segment(state, a, b, d, travel, least)
     return found, gap + dot(sub(centre_offset_at_start(bodies, a, b), d), normal), normal
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
-from carom.plugins import Physics, capsule, convex_hull
+from carom.plugins import Physics, capsule, convex_hull, convex_polygon
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 from carom.systems.impacts.turning import impulses_of
 
@@ -259,6 +259,48 @@ def test_a_thousand_pairs_keep_momentum_angular_momentum_and_smooth_ones_energy(
     else:
         assert np.all(last[0] <= first[0] * (1 + 1e-12))
         assert last[0].sum() < 0.98 * first[0].sum()
+
+
+@pytest.mark.parametrize("mode", MODES[1:])
+def test_what_flies_past_a_corner_that_turns_has_not_touched_it(mode):
+    """A thousand boxes that turn, and fast balls that graze or miss them: each pair keeps its energy."""
+    random, n = np.random.default_rng(7), 1000
+    with empty(collision=mode) as world:
+        away = np.stack(np.meshgrid(np.arange(40), np.arange(25)), -1).reshape(-1, 2) * 8.0
+        world.create_entities(
+            n, Transform.many(away, random.uniform(0, 6, n)), RigidBody.many(2.0),
+            Spin.many(random.uniform(-14, 14, n)), BoxCollider.many((0.4, 0.3), restitution=1.0))
+        speed, aside = random.uniform(20, 40, n), random.uniform(0.55, 0.8, n)
+        beside = np.stack((random.uniform(-1.2, -0.8, n), aside), 1)
+        world.create_entities(
+            n, Transform.many(away + beside), RigidBody.many(1.0, np.stack((speed, 0 * speed), 1)),
+            SphereCollider.many(0.3, restitution=1.0))
+        world.refresh_queries()
+
+        def energies():
+            bodies, inertia = world.bodies, 2.0 * (0.8**2 + 0.6**2) / 12
+            energy = bodies.mass * (bodies.linear_velocity**2).sum(1) + inertia * bodies.spin.angular_velocity**2
+            return energy[:n] + energy[n:]
+
+        before = energies()
+        run(world, 6)
+        np.testing.assert_allclose(energies(), before, rtol=1e-12)
+        assert world.stats().counters["impacts"] > n / 2
+
+
+@pytest.mark.parametrize("mode", MODES[1:])
+def test_where_two_have_bounced_they_do_not_touch_again_as_they_have_turned_since(mode):
+    shape = convex_polygon.ConvexPolygonCollider(((-0.4, -0.2), (0.4, -0.3), (0.2, 0.3)), restitution=1.0)
+    with World(Physics(2, gravity=0), Rotation(), convex_polygon.plugin, settings=Settings(collision=mode)) as world:
+        for place, angle, mass, velocity, spin in (
+            ((-1.07270967, 0.55748379), 49.90143473864663, 1.0, (0.54818994, -4.16731752), 43.857732720865975),
+            ((-0.34060533, 0.19047684), 5.700842573914769, 2.0, (2.5351161, 8.91141697), 14.667940476500256),
+        ):  # fmt: skip
+            world.create_entity(Transform(place, angle), RigidBody(mass, velocity), Spin(spin), shape.copy())
+        before = world.kinetic_energy()
+        world.step()
+        assert world.stats().counters["impacts"] == 1
+        assert world.kinetic_energy() == pytest.approx(before, rel=1e-12)
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.5])
