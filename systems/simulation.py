@@ -320,14 +320,14 @@ class Simulation:
         self.table.in_step = False
 
     def end_step(self) -> None:
+        for finish in self.extensions.finishers:  # while there is a way back
+            finish(self._world)
         self.table.in_step = False
         self.copies.kept = False
         if self.sleepers.on:
             self.sleepers.end_step()
         if self._words[self._found_current]:  # no RESPONSE has replaced them: they are read at any time
             self.contacts.columns_now()
-        for finish in self.extensions.finishers:
-            finish(self._world)
 
     def report_faults(self, prefix: str) -> None:
         """Name the bodies whose state is not finite in the world's faults; they are taken out of the next step."""

@@ -161,7 +161,11 @@ class Pipeline(esper.Processor):
         if self._parts_order != order.version or self._parts_physics != physics.parts_version:
             self._make_parts()
         self._run_parts(self.parts, dt)
-        physics.end_step()
+        try:
+            physics.end_step()
+        except BaseException as error:
+            self.fail("closing the step", error)
+            raise
         self.in_step = False
         esper_bridge.running.discard(self.world.name)
         self.clock.step_count += 1

@@ -361,11 +361,11 @@ class Joints(Plugin):
         self._end(broken, "joint_broken")
 
     def _end(self, joints: list[tuple[int, Joint]], event: str) -> None:
-        """Delete these joints, and tell."""
+        """Tell of these joints, and delete them: last, for if a handler raises the step is taken again."""
         if joints and self.world is not None:
-            self._contents.delete([entity for entity, _ in joints])
             for entity, joint in joints:
                 self.world.events.dispatch(event, entity, joint)
+            self._contents.delete([entity for entity, _ in joints])
 
 
 def _by_row(columns: dict[str, Any]) -> dict[tuple[int, ...], tuple[Any, ...]]:

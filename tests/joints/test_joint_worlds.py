@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from helpers_joints import G, at, chain, disc, gaps, joint_world, plank, run, run_failing
 
-from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World
+from carom import Physics, RigidBody, Settings, SphereCollider, StepError, Transform, World
 from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Motor, Slider, Weld
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
@@ -61,6 +61,40 @@ def test_joint_breaks_at_its_force():
     assert broken == [(pytest.approx(0.9 * G), broken[0][1])]
     assert broken[0][1] < 3
     assert len(joints) == 1
+
+
+@pytest.mark.parametrize("event", ["joint_broken", "joint_lost"])
+def test_step_whose_handler_raises_is_taken_again_with_the_same_events(event):
+    """As if nothing had happened; the world is no longer in the step."""
+    ends = []
+    for due in (0, 1, 2):
+        world, joints = joint_world()
+        bodies, hinges = chain(world, 8, (1, 0), (0.45, 0.1))
+        if event == "joint_broken":  # both in the same step
+            for k in (2, 5):
+                world.component_for_entity(hinges[k], Hinge).breaking_force = 1e-3
+        told, calls = [], 0
+
+        def handle(entity, joint, due=due, told=told):
+            nonlocal calls
+            calls += 1
+            if calls == due:
+                raise RuntimeError("once")
+            told.append(entity)
+
+        world.on(event, handle)
+        if event == "joint_lost":
+            run(world, 3)
+            world.delete_entity(bodies[3])
+        if due:
+            before = world.state_hash()
+            with pytest.raises(StepError, match=f"a handler of {event}: RuntimeError: once"):
+                world.step()
+            assert event == "joint_lost" or world.state_hash() == before
+        run(world, 30)
+        ends.append((world.state_hash(), len(joints), len(world.get_entities()), sorted(set(told))))
+        assert len(told) == 2 + (due == 2)
+    assert ends[0] == ends[1] == ends[2]
 
 
 def test_joined_bodies_touch_only_if_they_may():
