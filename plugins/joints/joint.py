@@ -76,7 +76,7 @@ class Joint(Component, abstract=True):
     __slots__ = ()
     plugin: ClassVar[str] = "joints"
     dimensions: ClassVar[tuple[int, ...]] = (2, 3)  # of its worlds
-    fixed: ClassVar[tuple[str, ...]] = ("a", "b", "anchor")  # where these are set the joint begins anew
+    fixed: ClassVar[tuple[str, ...]] = ("anchor",)  # where these, a or b are set the joint begins anew
 
     a: int | None
     b: int | None
@@ -128,7 +128,7 @@ class Joint(Component, abstract=True):
                 raise
             raise ValueError(str(error).replace(type(self).__name__, self._name(), 1)) from None
         now = self._values or {}
-        if any(name in self.fixed for name in values):
+        if any(name in ("a", "b", *self.fixed) for name in values):
             self.keep(attached=False)
         elif all(np.isscalar(value) and np.all(before.get(name) == now[name]) for name, value in values.items()):
             return  # a game may set its motors in each step

@@ -40,7 +40,7 @@ class Distance(Joint):
     """
 
     __slots__ = ()
-    fixed: ClassVar[tuple[str, ...]] = ("a", "b")
+    fixed: ClassVar[tuple[str, ...]] = ()
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(default=WORLD, dtype=int, minimum=0)
@@ -105,7 +105,7 @@ class Hinge(Driven):
     """
 
     __slots__ = ()
-    fixed: ClassVar[tuple[str, ...]] = ("a", "b", "anchor", "axis")
+    fixed: ClassVar[tuple[str, ...]] = ("anchor", "axis")
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
@@ -171,7 +171,7 @@ class Slider(Driven):
     """
 
     __slots__ = ()
-    fixed: ClassVar[tuple[str, ...]] = ("a", "b", "direction")
+    fixed: ClassVar[tuple[str, ...]] = ("direction",)
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
@@ -218,7 +218,7 @@ class Wheel(Driven):
     """
 
     __slots__ = ()
-    fixed: ClassVar[tuple[str, ...]] = ("a", "b", "anchor", "direction", "axis")
+    fixed: ClassVar[tuple[str, ...]] = ("anchor", "direction", "axis")
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
@@ -267,7 +267,7 @@ class Motor(Joint):
     """
 
     __slots__ = ()
-    fixed: ClassVar[tuple[str, ...]] = ("a", "b", "axis")
+    fixed: ClassVar[tuple[str, ...]] = ("axis",)
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(default=WORLD, dtype=int, minimum=0)
@@ -305,7 +305,7 @@ class Cone(Joint):
 
     __slots__ = ()
     dimensions: ClassVar[tuple[int, ...]] = (3,)
-    fixed: ClassVar[tuple[str, ...]] = ("a", "b", "anchor", "axis")
+    fixed: ClassVar[tuple[str, ...]] = ("anchor", "axis")
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
@@ -349,7 +349,7 @@ class MousePull(Joint):
     """
 
     __slots__ = ()
-    fixed: ClassVar[tuple[str, ...]] = ("b", "grip")
+    fixed: ClassVar[tuple[str, ...]] = ("grip",)
 
     b: int | None = special_column(dtype=int, minimum=0)
     grip: Vector = special_column(item="vector", largest=MOST)
@@ -358,6 +358,10 @@ class MousePull(Joint):
     frequency: float = special_column(default=5.0, largest=MOST, positive=True, kw_only=True)
     damping_ratio: float = special_column(default=1.0, minimum=0.0, largest=MOST, kw_only=True)
     a: int | None = special_column(default=WORLD, init=False, dtype=int)
+
+    def check(self) -> None:
+        if self.a != WORLD:
+            raise ValueError(f"MousePull.a must be None, as it pulls to a place of the world, got {self.a}")
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, self.grip)

@@ -192,6 +192,22 @@ def test_the_two_ends_of_a_length_are_set_together():
         assert spring.length == 3.0
 
 
+@pytest.mark.plain
+def test_a_pull_by_the_mouse_has_no_other_body():
+    world, joints = joint_world(gravity=0)
+    one, other = disc(world, (2, 2)), disc(world, (4, 2))
+    pull = MousePull(one, grip=(2, 2), target=(2, 2))
+    entity = world.create_entity(pull)
+    world.step()
+    with pytest.raises(ValueError, match=rf"entity {entity}: MousePull\.a must be None, .* got {other}"):
+        pull.a = other
+    assert joints.of(other) == []
+    pull.b = other
+    run(world, 120)
+    assert at(world, one).x == 2.0
+    assert joints.of(other) == [entity]
+
+
 def test_one_number_is_for_all_of_a_vector():
     world, _ = joint_world(gravity=0)
     body = disc(world, (2, 2))
