@@ -190,7 +190,7 @@ class Joint(Component, abstract=True):
         """Two limits, none where they are None; ValueError if the first is the larger, or one is no number."""
         try:
             least, most = -math.inf if low is None else float(low), math.inf if high is None else float(high)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ValueError(f"{self._name()}.{name} must be numbers, got {low!r} and {high!r}") from None
         if least > most:
             raise ValueError(f"{self._name()}.{name} must be (least, most), got ({low}, {high})")

@@ -63,7 +63,7 @@ def _checked(points: Any, loop: bool) -> np.ndarray:
     """As an array; ValueError if they are no polyline."""
     try:
         array = np.asarray(points, float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array = np.empty(0)
     least = 3 if loop else 2
     if array.ndim != 2 or array.shape[1:] != (2,) or len(array) < least:

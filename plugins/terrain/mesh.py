@@ -72,7 +72,7 @@ def create_height_field(
     size = FIELD_CELL.checked(cell)
     try:
         levels = np.asarray(heights, float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         levels = np.empty(0)
     if levels.ndim != 2 or min(levels.shape) < 2:
         got = f"an array of shape {levels.shape}" if isinstance(heights, np.ndarray) else repr(heights)
@@ -99,7 +99,7 @@ def create_height_field(
 def _points(vertices: Any) -> np.ndarray:
     try:
         array = np.asarray(vertices, float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array = np.empty(0)
     if array.ndim != 2 or array.shape[1:] != (3,) or len(array) < 3:
         got = f"an array of shape {array.shape}" if isinstance(vertices, np.ndarray) else repr(vertices)

@@ -165,7 +165,7 @@ def test_fields_that_do_not_fit_leave_the_joint_as_it_is():
     run(world, 300)
     assert at(world, leaf).rotation == pytest.approx(-1.0, abs=2e-3)
     rope = Distance(1, 2, length=2.0)
-    for wrong in ({}, "x", (1.0, {})):
+    for wrong in ({}, "x", (1.0, {}), 10**400):
         with pytest.raises(ValueError, match=r"Distance\.length must be numbers, got"):
             rope.length = wrong
     assert rope.length == 2.0
@@ -190,6 +190,9 @@ def test_the_two_ends_of_a_length_are_set_together():
         with pytest.raises(ValueError, match=rf"entity {entity}: Distance.*{why}"):
             spring.length = wrong
         assert spring.length == 3.0
+    world.restore(world.snapshot())
+    with pytest.raises(ValueError, match=rf"entity {entity}: Distance\.damping_ratio must be at least"):
+        spring.damping_ratio = -1.0
 
 
 @pytest.mark.plain

@@ -90,7 +90,9 @@ class LooseValues:
         """Write them into the handles of that population, which the world has."""
         for (entity, component), values in zip(population.loose, self.handles, strict=True):
             handle = entities[entity][component]
+            known = handle._entity  # to a joint, for its messages
             handle._hold(values)
+            handle._entity = known
 
 
 def _values_of(handle: Component) -> dict[str, Any]:
