@@ -142,9 +142,14 @@ def is_resting(state, dt, c):
         depth, normal, far = depth_by_plane(pairs, c, d), pairs.normal[c], False
     else:
         depth, normal, far = deepest(state, dt, c, d)
-        if state.spinning and depth == -math.inf and not turns:  # a thin bar that lies on terrain is soon behind it
-            _, depth, normal, _ = evaluate_pair(state, a, b, centre_offset_at_start(bodies, a, b))
-            far = depth > -math.inf
+        if state.spinning and not turns and depth < -margin:
+            # A thin bar that lies on terrain is soon behind it, and what slides fast soon beyond what bears it.
+            start = centre_offset_at_start(bodies, a, b)
+            slides = carried and not hit and length(sub(d, start)) > FAST * smaller_extent(bodies, a, b)
+            if slides or depth == -math.inf:
+                _, before, across, _ = evaluate_pair(state, a, b, start)
+                if before >= -margin:
+                    depth, normal, far = before, across, True
     was_near = pairs.near_contact[c] and has_manifold(pairs, c)  # not so pairs that were found within the step
     if depth < -margin and (hit or turns or not was_near):  # the prediction may push too much
         return False

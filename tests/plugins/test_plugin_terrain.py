@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -73,6 +74,26 @@ def test_what_slides_over_a_hundred_joints_keeps_height_speed_and_angle(mode, ti
         if shape != "ball":
             assert angle(world, entity) == pytest.approx(angles[shape], abs=near)
     world.close()
+
+
+@each_mode
+@pytest.mark.parametrize("tilt", [0.3, 1.0])
+def test_what_goes_beyond_its_own_length_in_a_step_is_borne_by_what_it_leaves(mode, tilt):
+    """At 50 m/s, 0.83 m in a step, over segments of 0.1 m, once it lies on the first one."""
+    along, up = np.array((math.cos(tilt), math.sin(tilt))), np.array((-math.sin(tilt), math.cos(tilt)))
+    shapes = BoxCollider((0.5, 0.3)), ConvexPolygonCollider(((-0.5, -0.3), (0.5, -0.3), (0.6, 0.0), (0.0, 0.4)))
+    for shape, uneven in itertools.product(shapes, (0.0, 0.9)):
+        world = make_world(tuple(-G * up), collision=mode, on_fault="ignore")
+        ways = 0.1 * (1.0 + uneven * np.random.default_rng(1).uniform(-1, 1, 2200))
+        create_chain(world, np.concatenate(((0.0,), 20.0 + np.cumsum(ways)))[:, None] * along)
+        body = RigidBody(linear_velocity=50.0 * along)
+        entity = world.create_entity(Transform(5.0 * along + 0.3 * up, tilt), body, Spin(), shape.copy())
+        for _ in range(230):
+            world.step()
+            assert position(world, entity) @ up == pytest.approx(0.3, abs=5e-3)
+            assert velocity(world, entity) @ along == pytest.approx(50.0, rel=4e-3)
+            assert angle(world, entity) == pytest.approx(tilt, abs=0.02)
+        world.close()
 
 
 @each_mode
