@@ -10,8 +10,6 @@ from helpers_modes import along, mode_world, positions, rows_of, strikes, veloci
 from helpers_pairwise import pairwise
 from worlds import ball, both_dimensions, box, floor, position, velocity
 
-from carom.components import RigidBody, SphereCollider, Transform
-
 DT, G = 1 / 60, 9.81
 # Methods whose path is the parabola: Verlet; event-driven flight with any integrator.
 exact = pytest.mark.parametrize(
@@ -126,20 +124,3 @@ def test_the_top_of_a_parabola_touches_a_ceiling(mode, dt, target, d):
         slow = math.sqrt(2 * g * max(over, 0.0))
         expected = [(v0 - slow) / g] if over > 0 else []
         assert hits.time.tolist() == pytest.approx(expected, abs=1e-15 / slow if expected else None), over
-
-
-@pytest.mark.parametrize("dt", [2.0, 1 / 60])
-@pytest.mark.parametrize(
-    ("mode", "integrator"),
-    [("continuous", "velocity_verlet"), ("continuous", "rk4"), ("event_driven", "semi_implicit_euler")],
-)
-def test_two_bodies_on_different_parabolas(mode, integrator, dt):
-    """One falls with g and a constant force, the other with a quarter of g: their distance is a parabola too."""
-    world = mode_world(mode, gravity=G, dt=dt, integrator=integrator, restitution_threshold=0.0)
-    upper = RigidBody(1.0, constant_force=(0.0, -3.0))
-    world.create_entity(Transform((0.0, 5.0)), upper, SphereCollider(0.2, restitution=1.0))
-    lower = RigidBody(2.0, (0.0, 1.0), gravity_scale=0.25)
-    world.create_entity(Transform((0.0, 0.0)), lower, SphereCollider(0.3, restitution=1.0))
-    hits = strikes(world, round(2 / dt))
-    closing = 0.75 * G + 3.0
-    assert hits.time.tolist() == pytest.approx([(math.sqrt(1 + 2 * closing * 4.5) - 1) / closing], abs=1e-12)

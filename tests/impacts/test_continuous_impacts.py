@@ -18,7 +18,6 @@ DT, G = 1 / 60, 9.81
 RATIOS = [10.0**k for k in (0, 3, -3, 6, -6, 9, -9, 12, -12)]
 makers = pytest.mark.parametrize("maker", [ball, box])
 every_mode = pytest.mark.parametrize("mode", ["discrete", *MODES])
-# Methods whose path is the parabola: Verlet; event-driven flight with any integrator.
 
 
 @both_dimensions
@@ -89,32 +88,6 @@ def test_b10_oblique_impact(mode, d, dt, radius):
             np.testing.assert_allclose(positions(world, entities), lanes + origin + np.array(new) * after, atol=5e-12)
 
 
-@both_dimensions
-@each_mode
-@makers
-def test_a_piston_drives_a_ball(mode, d, maker):
-    """Between a wall and a piston at 5 m/s each impact turns v into 2 V - v: 100, 110, 120...; several in a step."""
-    world = mode_world(mode, d, max_impacts_per_step=50)
-    size = {"radius": 0.1} if maker is ball else {"half": 0.1}
-    mover = maker(world, 1.0, 100.0, restitution=1.0, **size)
-    box(world, -1.0, half=along(d, 1.0, 9.0, 9.0), kind="static")
-    box(world, 3.1, -5.0, half=along(d, 1.0, 9.0, 9.0), kind="kinematic")
-    x, v, t, times, end = 1.0, 100.0, 0.0, [], 16 * DT
-    while True:
-        wait = (2.0 - 5 * t - x) / (v + 5) if v > 0 else (x - 0.1) / -v
-        if t + wait > end:
-            break
-        x, t = x + v * wait, t + wait
-        v = -10 - v if v > 0 else -v
-        times.append(t)
-    hits = strikes(world, 16)
-    assert len(hits) == len(times) > 20
-    np.testing.assert_allclose(hits.time, times, rtol=1e-12)
-    assert velocity(world, mover)[0] == pytest.approx(v, rel=1e-13)
-    assert position(world, mover)[0] == pytest.approx(x + v * (end - t), abs=1e-10)
-    assert world.stats().counters["capped_impacts"] == 0
-
-
 @pytest.mark.parametrize("start", [(-50.0, 0.0), (-1.0, 0.0)], ids=["apart", "inside"])
 @each_mode
 def test_a_wall_that_the_game_has_moved_is_met_where_it_stands(mode, start):
@@ -146,14 +119,3 @@ def test_threshold(mode, d, share, bounces):
     assert velocity(world, mover)[0] == pytest.approx(-0.8 * speed if bounces else 0.0, abs=1e-12)
     place = -0.15 - 0.8 * speed * left if bounces else -0.15
     assert position(world, mover)[0] == pytest.approx(place, abs=1e-12 if bounces else 0.005 * 0.2)
-
-
-@each_mode
-def test_what_is_slow_but_tiny_does_not_tunnel(mode):
-    """Below the threshold, but 13 times its size per step, and the sheet is thinner still: it stays on top."""
-    world = mode_world(mode, gravity=G, integrator="velocity_verlet")
-    box(world, (0.0, -5e-5), half=(1.0, 5e-5), kind="static")
-    speck = ball(world, (0.0, 1.2e-3), (0.0, -0.05), radius=1e-4, restitution=0.5)
-    run(world, 60)
-    assert position(world, speck)[1] == pytest.approx(1e-4, abs=0.02 * 2e-4)
-    assert velocity(world, speck)[1] == pytest.approx(0.0, abs=1e-9)

@@ -6,15 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from helpers_modes import bullet, each_sweep, positions, strikes, velocities
+from helpers_modes import bullet, each_sweep, strikes
 from worlds import position, velocity
 
 from carom.components import AABBCollider, SphereCollider, Transform
 from carom.framework import Settings, World
-from carom.plugins import Physics, capsule, convex_polygon, half_space, one_way_segment
+from carom.plugins import Physics, capsule, convex_polygon, one_way_segment
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider
-from carom.plugins.half_space import HalfSpaceCollider
 from carom.plugins.one_way_segment import OneWaySegmentCollider
 
 pytestmark = pytest.mark.slow  # each set of shapes compiles for long
@@ -94,32 +93,6 @@ def test_every_pair_meets_where_it_should(mode):
             np.testing.assert_allclose(velocity(world, entity), v, atol=3e-7 * speed)
             np.testing.assert_allclose(position(world, entity), start + v * (DT - toi), atol=3e-7 * speed * DT + loose)
     assert len(hits) == len(expected)
-
-
-@each_sweep
-@pytest.mark.parametrize("e", [0.0, 1.0])
-def test_a_half_space_holds_bullets(mode, e):
-    """An infinite slope: balls and boxes at 1e2 to 1e5 m/s straight at it. They stop there or bounce back."""
-    world = shaped_world(mode, half_space.plugin)
-    n = np.array((-0.6, 0.8))
-    world.create_entity(Transform((0.0, 0.0)), HalfSpaceCollider(n, restitution=e))
-    tangent, expected = np.array((0.8, 0.6)), []
-    support = {"ball": 0.15, "box": 0.6 * 0.2 + 0.8 * 0.1}
-    for k, speed in enumerate((1e2, 1e3, 1e4, 1e5)):
-        for j, (shape, height) in enumerate(support.items()):
-            toi = (0.3 + 0.2 * j) * DT
-            foot = (50.0 * k + 5.0 * j) * tangent + height * n
-            entity = bullet(world, foot + speed * toi * n, -speed * n, collider=SHAPES[shape](0.0))
-            expected.append((entity, foot + e * speed * (DT - toi) * n, e * speed * n, speed))
-    strikes(world, 1)
-    for entity, place, v, speed in expected:
-        np.testing.assert_allclose(velocity(world, entity), v, atol=1e-9 * speed)
-        np.testing.assert_allclose(position(world, entity), place, atol=1e-9 * speed * DT + (0.0 if e else 0.002))
-    strikes(world, 20)
-    places = positions(world, [row[0] for row in expected])
-    assert (places @ n > 0.149).all()
-    if not e:
-        assert np.abs(velocities(world, [row[0] for row in expected])).max() < 1e-6
 
 
 @each_sweep
