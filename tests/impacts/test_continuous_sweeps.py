@@ -14,32 +14,6 @@ DT = 1 / 60
 
 
 @both_dimensions
-@each_sweep
-def test_b13_tangent_point_and_overlap(mode, d):
-    """A tangent touches without impulse (to sqrt(eps)); a point is a ray; overlapping approach hits at t = 0."""
-    world = mode_world(mode, d, dt=3.0)
-    box(world, along(d), half=1.0, kind="static")
-    tangent = bullet(world, along(d, -5.0, 2.0), 2.0, radius=1.0, restitution=1.0)
-    run(world, 1)
-    np.testing.assert_allclose(velocity(world, tangent), along(d, 2.0), atol=2 * 1e-7 * 2)
-    np.testing.assert_allclose(position(world, tangent), along(d, 1.0, 2.0), atol=2 * 1e-7 * 3)
-
-    world = mode_world(mode, d, dt=3.0)
-    box(world, along(d), half=1.0, kind="static")
-    point = bullet(world, -5.0, 2.0, radius=0.0, restitution=1.0)
-    assert strikes(world, 1).time.tolist() == pytest.approx([2.0], abs=1e-12)
-    assert position(world, point)[0] == pytest.approx(-3.0, abs=1e-12)
-
-    for speed in (60.0, -60.0):
-        world = mode_world(mode, d)
-        box(world, along(d), half=1.0, kind="static")
-        inside = bullet(world, -1.75, along(d, speed, 30.0), radius=1.0, restitution=1.0)
-        hits = strikes(world, 1)
-        assert hits.time.tolist() == ([0.0] if speed > 0 else [])
-        np.testing.assert_allclose(velocity(world, inside), along(d, -60.0, 30.0), atol=1e-12)
-
-
-@both_dimensions
 @each_mode
 @pytest.mark.parametrize("radius", [0.0, 0.1])
 def test_b15_a_thousand_passes(mode, d, radius):
@@ -130,14 +104,17 @@ def test_a_bullet_and_its_partners_partners(mode):
     assert velocities(world, chain)[:, 0].tolist() == pytest.approx([0, 0, 0, 0, -6000], abs=1e-9)
 
 
-@each_mode
+@each_sweep
 def test_what_a_step_of_several_searches_has_found_is_told(mode):
-    """A sensor crossed on the way back, a contact disabled, a wall struck: all before pairs are searched again."""
+    """A sensor crossed on the way back, a contact disabled, a wall struck: all before pairs are searched again. What is
+    too slow to be swept still meets a wall where the step ends."""
     for seed in range(3):
         rng, world = np.random.default_rng(seed), mode_world(mode, max_impacts_per_step=1000)
         behind = box(world, (7.5, 20.0), half=(0.05, 5.0), kind="static", sensor=True)
         walls = [box(world, (9.0, y), half=(0.05, 5.0), kind="static") for y in (20.0, 40.0)]
         flyers = [bullet(world, (8.5, y), (6000.0, 0.0), restitution=1.0) for y in (20.0, 40.0)]
+        box(world, (9.0, -30.0), kind="static")
+        slow = ball(world, (6.0, -30.0), 2.2 / DT)
         for place in rng.uniform(-6, 6, (300, 2)):
             bullet(world, place, rng.normal(size=2) * 300, radius=0.02, restitution=1.0)
 
@@ -155,3 +132,4 @@ def test_what_a_step_of_several_searches_has_found_is_told(mode):
         pairs = [(behind, flyers[0]), (walls[0], flyers[0]), (walls[1], flyers[1])]
         assert [pair in begin for pair in pairs] == [True, True, False]
         assert velocities(world, flyers)[:, 0].tolist() == [-6000.0, 6000.0]
+        assert position(world, slow)[0] < 8.1

@@ -239,18 +239,3 @@ def test_a_stopped_body_stays_there_whatever_carried_it():
     assert world.stats().counters["capped_impacts"] > 0
     assert kit.position(world, box)[1] == pytest.approx(height, abs=1e-3)
     kit.assert_touching(world, box, box + 2)
-
-
-@pytest.mark.slow
-def test_neighbours_in_a_discrete_world_do_not_lose_contacts_to_a_crowd_of_bullets():
-    """60 bullets make the step take several rounds; a ball without ccd still meets a wall at its end."""
-    rng = np.random.default_rng(3)
-    world = mode_world("ccd", 3)
-    for _ in range(60):
-        body = RigidBody(1.0, tuple(rng.normal(size=3) * 300), ccd=True)
-        world.create_entity(Transform(tuple(rng.uniform(-3, 3, 3))), body, SphereCollider(0.02))
-    kit.box(world, (9.0, 0.0, 0.0), half=(0.5, 2.0, 2.0), kind="static")
-    ball = kit.ball(world, (6.0, 0.0, 0.0), (2.2 / DT, 0.0, 0.0), radius=0.5)
-    world.step()
-    assert world.stats().counters["rounds"] > 0
-    assert kit.position(world, ball)[0] < 8.1
