@@ -66,7 +66,8 @@ def test_a_ball_falls_on_a_ball_at_rest(d, e_floor):
     """Energy does not grow; overlaps stay below 2 %; all bodies come to rest, unless e = 1 everywhere.
 
     A ball with e = 1 on one on a floor with e = 0: the floor takes all, because the lower ball is pressed into it. If
-    floor and ball have e = 1 the lag's cycle shows: g u dt = 2.9 % of the energy, u the impact speed, and it continues.
+    floor and ball have e = 1 the lag's cycle shows: g u dt = 2.9 % of the energy, u the impact speed, and it continues
+    without drift: the mean energies of the last and first quarter agree to 0.5 %.
     """
     for e in (1.0, 0.8, 0.5):
         world = make_world(d, gravity=G)
@@ -75,28 +76,17 @@ def test_a_ball_falls_on_a_ball_at_rest(d, e_floor):
         upper = ball(world, at(d, 0, 4.0), restitution=e)
         start, for_ever = energy(world), e == e_floor == 1.0
         gain = G * math.sqrt(2 * G * 2.5) * DT / start if for_ever else 0.0
+        seen = []
         for _ in range(1200):
             world.step()
-            assert energy(world) < start * (1 + gain)
+            seen.append(energy(world) / start)
+            assert seen[-1] < 1 + gain
             assert overlaps(world, [lower, upper]).max() < 0.02
-        if not for_ever:
+        if for_ever:
+            assert np.mean(seen[-300:]) == pytest.approx(np.mean(seen[:300]), abs=5e-3)
+        else:
             assert speed(world) < 1e-9
             assert overlaps(world, [lower, upper]).max() < SLOP
-
-
-def test_elastic_bodies_above_each_other_bounce_for_ever():
-    """All e = 1, 20 s: the lag's cycle without drift: the mean energies of the last and first quarter agree to 0.5
-    %."""
-    world = make_world(gravity=G)
-    floor(world, 1.0)
-    ball(world, (0, 0.5), restitution=1.0)
-    ball(world, (0, 4.0), restitution=1.0)
-    start, seen = energy(world), []
-    for _ in range(1200):
-        world.step()
-        seen.append(energy(world) / start - 1)
-    assert np.abs(seen).max() < G * math.sqrt(2 * G * 2.5) * DT / start
-    assert np.mean(seen[-300:]) == pytest.approx(np.mean(seen[:300]), abs=5e-3)
 
 
 @both_dimensions

@@ -12,7 +12,6 @@ from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
 from carom.plugins import Physics, capsule, convex_hull, convex_polygon
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
-from carom.systems.impacts.turning import impulses_of
 
 MODES = ("discrete", "continuous", "event_driven")
 
@@ -90,25 +89,6 @@ def test_a_rod_that_is_struck_off_centre_turns(mode):
 
 @pytest.mark.plain
 @pytest.mark.parametrize("mode", MODES)
-def test_a_tilted_rod_leaves_the_ground_as_its_end_says(mode):
-    """One end lands: w = (1 + e) v c / (c^2 + i), c the way of that end beside the centre, i the inertia of 1 kg."""
-    for angle, e in ((0.5, 1.0), (-0.5, 0.4), (1.2, 0.0 if mode == "event_driven" else 0.7)):
-        with empty(collision=mode) as world:
-            floor(world, restitution=e)
-            half = np.array((0.5, 0.05))
-            c, s = math.cos(angle), math.sin(angle)
-            corners = np.array([(c * x - s * y, s * x + c * y) for x in (-0.5, 0.5) for y in (-0.05, 0.05)])
-            lowest = corners[np.argmin(corners[:, 1])]
-            rod = box(world, (0, -lowest[1] + 0.02), half, (0, -3.0), rotation=angle, restitution=e)
-            run(world, 1)
-            (_, vy), w = motion(world, rod)
-        inertia, x = (0.5**2 + 0.05**2) / 3, lowest[0]
-        j = (1 + e) * 3.0 / (1 + x * x / inertia)
-        assert (vy, w) == pytest.approx((-3.0 + j, j * x / inertia), rel=1e-9)
-
-
-@pytest.mark.plain
-@pytest.mark.parametrize("mode", MODES)
 def test_a_flat_landing_does_not_turn(mode):
     """To the bit: with e v, and w = 0."""
     for e in (0.25, 0.5, 1.0):
@@ -158,24 +138,6 @@ def test_what_lands_flat_in_space_does_not_turn(shape, mode):
                 assert v[1] == pytest.approx(-2.75 if like else 4.0, rel=1e-12)
 
 
-@pytest.mark.plain
-def test_the_law_of_one_point_never_gains():
-    """5,000 random points: e^2 of the work of the compression is given back, friction only takes, within its cone."""
-    random = np.random.default_rng(1)
-    for _ in range(5000):
-        arms, i = random.uniform(-2, 2, (2, 2)), random.uniform(0.1, 10, 2)
-        light = random.uniform(0.1, 10)
-        nn, tt = light + (i * arms[:, 0] ** 2).sum(), light + (i * arms[:, 1] ** 2).sum()
-        nt, e, mu = (i * arms[:, 0] * arms[:, 1]).sum(), random.uniform(0, 1), random.choice((0.0, 0.1, 0.5, 1.5, 1e3))
-        u = np.array((-random.uniform(0.1, 3), random.uniform(-3, 3) * random.integers(0, 2)))
-        k = np.array(((nn, nt), (nt, tt)))
-        p = np.array(impulses_of((nn, nt, tt), (u[0], u[1]), e, mu))
-        work = p @ u + 0.5 * p @ k @ p
-        assert abs(p[1]) <= mu * p[0] * (1 + 1e-9)
-        assert work <= 1e-12 * (u @ u)
-        assert (u + k @ p)[0] >= -1e-9
-
-
 # -- gases: conservation --------------------------------------------------------------------------
 
 
@@ -205,20 +167,6 @@ def totals(world, entities, inertia):
     energy = 0.5 * (m * (v**2).sum(1)).sum() + 0.5 * (inertia * w**2).sum()
     about = (m * (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0])).sum() + (inertia * w).sum()
     return energy, (m[:, None] * v).sum(0), about, x
-
-
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("seed", range(2))
-def test_a_smooth_elastic_gas_of_boxes_and_balls_keeps_energy(seed, mode):
-    """To rounding; a discrete one, in which bodies overlap, within 2 %. Nothing leaves."""
-    with empty(collision=mode, max_impacts_per_step=64) as world:
-        entities, inertia = boxes_and_balls(world, seed, restitution=1.0)
-        first = totals(world, entities, inertia)[0]
-        run(world, 240)
-        energy, _, _, places = totals(world, entities, inertia)
-        assert world.stats().counters["impacts"] > 200
-    assert energy == pytest.approx(first, rel=2e-2 if mode == "discrete" else 1e-12)
-    assert np.abs(places).max() < 5.0
 
 
 @pytest.mark.parametrize(("mu", "e"), [(0.0, 1.0), (0.5, 1.0), (0.5, 0.5)])
@@ -303,34 +251,23 @@ def test_where_two_have_bounced_they_do_not_touch_again_as_they_have_turned_sinc
         assert world.kinetic_energy() == pytest.approx(before, rel=1e-12)
 
 
-@pytest.mark.parametrize("mu", [0.0, 0.5])
-def test_a_cloud_of_boxes_and_balls_keeps_momentum_and_angular_momentum(mu):
-    """Event-driven: impacts are where their bodies are."""
-    with empty(collision="event_driven", max_impacts_per_step=64) as world:
-        entities, inertia = boxes_and_balls(world, 3, walls=False, restitution=1.0, friction=mu)
-        first = totals(world, entities, inertia)
-        run(world, 120)
-        last = totals(world, entities, inertia)
-        assert world.stats().counters["impacts"] > 30
-    assert np.allclose(last[1], first[1], atol=1e-12)
-    assert last[2] == pytest.approx(first[2], rel=1e-12)
-    assert (last[0] == pytest.approx(first[0], rel=1e-12)) == (mu == 0.0)
-
-
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
-def test_energy_never_rises_with_friction(e, mode):
+@pytest.mark.parametrize(("mu", "e"), [(0.0, 1.0), (0.4, 0.0), (0.4, 0.5), (0.4, 1.0)])
+def test_a_gas_of_boxes_and_balls_never_gains_energy_and_keeps_it_if_smooth_and_elastic(mu, e, mode):
+    """To rounding; a smooth one in a discrete world, in which bodies overlap, within 2 %. Nothing leaves."""
     with empty(collision=mode, max_impacts_per_step=64) as world:
-        entities, inertia = boxes_and_balls(world, 4, restitution=e, friction=0.4)
-        last, first = totals(world, entities, inertia)[0], totals(world, entities, inertia)[0]
+        entities, inertia = boxes_and_balls(world, 4, restitution=e, friction=mu)
+        last = first = totals(world, entities, inertia)[0]
         given = 1e-12 if e > 0.0 else 1e-5  # what does not bounce is left to contacts, which push out overlaps
+        given = 2e-2 if mu == 0.0 and mode == "discrete" else given
         for _ in range(180):
             world.step()
-            now = totals(world, entities, inertia)[0]
+            now, _, _, places = totals(world, entities, inertia)
             assert now <= last * (1 + given)
             last = now
         assert world.stats().counters["impacts"] > 50 or (e == 0.0 and mode != "event_driven")
-    assert last < 0.9 * first
+        assert np.abs(places).max() < 5.0
+    assert last == pytest.approx(first, rel=given) if mu == 0.0 else last < 0.9 * first
 
 
 @pytest.mark.parametrize("mode", MODES)
