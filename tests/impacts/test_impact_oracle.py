@@ -125,7 +125,7 @@ def test_many_fast_bodies_in_several_rounds(mode, d):
 @pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
 def test_several_strike_one_at_the_same_time(mode, d):
     """Of any mass and restitution: each pair parts at e times its approach or faster, p >= 0, p (A p - wanted) = 0."""
-    rng = np.random.default_rng(5)
+    rng, left_out = np.random.default_rng(5), 0
     for _ in range(8):
         world = kit.make_world(d, collision=mode, max_impacts_per_step=CAP)
         struck, striking, wanted, ways = kit.ball(world, np.zeros(d), restitution=0.5), [], [], []
@@ -133,8 +133,10 @@ def test_several_strike_one_at_the_same_time(mode, d):
         for k, (axis, sign) in enumerate(itertools.product(range(d), (-1.0, 1.0))):
             way = sign * np.eye(d)[axis] + rng.normal(size=d) * 0.1
             way /= np.linalg.norm(way)
-            striking.append(kit.ball(world, way * 1.0625, -way * 8.0, mass=masses[k], restitution=restitutions[k]))
-            wanted.append(8.0 * (1.0 + restitutions[k]))
+            speed = 8.0 if mode == "discrete" else rng.choice([0.25, 8.0])  # a discrete world lets none be shot out
+            place, mass, e = way * (1.0 + speed / 128), masses[k], restitutions[k]
+            striking.append(kit.ball(world, place, -way * speed, mass=mass, restitution=e))
+            wanted.append(speed * (1.0 + e))
             ways.append(np.concatenate([-way, *(way * (m == k) / np.sqrt(masses[m]) for m in range(2 * d))]))
         ways = np.array(ways).T  # by the square roots of the masses, so that A = ways^T ways
         impulses = nnls(ways, np.linalg.lstsq(ways.T, wanted, rcond=None)[0])[0]
@@ -143,8 +145,9 @@ def test_several_strike_one_at_the_same_time(mode, d):
         first = dict(zip(rows.entity_b.tolist(), rows.normal_impulse, strict=True), default=0.0)
         assert rows.entity_a[0] == struck
         np.testing.assert_allclose([first.get(entity, 0.0) for entity in striking], impulses, atol=1e-9)
-        assert (impulses > 0).sum() > 2
+        left_out += (impulses == 0).sum()
         world.close()
+    assert left_out > 0 or mode == "discrete"
 
 
 @pytest.mark.parametrize(("d", "cap", "pillar"), pairwise((2, 3), (1, 2), (False, True)))
