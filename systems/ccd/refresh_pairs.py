@@ -22,7 +22,7 @@ SURVIVED, GONE = -1, -2  # in ``pairs.place``; from 0 on it is the place in the 
 
 @part
 def mark_kept(state):
-    """place[c] = KEPT for the pairs that something has come of in this step, GONE for the others."""
+    """place[c] = SURVIVED for the pairs that something has come of in this step, GONE for the others."""
     pairs = state.pairs
     for c in range(pairs.count):
         pairs.place[c] = SURVIVED if pairs.crossed[c] or pairs.impulse[c] > 0.0 else GONE
