@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..vectors import _emitted
-from .lazy import arrayobj, cgutils, ir, types
+from .lazy import arrayobj, ir, types
 
 
 def _sign_stack_array(count: Any, like: Any) -> Any:
@@ -27,7 +27,8 @@ def _emit_stack_array(context: Any, builder: Any, arguments: Any, values: Any) -
     shape = [arguments[0].literal_value] + ([arguments[1].count] if kind.ndim == 2 else [])
     item_type = context.get_data_type(kind.dtype)
     item_size = context.get_abi_sizeof(item_type)
-    memory = cgutils.alloca_once(builder, ir.ArrayType(item_type, int(np.prod(shape))))
+    with builder.goto_entry_block():  # cgutils.alloca_once would clear it in each call
+        memory = builder.alloca(ir.ArrayType(item_type, int(np.prod(shape))))
     strides = [item_size * shape[1], item_size] if kind.ndim == 2 else [item_size]
     made = context.make_array(kind)(context, builder)
     arrayobj.populate_array(
