@@ -77,20 +77,21 @@ class Boxes:
 
         return handle
 
-    def set(self, lower, upper, moving, statics_changed=True, first=0):
-        """Take these corners (n, d), of which those before ``first`` sleep."""
+    def set(self, lower, upper, moving, statics_changed=True, first=0, kinematic=0):
+        """Take these corners (n, d), of which those before ``first`` sleep and the last of what moves are kinematic."""
         state, d = self.state, lower.shape[1]
         state.bodies.lower, state.bodies.upper = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
         state.bodies.position = state.bodies.previous_position = np.zeros_like(lower)
         state.count, state.first, state.moving = len(lower), first, moving
+        state.dynamic = stop = moving - kinematic
         state.statics_version += statics_changed
         state.frame[LOWEST : LOWEST + 3], state.frame[HIGHEST : HIGHEST + 3] = np.inf, -np.inf
         state.frame[LARGEST] = 0.0
         with warnings.catch_warnings(), np.errstate(invalid="ignore"):
             warnings.simplefilter("ignore")  # all of a column may be nan
-            state.frame[LOWEST : LOWEST + d] = np.fmin.reduce(lower[first:moving], axis=0, initial=np.inf)
-            state.frame[HIGHEST : HIGHEST + d] = np.fmax.reduce(upper[first:moving], axis=0, initial=-np.inf)
-            state.frame[LARGEST] = np.fmax.reduce(upper[first:moving] - lower[first:moving], axis=None, initial=0.0)
+            state.frame[LOWEST : LOWEST + d] = np.fmin.reduce(lower[first:stop], axis=0, initial=np.inf)
+            state.frame[HIGHEST : HIGHEST + d] = np.fmax.reduce(upper[first:stop], axis=0, initial=-np.inf)
+            state.frame[LARGEST] = np.fmax.reduce(upper[first:stop] - lower[first:stop], axis=None, initial=0.0)
 
     def find(self):
         """Rows (first, second) of the candidates."""

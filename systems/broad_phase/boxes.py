@@ -13,8 +13,9 @@ from ..integration.turning import size_of_turn
 from ..linking.parts import BOUND_SEARCHES, call_bound_searches
 from ..shapes.dispatch import half_extents, write_rotated
 from ..shapes.tolerances import driven_travel, reach_of
+from .brute_force import BRUTE_FORCE_MAX
 from .records import HIGHEST, LARGEST, LOWEST
-from .uniform_grid import move_in_grid
+from .uniform_grid import OUTSIDE_MAX, move_in_grid
 
 # Of the body's smallest half extent, on each side: bodies deflected within the step still meet their neighbours.
 MARGIN = 0.1
@@ -102,12 +103,20 @@ def add_level(state, i, low, high):
 
 
 @part
+def grid_stop(state):
+    """The row behind those of the grid of what moves. Kinematic bodies are often long: if they are few they are outside
+    of it."""
+    few = state.moving - state.dynamic <= OUTSIDE_MAX // 2 and state.dynamic - state.first > BRUTE_FORCE_MAX
+    return state.dynamic if few else state.moving
+
+
+@part
 def measure_frame(state):
-    """The frame holds the boxes of all moving bodies; those of nan count for nothing."""
+    """The frame holds the boxes of what may be in the grid of what moves; those of nan count for nothing."""
     frame, bodies, lowest, highest, largest = state.frame, state.bodies, zero_of(state), zero_of(state), 0.0
     for k in range(len(lowest)):
         lowest, highest = replace(lowest, k, math.inf), replace(highest, k, -math.inf)
-    for i in range(state.first, state.moving):
+    for i in range(state.first, grid_stop(state)):
         low, high, longest = bodies.lower[i], bodies.upper[i], 0.0
         for k in range(len(low)):  # comparisons with nan are false
             lowest = replace(lowest, k, item(low, k) if item(low, k) < item(lowest, k) else item(lowest, k))
@@ -155,7 +164,7 @@ STANDING, MOVING, SEARCHING, STAYING = range(4)
 @part
 def box_rows(state, start, stop, motion):
     """Boxes of rows start..stop-1: of bodies that stand, around their motion, or from search_lower to search_upper; the
-    frame holds those of what moves.
+    frame holds those of the grid of what moves.
 
     A box holds every level, so that what the first one meets is looked at.
     """

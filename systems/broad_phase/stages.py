@@ -5,7 +5,7 @@ are made before:
 
     moving                       pairs of what moves
     less than UNIFORM_GRID_MIN   brute force
-    more                         uniform grid
+    more                         uniform grid, into which the kinematic ones look if they are few
 
     static                       pairs with what does not move
     no more than move, or        brute force; or the static bodies look into the uniform grid of what moves
@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from ...framework.compilation import packed, part
 from ..codes import FIND_IN_PYTHON, NEED_CANDIDATES, NEED_CELLS, NEED_STATIC_CELLS, OK
-from .boxes import fixed_count, fixed_row
+from .boxes import fixed_count, fixed_row, grid_stop
 from .brute_force import BRUTE_FORCE_MAX, boxes_overlap
 from .records import FRAME_SIZE
 from .static_grid import build_static_grid, follow_rows
@@ -114,8 +114,11 @@ def build_moving_grid(state):
         return NEED_CELLS
     for k in range(FRAME_SIZE):
         grid.frame[k] = state.frame[k]
-    build_grid(grid, bodies.lower, bodies.upper, state.first, moving)
-    grid.version, grid.first, grid.outside_count = state.version, state.first, 0
+    stop = grid_stop(state)
+    build_grid(grid, bodies.lower, bodies.upper, state.first, stop - state.first)
+    grid.version, grid.first, grid.outside_count = state.version, state.first, state.moving - stop
+    for k in range(grid.outside_count):
+        grid.outside[k] = stop + k
     forget_queries(state, grid)
     return OK
 
@@ -149,12 +152,31 @@ def choose_search(state, dt):
 
 
 @part
+def test_row(state, i, start, stop, found):
+    """Pairs of body i and rows start..stop-1; returns the number of pairs, or FULL."""
+    lower, upper, candidates = state.bodies.lower, state.bodies.upper, state.candidates
+    first, second, low, high = candidates.first, candidates.second, lower[i], upper[i]
+    if found + (stop - start) > len(first):
+        return FULL
+    for k in range(start, stop):
+        first[found] = i
+        second[found] = k
+        found += boxes_overlap(low, high, lower[k], upper[k])
+    return found
+
+
+@part
 def look_from_outside(state, found):
-    """Static bodies that are in no grid look into that of what moves; returns the number of pairs, or FULL."""
-    static_grid, all_static = state.static_grid, not looks_into_statics(state)
-    for k in range(fixed_count(state) if all_static else static_grid.outside_count):
-        i = fixed_row(state, k) if all_static else static_grid.outside[k]
+    """Static bodies that are in no grid look into that of what moves, and at what moves but is in none; so does this.
+    Returns the number of pairs, or FULL."""
+    static_grid, all_static, stop = state.static_grid, not looks_into_statics(state), grid_stop(state)
+    count = fixed_count(state) if all_static else static_grid.outside_count
+    for k in range(count + state.moving - stop):
+        moves = k >= count
+        i = stop + k - count if moves else fixed_row(state, k) if all_static else static_grid.outside[k]
         found = look_inside(state, state.grid, i, state.bodies.lower[i], state.bodies.upper[i], found)
+        if found != FULL:
+            found = test_row(state, i, i + 1 if moves else stop, state.moving, found)
         if found == FULL:
             break
     return found
@@ -179,20 +201,6 @@ def search_moving_grid(state):
 def search_uniform_grid(state, dt):
     """Many bodies move."""
     return search_moving_grid(state) if state.pair_search == UNIFORM_GRID else OK
-
-
-@part
-def test_row(state, i, start, stop, found):
-    """Pairs of body i and rows start..stop-1; returns the number of pairs, or FULL."""
-    lower, upper, candidates = state.bodies.lower, state.bodies.upper, state.candidates
-    first, second, low, high = candidates.first, candidates.second, lower[i], upper[i]
-    if found + (stop - start) > len(first):
-        return FULL
-    for k in range(start, stop):
-        first[found] = i
-        second[found] = k
-        found += boxes_overlap(low, high, lower[k], upper[k])
-    return found
 
 
 def test_few(state, dt):

@@ -13,7 +13,7 @@ from worlds import both_dimensions
 
 from carom.components import RigidBody, Transform
 from carom.systems.broad_phase.brute_force import BRUTE_FORCE_MAX
-from carom.systems.broad_phase.stages import CANDIDATE_LIMIT
+from carom.systems.broad_phase.stages import CANDIDATE_LIMIT, UNIFORM_GRID
 from carom.systems.broad_phase.tree.tree import CandidateLimitError
 from carom.systems.broad_phase.uniform_grid import OUTSIDE_MAX
 
@@ -225,6 +225,25 @@ def test_a_level_is_seen_as_it_is(d, movers):
             else:
                 world.bodies.position[world.bodies.row_of(box)] = beside
             world.component_for_entity(sphere, RigidBody).linear_velocity = (0.0,) * d
+
+
+@both_dimensions
+@pytest.mark.parametrize("fixed", [0, 40, 900])
+def test_long_kinematic_boxes_leave_the_others_in_their_grid(d, fixed):
+    """They meet these, each other, what stands and what sleeps."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        kinematic, sleepers, dynamic = int(rng.integers(1, OUTSIDE_MAX // 2)), int(rng.integers(0, 30)), 300
+        n = sleepers + dynamic + kinematic + fixed
+        centre, half = rng.uniform(0.0, 30.0 if d == 2 else 12.0, (n, d)), np.full((n, d), 0.5)
+        long = half[sleepers + dynamic : sleepers + dynamic + kinematic + 8]  # some that stand as well
+        long[:] = 10.0 ** rng.uniform(-1.0, 1.5, long.shape)
+        boxes, moving = Boxes(d), sleepers + dynamic + kinematic
+        boxes.set(centre - half, centre + half, moving, first=sleepers, kinematic=kinematic)
+        found = pair_set(*boxes.find())
+        pairs = overlapping(centre - half, centre + half, moving)
+        assert found == {(i, j) for i, j in pairs if sleepers <= i or sleepers <= j < moving}
+        assert boxes.state.pair_search == UNIFORM_GRID
 
 
 def test_what_is_uneven_is_left_to_trees():
