@@ -96,7 +96,6 @@ SOLVER = Schema(
     mover=ints("int32"),  # bodies that move by themselves
     movers=integer(),
     shared=flags(),  # something presses on it
-    squeezes=flags(),  # some row of it still closes in the end
     way=vectors(),  # sum of the normals of what holds it
     held=floats(),  # N s, by its strongest hard contact
     # islands

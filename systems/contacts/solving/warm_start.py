@@ -11,9 +11,8 @@ from ....framework.data.row_moves import place_of
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add_scaled, dot, length, scale, sub
 from ...codes import NEED_WARM_START, OK
-from ..constants import EXCESS, MOST_LOAD, NEAR_PLACE, OPEN, TURNED
+from ..constants import MOST_LOAD, NEAR_PLACE, OPEN, TURNED
 from .guard import island_of
-from .rows import ARMS, NO_ARMS, excess_speed
 
 
 @part
@@ -110,18 +109,6 @@ def match_warm_start(state, dt):
     return OK
 
 
-@part
-def find_squeezed(solver, dt, arms):
-    """Bodies of which some row still closes: the impulses of their rows do not tell what holds them."""
-    for q in range(solver.bodies):
-        solver.squeezes[q] = False
-    for k in range(solver.contacts):
-        if excess_speed(solver, k, arms) * dt > EXCESS * solver.extent[k]:
-            a, b = solver.first[k], solver.second[k]
-            solver.squeezes[a] |= solver.inverse_mass[a] > 0.0
-            solver.squeezes[b] |= solver.inverse_mass[b] > 0.0
-
-
 def store_warm_start(state, dt):
     """Keep the contacts that pushed, for the next step; the memory until now stays, for a step that is undone."""
     solver, memory, pairs, entity = state.solver, state.warm_start, state.pairs, state.bodies.entity
@@ -131,18 +118,12 @@ def store_warm_start(state, dt):
     if solver.contacts > len(memory.off):
         state.needed = solver.contacts
         return NEED_WARM_START
-    if state.spinning:
-        find_squeezed(solver, dt, ARMS)
-    else:
-        find_squeezed(solver, dt, NO_ARMS)
     new, count = 1 - memory.now, 0
     for r in range(solver.contacts):
         k, c = solver.slot[r], solver.pair[r]
         if not solver.total[k] * dt > OPEN * solver.extent[k] * solver.mass[k]:  # of rounding; also nan
             continue
         a, b = pairs.a[c], pairs.b[c]
-        if solver.squeezes[solver.first[k]] or solver.squeezes[solver.second[k]]:
-            continue
         memory.first[new, count], memory.second[new, count] = a, b
         memory.entity_a[new, count], memory.entity_b[new, count] = entity[a], entity[b]
         last, total = solver.impulse[k], solver.total[k]
