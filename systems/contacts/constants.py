@@ -36,7 +36,7 @@ FURTHER_WORK = 20_000  # rows of the island in all of these,
 LEAST_FURTHER_PASSES = 8  # if they are not these,
 SWEEPS = 4  # between two looks at which rows these are
 EXCESS = 0.01  # extents per step: where the speed of a row is wrong by more, its island is struck, and solved until
-SOLVED = EXCESS * LEAST_FURTHER_PASSES / FURTHER_PASSES  # less than this is wrong; the fewer passes, the more is left
+FINER_PASSES = 32  # less is; an island that may have more passes than these is solved as much better
 
 # Joints that hold: springs that the passes which push solve, and the others as if they were none.
 JOINT_FREQUENCY = 0.25  # times the rate of the substeps: a fixed one gains nothing by more of them

@@ -9,18 +9,18 @@ from __future__ import annotations
 
 import math
 
-from ....framework.compilation import part
+from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, dot, scale, sub
 from ...integration.turning import cross_spin, momentum_of_spin
 from ..constants import (
     DEEP,
+    EXCESS,
     FADING,
-    FURTHER_PASSES,
+    FINER_PASSES,
     GAIN_MOTION,
     GAIN_PUSH,
     GAIN_ROUNDING,
     GAIN_WEIGHT,
-    SOLVED,
     SWEEPS,
 )  # fmt: skip
 from .joints.given import rates_of_given
@@ -184,24 +184,30 @@ def allow(solver, bias_rate, h, dt, span, islands):
             allowed[t] += share * GAIN_PUSH * solver.mass[k] * speed * speed
 
 
+@inlined
+def fineness(solver, t):
+    """How many times better than EXCESS the rows of a struck island are solved, as many passes as it may have."""
+    return max(1.0, solver.passes[t] / FINER_PASSES)
+
+
 @part
 def find_unsolved(solver, turn, any_struck, dt, span, islands):
     """The rows of struck islands that are not solved, and all of islands that gain, come first in ``listed``; returns
     how many. An island has as many passes as its own size allows: what is solved elsewhere changes none of its bits."""
-    unsolved, struck, passes, extent = solver.unsolved, solver.struck, solver.passes, solver.extent
-    any_gain, most, count, used = False, 0, 0, solver.used
+    unsolved, struck, extent, used = solver.unsolved, solver.struck, solver.extent, solver.used
+    any_gain, finest, count = False, 0.0, 0
     for t in range(islands[0], islands[1]):
         solver.listed_of[t] = 0
         unsolved[t] = gains(solver, t) and not solver.jointed[t]  # what joints give passes over contacts do not take
         any_gain |= unsolved[t]
-        most = max(most, passes[t] if struck[t] else 0)
+        finest = max(finest, fineness(solver, t) if struck[t] else 0.0)
     for k in range(span[0], span[1] if any_gain or any_struck else span[0]):
         if turn > 0 and not any_gain and used[solver.first[k]] != turn and used[solver.second[k]] != turn:
             continue  # no pass since the last look has changed what it asks
-        excess, least = excess_speed(solver, k, span[4]) * dt, SOLVED * FURTHER_PASSES * extent[k]
-        if excess * most > least or any_gain:  # seldom
+        excess, least = excess_speed(solver, k, span[4]) * dt, EXCESS * extent[k]
+        if excess * finest > least or any_gain:  # seldom
             t = island_of(solver, k)
-            if ((struck[t] and excess * passes[t] > least) or unsolved[t]) and turn < passes[t]:
+            if ((struck[t] and excess * fineness(solver, t) > least) or unsolved[t]) and turn < solver.passes[t]:
                 solver.listed[count] = k
                 solver.listed_of[t] += 1
                 count += 1
