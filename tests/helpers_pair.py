@@ -13,7 +13,7 @@ from carom.framework.compilation import kernel
 from carom.framework.jit.records.record_type import record_at, zero_of
 from carom.framework.jit.stack_arrays import stack_array
 from carom.framework.vectors import row, store
-from carom.plugins import Physics, capsule, convex_polygon, half_space, tile_grid
+from carom.plugins import Physics, capsule, convex_hull, convex_polygon, half_space, tile_grid
 from carom.plugins.half_space import HalfSpaceCollider
 from carom.plugins.rotation import Rotation
 from carom.plugins.tile_grid import TileGridCollider
@@ -53,7 +53,7 @@ class Pair:
     def __init__(self, one, two, d, turn=None, margin=MARGIN, tilt=TILT):
         self.world = World(
             Physics(d, gravity=0), Rotation(), capsule.plugin, half_space.plugin,
-            *([convex_polygon.plugin, tile_grid.plugin] if d == 2 else []),
+            *([convex_polygon.plugin, tile_grid.plugin] if d == 2 else [convex_hull.plugin]),
         )  # fmt: skip
         self.d, self.within, rows = d, np.array((margin, tilt)), []
         turns = (None, None) if turn is None else turn

@@ -11,6 +11,7 @@ from helpers_pair import MARGIN, TILT, Pair, matrix, rotation
 
 from carom.components import AABBCollider, SphereCollider
 from carom.plugins.capsule import CapsuleCollider
+from carom.plugins.convex_hull import ConvexHullCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider
 from carom.plugins.half_space import HalfSpaceCollider
 from carom.plugins.rotation import BoxCollider
@@ -233,6 +234,23 @@ def test_a_polygon_of_many_edges_lies_on_one_of_them_or_on_a_corner(turn, count)
         depth, _, places, gaps = pair.at((0, 0.999))
         assert np.allclose(gaps, -depth, atol=1e-12)
         assert np.allclose(sorted(places[:, 0]), [0.0] if count == 1 else (-0.5 * edge, 0.5 * edge), atol=1e-6)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.001, 0.01])
+def test_a_hull_lies_on_its_lowest_face_though_the_next_one_is_within_the_tilt(angle):
+    """It touches in the corners of that face, with the gaps of these, while it is nearer to level than the next."""
+    square = np.array(list(itertools.product((-0.5, 0.5), (0.0,), (-0.5, 0.5))))
+    next_one = [(1.0, 0.5 * math.tan(0.03), z) for z in (-0.5, 0.5)]
+    rock = ConvexHullCollider([*square, *next_one, (0.0, 0.8, 0.0)])
+    turn = rotation(0.0, 0.0, -angle)
+    with Pair(HalfSpaceCollider((0, 1, 0)), rock, 3, (None, turn)) as pair:
+        _, _, places, gaps = pair.at((0, 0.001, 0))
+        expected = square @ matrix(turn).T + (0, 0.001, 0)
+        assert len(places) == 4
+        for corner in expected:
+            away = np.abs(places - corner * (1, 0.5, 1)).max(axis=1)
+            assert away.min() < 1e-12
+            assert gaps[away.argmin()] == pytest.approx(corner[1], abs=1e-12)
 
 
 def test_edges_lie_on_faces_and_along_each_other_in_two_points():

@@ -20,7 +20,8 @@ from .gjk import cross
 MOST_POINTS = 4  # of a pair in 3D; 2 in 2D
 SAME = 1e-12  # of the coordinates: corners that are no farther apart are one
 FLAT = 1e-6  # of its size: how far a face may be from flat; what is shared and narrower is a point
-FINER = 1e-3  # of the tilt: looks for the face that lies flat where several are within the tilt, or none is flat
+FINER = 0.25  # of the tilt: where several faces are within it the next look is so much narrower, until one lies flat
+LOOKS = 6  # at most
 DIRECTIONS = 8  # around the normal, in 3D: a face of more corners shows so many of them
 START = math.cos(math.pi / 8), math.sin(math.pi / 8)  # the first: off the axes, where boxes have two corners
 SLANT = math.sqrt(0.5)  # sine and cosine of the way from one to the next
@@ -106,7 +107,7 @@ def edge_towards(shape, normal, tilt):
     """Both ends of the core's edge in the direction of a normal; twice the same point if there is a corner."""
     along = (-normal[1], normal[0])
     one = normal
-    for _ in range(2):
+    for _ in range(LOOKS):
         one = support_by_address(shape, add_scaled(normal, along, -tilt))
         two = support_by_address(shape, add_scaled(normal, along, tilt))
         way = sub(two, one)
@@ -233,7 +234,7 @@ def face_towards(shape, centre, basis, face, corners):
     if shape[0] == 0:
         store(corners, 0, (0.0, 0.0, level))
         return 0, 0.0, 0.0
-    for _ in range(2):
+    for _ in range(LOOKS):
         count = corners_around(shape, basis, side, tilt, corners)
         if count == 1:
             break
