@@ -12,7 +12,7 @@ from worlds import MODES
 
 from carom import Physics, RigidBody, SphereCollider, Transform, World
 from carom.plugins.joints import Distance, Hinge, Joints, Motor, MousePull, Slider, Weld
-from carom.plugins.rotation import BoxCollider, Spin
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 
 def elliptic(k: float) -> float:
@@ -151,6 +151,47 @@ def test_springs_without_damping_give_no_energy(springs, frequency):
     early, late = max(energies[:600]), max(energies[600:])
     assert late < 1.02 * early
     assert springs * frequency > 40.0 or late > 0.98 * early
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("arm", [0.0, 0.5, 1.0])
+def test_door_on_a_spring_swings_about_its_edge_at_the_frequency_of_the_spring(d, arm):
+    joints, pad = Joints(), (0.0,) * (d - 2)
+    world = World(Physics(dimensions=d, gravity=0), Rotation(), joints)
+    leaf = world.create_entity(
+        Transform((arm, 0, *pad)), RigidBody(mass=10.0), Spin(), BoxCollider((0.5, 0.04, 0.3)[:d])
+    )
+    axis = {"axis": (0, 0, 1)} if d == 3 else {}
+    door = world.create_entity(Hinge(None, leaf, anchor=(0, 0, *pad), frequency=1.0, **axis))
+    world.step()
+    world.component_for_entity(leaf, Spin).apply_impulse((0, 1.0, *pad), at=(arm + 0.5, 0, *pad))
+    angles = []
+    for _ in range(600):
+        world.step()
+        angles.append(joints.state(door).value)
+    assert period(angles, 1 / 60) == pytest.approx(1.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("frequency", [1.0, 8.0, 20.0, 29.0])
+@pytest.mark.parametrize("leaves", [1, 4])
+@pytest.mark.parametrize("substeps", [2, 4])
+def test_springs_of_doors_give_no_energy(frequency, leaves, substeps):
+    world, _ = joint_world(0, substeps=substeps)
+    before, bodies = None, []
+    for k in range(leaves):
+        collider = BoxCollider((0.5, 0.05), layer=2, mask=1)
+        leaf = world.create_entity(Transform((k + 0.5, 0)), RigidBody(mass=30.0 ** (k % 2)), Spin(), collider)
+        world.create_entity(Hinge(before, leaf, anchor=(k, 0), frequency=frequency))
+        before = leaf
+        bodies.append(leaf)
+    world.step()
+    for k, leaf in enumerate(bodies):
+        world.component_for_entity(leaf, RigidBody).apply_impulse((0.1, 0.3 * (-1) ** k))
+    energies = []
+    for _ in range(1200):
+        world.step()
+        energies.append(world.kinetic_energy())
+    assert max(energies[600:]) < 1.05 * max(energies[:600])
 
 
 @pytest.mark.parametrize("frequency", [3.0, 29.0, 31.0, 100.0, 1e4])

@@ -74,7 +74,7 @@ JOINTS = Schema(
     # in a substep
     arm_a=vectors(),
     arm_b=vectors(),
-    gap=vectors(),  # m, of a POINT
+    gap=vectors(),  # m, of a POINT; of a spring that turns, what the point of its joint pushes for each N m
     turn_a=vectors(),  # of a GIVEN: about which it turns them
     turn_b=vectors(),
     mass=floats(),  # kg or kg m^2

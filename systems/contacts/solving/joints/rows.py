@@ -152,6 +152,39 @@ def multiplied(diagonal, others, v):
 
 
 @inlined
+def point_of(joints, j):
+    """The first row of the joint of row j: the point about which it turns, if it has one."""
+    hold = j
+    while hold > 0 and joints.joint[hold - 1] == joints.joint[j]:
+        hold -= 1
+    return hold
+
+
+@inlined
+def held_back(solver, j, axis):
+    """How much less a spring turns two bodies that a point holds, for which the point has to push: a door turns about
+    its edge."""
+    joints, hold = solver.joints, point_of(solver.joints, j)
+    if joints.kind[hold] != POINT:
+        return 0.0
+    moved = cross_spin(change_of_spin(solver, joints.first[j], axis), joints.arm_a[hold])
+    moved = add(moved, cross_spin(change_of_spin(solver, joints.second[j], axis), joints.arm_b[hold]))
+    joints.gap[j] = scale(multiplied(joints.inverse[hold], joints.inverse_products[hold], moved), -1.0)
+    return -dot(moved, joints.gap[j])
+
+
+@inlined
+def hold_point(solver, j, impulse):
+    """The point of a joint pushes with the spring of row j: after it, bodies would first move as if they were free."""
+    joints, hold = solver.joints, point_of(solver.joints, j)
+    if joints.kind[hold] == POINT:
+        push = scale(joints.gap[j], impulse)
+        joints.push[hold] = add(joints.push[hold], push)
+        ends, arms = (joints.first[j], joints.second[j]), (joints.arm_a[hold], joints.arm_b[hold])
+        push_apart(columns_of(solver), ends, arms, push)
+
+
+@inlined
 def angle_of(solver, j):
     """(along which a spin changes it, angle) of a row of angles: for most rows the axis."""
     joints = solver.joints
@@ -218,6 +251,8 @@ def measure_joints(solver):
         if kind >= TURN:
             axis, angle = angle_of(solver, j)
             moved = dot(axis, change_of_spin(solver, a, axis)) + dot(axis, change_of_spin(solver, b, axis))
+            if kind == TURN and swings(joints, j):
+                moved -= held_back(solver, j, axis)
             joints.normal[j], joints.mass[j] = axis, 1.0 / moved if moved > 0.0 else 0.0
             ask(joints, j, angle)
             continue
@@ -318,6 +353,8 @@ def solve_row(solver, j, pushes):
     joints.impulse[j] = new
     if new != old:  # most limits are not met
         give_row(solver, j, new - old)
+        if joints.kind[j] == TURN and swings(joints, j):
+            hold_point(solver, j, new - old)
 
 
 @part
