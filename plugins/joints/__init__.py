@@ -12,8 +12,7 @@ from ...framework import NoPhysicsError, Plugin, PluginError, World
 from ...framework.jit.lazy import errors
 from ...framework.plugins.joints import Placed, numbers_of, rows_of
 from ...systems.contacts.solving.joints.linked import linked_joint
-from ...systems.contacts.solving.joints.records import JOINTS
-from ...systems.contacts.solving.joints.rows import DRIVE, GIVEN, HOLD, LIMIT, POINT, SERVO, SPRING, TURN
+from ...systems.contacts.solving.joints.records import DRIVE, GIVEN, HOLD, JOINTS, LIMIT, POINT, SERVO, SPRING, TURN
 from ...systems.tracking import BEFORE_STEP
 from .arms import arm_of, moment
 from .joint import WORLD, Changes, Driven, Joint, Place, Row

@@ -13,7 +13,7 @@ from ...components.part_of import PartOf
 from ...framework.data.columns import special_column
 from ...framework.data.component import Component
 from ...framework.typing import Vector
-from ...systems.contacts.solving.joints.rows import ALIGN, DRIVE, GIVEN, HOLD, LIMIT, SPRING, TURN
+from ...systems.contacts.solving.joints.records import ALIGN, DRIVE, GIVEN, HOLD, LIMIT, SPRING, TURN
 
 WORLD = 0  # in place of a body
 FREE = -math.inf, math.inf

@@ -10,8 +10,8 @@ import pytest
 from helpers_joints import G, at, chain, disc, energy, gaps, joint_world, plank, run, spin_of
 from worlds import MODES
 
-from carom import Physics, RigidBody, SphereCollider, Transform, World
-from carom.plugins.joints import Distance, Hinge, Joints, Motor, MousePull, Slider, Weld
+from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World
+from carom.plugins.joints import Distance, Hinge, Joints, Motor, MousePull, Slider, Weld, Wheel
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 
@@ -187,6 +187,43 @@ def test_springs_of_doors_give_no_energy(frequency, leaves, substeps):
     world.step()
     for k, leaf in enumerate(bodies):
         world.component_for_entity(leaf, RigidBody).apply_impulse((0.1, 0.3 * (-1) ** k))
+    energies = []
+    for _ in range(1200):
+        world.step()
+        energies.append(world.kinetic_energy())
+    assert max(energies[600:]) < 1.05 * max(energies[:600])
+
+
+@pytest.mark.parametrize("beside", [0.0, 1.5, 3.0])
+def test_slider_on_a_spring_swings_at_its_frequency_wherever_its_axis_is(beside):
+    world, joints = joint_world(0)
+    a, b = plank(world, (0, 0), (0.5, 0.5)), plank(world, (0.5, beside), (0.5, 0.5))
+    slider = world.create_entity(Slider(a, b, direction=(1, 0), frequency=1.0))
+    world.component_for_entity(b, RigidBody).apply_impulse((0.5, 0))
+    ways = []
+    for _ in range(600):
+        world.step()
+        ways.append(joints.state(slider).value)
+    assert period(ways, 1 / 60) == pytest.approx(1.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("kind", [Slider, Wheel])
+@pytest.mark.parametrize(("frequency", "substeps"), [(8.0, 2), (8.0, 4), (20.0, 4)])
+@pytest.mark.parametrize("beside", [-0.6, -2.0])
+def test_springs_beside_the_centres_of_their_bodies_give_no_energy(d, kind, frequency, substeps, beside):
+    pad, place = (0.0,) * (d - 2), (0.7, beside, 0.0)[:d]
+    world = World(Physics(dimensions=d, gravity=0), Rotation(), Joints(), settings=Settings(substeps=substeps))
+    a, b = (
+        world.create_entity(Transform(at), RigidBody(), Spin(), BoxCollider(half[:d]))
+        for at, half in (((0, 0, *pad), (0.5, 0.1, 0.2)), (place, (0.3, 0.3, 0.3)))
+    )
+    held = {"direction": (1, 0, *pad)} if kind is Slider else {"direction": (0, 1, *pad), "anchor": place}
+    if kind is Wheel and d == 3:
+        held["axis"] = (0, 0, 1)
+    world.create_entity(kind(a, b, frequency=frequency, **held))
+    world.component_for_entity(a, RigidBody).apply_impulse((0.1, 0.25, *pad))
+    world.component_for_entity(b, RigidBody).apply_impulse((0.1, -0.4, *pad))
     energies = []
     for _ in range(1200):
         world.step()

@@ -24,7 +24,8 @@ from ..constants import (
     SWEEPS,
 )  # fmt: skip
 from .joints.given import rates_of_given
-from .joints.rows import GIVEN, POINT, TURN, relax_open
+from .joints.records import GIVEN, POINT, TURN
+from .joints.rows import relax_open
 from .rows import excess_speed, relax_listed, velocity_at
 
 

@@ -39,7 +39,7 @@ from ..constants import (
     SUBSTEP_WORK,
 )  # fmt: skip
 from ..points import points_of
-from .joints.rows import HOLD, LIMIT, LINE, POINT, TURN
+from .joints.records import HOLD, LIMIT, LINE, POINT, TURN
 
 COLOURS = 62  # bits of a mask; pairs of a body beyond them share the last one
 STREAMS = 4  # of joints: more are no faster

@@ -13,7 +13,7 @@ from ....integration.turning import change_of_spin, cross_spin
 from ....narrow_phase.stages import layers_meet
 from ..rows import turn_body
 from ..warm_start import row_of
-from .rows import DRIVE, GIVEN, POINT, SLIDE, TURN
+from .records import DRIVE, GIVEN, POINT, SLIDE, TURN
 
 
 @inlined

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from .....framework.jit.records.schema import Schema, flags, floats, integer, ints, number, vectors
 
+POINT, LINE, SLIDE, TURN, ALIGN, CONE, TWIST, GIVEN = range(8)
+HOLD, LIMIT, DRIVE, SPRING, SERVO = range(5)
+
 JOINTS = Schema(
     "Joints",
     count=integer(),
@@ -74,7 +77,7 @@ JOINTS = Schema(
     # in a substep
     arm_a=vectors(),
     arm_b=vectors(),
-    gap=vectors(),  # m, of a POINT; of a spring that turns, what the point of its joint pushes for each N m
+    gap=vectors(),  # m, of a POINT
     turn_a=vectors(),  # of a GIVEN: about which it turns them
     turn_b=vectors(),
     mass=floats(),  # kg or kg m^2
@@ -87,4 +90,5 @@ JOINTS = Schema(
     greatest=floats(),
     impulse=floats(),
     push=vectors(),  # N s of a POINT
+    answer=vectors(),  # N of a POINT, else first N or N m, for each N or N m of the spring of its joint
 )

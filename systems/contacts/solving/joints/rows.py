@@ -22,9 +22,9 @@ from .....framework.vectors import add, add_scaled, dot, item, length, replace, 
 from ....integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
 from ...constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY, SPRING_FREQUENCY
 from .given import measure_given, push_given, speed_of_given
+from .records import ALIGN, DRIVE, GIVEN, HOLD, LIMIT, POINT, SERVO, SLIDE, SPRING, TURN, TWIST
+from .springs import first_of, left_to
 
-POINT, LINE, SLIDE, TURN, ALIGN, CONE, TWIST, GIVEN = range(8)
-HOLD, LIMIT, DRIVE, SPRING, SERVO = range(5)
 FOLDED = 1e-2  # 1 + cosine of a swing: beyond it a twist is nearly any angle
 LEAST_SHARE = 1e-9  # of its mass that a spring without damping takes part with
 BRAKES = 0.9  # of the speed from which a servo could just stop in time
@@ -152,36 +152,11 @@ def multiplied(diagonal, others, v):
 
 
 @inlined
-def point_of(joints, j):
-    """The first row of the joint of row j: the point about which it turns, if it has one."""
-    hold = j
-    while hold > 0 and joints.joint[hold - 1] == joints.joint[j]:
-        hold -= 1
-    return hold
-
-
-@inlined
-def held_back(solver, j, axis):
-    """How much less a spring turns two bodies that a point holds, for which the point has to push: a door turns about
-    its edge."""
-    joints, hold = solver.joints, point_of(solver.joints, j)
-    if joints.kind[hold] != POINT:
-        return 0.0
-    moved = cross_spin(change_of_spin(solver, joints.first[j], axis), joints.arm_a[hold])
-    moved = add(moved, cross_spin(change_of_spin(solver, joints.second[j], axis), joints.arm_b[hold]))
-    joints.gap[j] = scale(multiplied(joints.inverse[hold], joints.inverse_products[hold], moved), -1.0)
-    return -dot(moved, joints.gap[j])
-
-
-@inlined
-def hold_point(solver, j, impulse):
-    """The point of a joint pushes with the spring of row j: after it, bodies would first move as if they were free."""
-    joints, hold = solver.joints, point_of(solver.joints, j)
-    if joints.kind[hold] == POINT:
-        push = scale(joints.gap[j], impulse)
-        joints.push[hold] = add(joints.push[hold], push)
-        ends, arms = (joints.first[j], joints.second[j]), (joints.arm_a[hold], joints.arm_b[hold])
-        push_apart(columns_of(solver), ends, arms, push)
+def weigh_spring(solver, j):
+    """The mass that a spring moves where its joint holds its bodies in other ways, too."""
+    if swings(solver.joints, j) and first_of(solver.joints, j) < j:
+        left = left_to(solver, j)
+        solver.joints.mass[j] = 1.0 / left if left > 0.0 else 0.0
 
 
 @inlined
@@ -251,9 +226,8 @@ def measure_joints(solver):
         if kind >= TURN:
             axis, angle = angle_of(solver, j)
             moved = dot(axis, change_of_spin(solver, a, axis)) + dot(axis, change_of_spin(solver, b, axis))
-            if kind == TURN and swings(joints, j):
-                moved -= held_back(solver, j, axis)
             joints.normal[j], joints.mass[j] = axis, 1.0 / moved if moved > 0.0 else 0.0
+            weigh_spring(solver, j)
             ask(joints, j, angle)
             continue
         arm_a, arm_b = turned_with(solver, a, base_a[j]), turned_with(solver, b, base_b[j])
@@ -271,6 +245,7 @@ def measure_joints(solver):
         arms_a[j], arms_b[j], joints.normal[j] = arm_a, arm_b, normal
         moved = solver.inverse_mass[a] + solver.inverse_mass[b]
         joints.mass[j] = 1.0 / (moved + compliance(solver, a, arm_a, normal) + compliance(solver, b, arm_b, normal))
+        weigh_spring(solver, j)
         ask(joints, j, value)
     joints.moved_for = joints.step
 
@@ -313,6 +288,23 @@ def give_row(solver, j, impulse):
         solver.spin[b] = add(solver.spin[b], change_of_spin(solver, b, twisted))
 
 
+@inlined
+def answer_spring(solver, j, impulse):
+    """What holds in the joint of a spring pushes with it, see springs."""
+    joints = solver.joints
+    for i in range(first_of(joints, j), j):
+        if joints.rule[i] != HOLD or joints.kind[i] == GIVEN:
+            continue
+        answer = scale(joints.answer[i], impulse)
+        if joints.kind[i] == POINT:
+            ends, arms = (joints.first[i], joints.second[i]), (joints.arm_a[i], joints.arm_b[i])
+            joints.push[i] = add(joints.push[i], answer)
+            push_apart(columns_of(solver), ends, arms, answer)
+        else:
+            joints.impulse[i] += item(answer, 0)
+            give_row(solver, i, item(answer, 0))
+
+
 @part
 def warm_start_joints(solver):
     """The impulses of the last substep act again, with the anchors as they are now."""
@@ -353,8 +345,8 @@ def solve_row(solver, j, pushes):
     joints.impulse[j] = new
     if new != old:  # most limits are not met
         give_row(solver, j, new - old)
-        if joints.kind[j] == TURN and swings(joints, j):
-            hold_point(solver, j, new - old)
+        if swings(joints, j) and joints.kind[j] != GIVEN:
+            answer_spring(solver, j, new - old)
 
 
 @part
