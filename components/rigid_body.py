@@ -13,7 +13,9 @@ from ..framework.data.table import KINDS
 from ..framework.typing import Vector, VectorField
 
 FASTEST = 1e307  # m/s along each axis: differences of two such velocities, and their lengths, are finite
-OF_A_SPIN = ("angular_velocity", "inertia", "angular_damping", "max_angular_speed", "rolling_friction", "torque")
+OF_A_SPIN = (
+    "angular_velocity", "inertia", "moment", "angular_damping", "max_angular_speed", "rolling_friction", "torque",
+)  # fmt: skip
 Kind = Literal["dynamic", "kinematic", "static"]
 # Arguments, checked like fields.
 FORCE = Column(item="vector", owner="RigidBody", name="apply_force")

@@ -62,7 +62,9 @@ class Spin(Component):
     angular_velocity: Angular = special_column(
         default=0.0, item="angular", largest=FASTEST_TURN, also=("velocity", "speed", "omega")
     )
-    inertia: Angular | None = special_column(default=None, item="angular", optional=True, positive=True)
+    inertia: Angular | None = special_column(
+        default=None, item="angular", optional=True, positive=True, also=("moment",)
+    )
     angular_damping: float = special_column(default=0.0, minimum=0.0, kw_only=True, also=("damping",))
     max_angular_speed: float | None = special_column(
         default=None, optional=True, minimum=0.0, kw_only=True, also=("max_speed",)

@@ -28,7 +28,7 @@ from carom.framework import (
 )
 from carom.plugins import Physics, capsule, rotation
 from carom.plugins.capsule import CapsuleCollider
-from carom.plugins.rotation import Rotation
+from carom.plugins.rotation import Rotation, Spin
 from carom.plugins.springs import Springs
 from carom.plugins.tile_grid import TileGridCollider
 
@@ -88,6 +88,8 @@ REFUSED = {
     "default": (default_of_another_shape, ValueError, "Health.hp must be one scalar"),
     "no physics": (body_without_physics, NoPhysicsError, "entity 1 has RigidBody"),
     "turning": (lambda: RigidBody(angular_velocity=1), TypeError, "that of a Spin turns bodies"),
+    "moment": (lambda: RigidBody(moment=1), TypeError, "that of a Spin turns bodies"),
+    "moment of a Spin": (lambda: Spin(moment=1), TypeError, "did you mean 'inertia'?"),
     "sphere": (lambda: SphereCollider(1, bounce=1), TypeError, "did you mean 'restitution'"),
     "many": (lambda: SphereCollider.many(1, bounce=1), TypeError, "did you mean 'restitution'"),
     "capsule": (lambda: CapsuleCollider(1, 1, bounciness=1), TypeError, "did you mean 'restitution'"),
