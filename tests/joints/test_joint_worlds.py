@@ -11,7 +11,7 @@ import pytest
 from helpers_joints import G, at, chain, disc, gaps, joint_world, plank, run, run_failing
 
 from carom import Physics, RigidBody, Settings, SphereCollider, StepError, Transform, World
-from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Motor, Slider, Weld
+from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Motor, Slider, Weld, Wheel
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 
@@ -132,6 +132,32 @@ def test_same_joints_same_bits_and_back_again():
     world.restore(snapshot)
     world.step()
     assert not np.allclose([joints.state(hinge).impulse for hinge in hinges], 0 * np.array(forces))
+
+
+def test_a_car_of_five_wheels_goes_back_and_is_loaded_to_the_bit(tmp_path):
+    """Rows of a joint are solved side by side with those of others, not one after the other."""
+    plugins = Physics(2, gravity=(0, -9.81)), Rotation(), Joints()
+    with World(*plugins) as world:
+        world.create_entity(Transform((0, -0.5)), BoxCollider((100, 0.5)))
+        body = world.create_entity(
+            Transform((0, 1.2)), RigidBody(10, linear_velocity=(3, 0)), Spin(), BoxCollider((2, 0.3))
+        )
+        for x in np.linspace(-1.5, 1.5, 5):
+            wheel = world.create_entity(Transform((x, 0.5)), RigidBody(), Spin(), SphereCollider(0.4, friction=0.8))
+            world.create_entity(
+                Wheel(body, wheel, (x, 0.5), (0, 1), frequency=4, damping_ratio=0.5, motor_speed=-5, max_torque=20)
+            )
+        run(world, 20)
+        before = world.snapshot()
+        world.save(tmp_path / "car")
+        run(world, 30)
+        after = world.state_hash()
+        world.restore(before)
+        run(world, 30)
+        assert world.state_hash() == after
+    with World.load(tmp_path / "car", Physics(2, gravity=(0, -9.81)), Rotation(), Joints()) as world:
+        run(world, 30)
+        assert world.state_hash() == after
 
 
 def test_step_that_fails_leaves_the_forces_as_they_were():

@@ -152,14 +152,6 @@ def multiplied(diagonal, others, v):
 
 
 @inlined
-def weigh_spring(solver, j):
-    """The mass that a spring moves where its joint holds its bodies in other ways, too."""
-    if swings(solver.joints, j) and first_of(solver.joints, j) < j:
-        left = left_to(solver, j)
-        solver.joints.mass[j] = 1.0 / left if left > 0.0 else 0.0
-
-
-@inlined
 def angle_of(solver, j):
     """(along which a spin changes it, angle) of a row of angles: for most rows the axis."""
     joints = solver.joints
@@ -227,7 +219,6 @@ def measure_joints(solver):
             axis, angle = angle_of(solver, j)
             moved = dot(axis, change_of_spin(solver, a, axis)) + dot(axis, change_of_spin(solver, b, axis))
             joints.normal[j], joints.mass[j] = axis, 1.0 / moved if moved > 0.0 else 0.0
-            weigh_spring(solver, j)
             ask(joints, j, angle)
             continue
         arm_a, arm_b = turned_with(solver, a, base_a[j]), turned_with(solver, b, base_b[j])
@@ -245,8 +236,12 @@ def measure_joints(solver):
         arms_a[j], arms_b[j], joints.normal[j] = arm_a, arm_b, normal
         moved = solver.inverse_mass[a] + solver.inverse_mass[b]
         joints.mass[j] = 1.0 / (moved + compliance(solver, a, arm_a, normal) + compliance(solver, b, arm_b, normal))
-        weigh_spring(solver, j)
         ask(joints, j, value)
+    for e in range(joints.begin, joints.end):  # now that all rows are measured: those of a joint may come in any order
+        j = order[e]
+        if swings(joints, j) and kinds[j] != GIVEN and first_of(joints, j) < j:
+            left = left_to(solver, j)
+            joints.mass[j] = 1.0 / left if left > 0.0 else 0.0
     joints.moved_for = joints.step
 
 
