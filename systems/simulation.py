@@ -181,9 +181,9 @@ class Simulation:
     def _follow(self, others_write: bool) -> None:
         """Everything that depends on which bodies and systems there are."""
         table, scene, words = self.table, self.scene, self._words
+        words[self._step_number] = self.table.clock.step_count  # first: what fails here goes back to before this step
         for follow in self.extensions.followers:
             follow(self._world)
-        words[self._step_number] = self.table.clock.step_count
         self.contacts_before = self.contacts.columns_now() if words[self._found_current] else None
         if self._structure() != scene.structure or table.static_version != scene.static_version:
             self._refresh()

@@ -143,7 +143,7 @@ def joined(d: int, mode: str) -> World:
         lambda a, b, x: Weld(a, b, x),
         lambda a, b, x: Slider(a, b, axis, limits=(-0.01, 0.05), motor_speed=1.0, max_force=5.0),
         lambda a, b, x: Slider(None, b, axis, frequency=3.0),
-        lambda a, b, x: Distance(a, b, anchor_a=at(d, 0.2)),
+        lambda a, b, x: Distance(a, b, point_a=x),
         lambda a, b, x: Distance(a, length=(0.0, 0.1)),
         lambda a, b, x: Distance(a, b, frequency=4.0, damping_ratio=0.5),
         lambda a, b, x: Motor(a, b, speed=2.0, max_torque=1.0, **about),

@@ -32,19 +32,25 @@ class ChangeLog:
         how often the table has been brought up to date: another number whenever entities may have changed
     cleared
         esper.clear_database(): everything before it has gone
+    followers
+        sets that get what was touched, too: of plugins, which empty them when they look
     """
 
-    __slots__ = ("arrivals", "base", "cleared", "deleted", "dirty", "lost", "rounds", "touched")
+    __slots__ = ("arrivals", "base", "cleared", "deleted", "dirty", "followers", "lost", "rounds", "touched")
 
     def __init__(self, base: type[Any]) -> None:
         self.base = base  # only types derived from it are watched
         self.rounds = 0
+        self.followers: list[set[int]] = []
+        self.touched: set[int] = set()
         self.clear()
 
     def clear(self) -> None:
         self.cleared = self.dirty = False
         self.rounds += 1
-        self.touched: set[int] = set()
+        for follower in self.followers:
+            follower |= self.touched
+        self.touched = set()
         self.arrivals: list[Arrival] = []
         self.deleted: set[int] = set()
         self.lost: list[Any] = []

@@ -269,6 +269,7 @@ class Entities(dict[int, dict[type[Any], Any]]):
         self.version += 1
         lost = [h for components in dict.values(self) for h in components.values() if isinstance(h, Component)]
         lost += self.log.lost
+        self.log.touched.update(dict.keys(self))
         self.log.clear()
         self.log.cleared = self.log.dirty = True
         self.log.lost = lost

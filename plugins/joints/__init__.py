@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...components import RigidBody
 from ...components.part_of import Changes as PartChanges
 from ...components.part_of import PartOf
-from ...framework import NoPhysicsError, Plugin, PluginError, World
-from ...framework.jit.lazy import errors
-from ...framework.plugins.joints import Placed, numbers_of, rows_of
-from ...systems.contacts.solving.joints.linked import linked_joint
+from ...components.spin import Spin
+from ...framework import NoPhysicsError, Plugin, World
+from ...framework.plugins.joints import Placed, rows_of
 from ...systems.contacts.solving.joints.records import DRIVE, GIVEN, HOLD, JOINTS, LIMIT, POINT, SERVO, SPRING, TURN
 from ...systems.tracking import BEFORE_STEP
 from .arms import arm_of, moment
-from .joint import WORLD, Changes, Driven, Joint, Place, Row
+from .joint import WORLD, Driven, Joint, Place, Row, whole_body
 from .kinds import KINDS, Ball, Cone, Distance, Hinge, Motor, MousePull, Slider, Weld, Wheel
 from .measures import Holds, anchors, holds, measure, moving
+from .rows import KEPT, KEY, OF_PLUGINS, JointRows, by_row, put_kept
 
-# What rows are known by, and what they keep from step to step.
-KEY = ("joint", "kind", "rule", "entity_a", "entity_b")
-KEPT = ("load", "pull", "normal", "total", "thrust")
-OF_PLUGINS = ("value", "along_a", "turn_a", "turn_b")  # and rows of plugins' joints besides
+BREAKING = "breaking_force", "breaking_torque"
 
 
 class JointState(NamedTuple):
@@ -35,12 +34,16 @@ class JointState(NamedTuple):
     value, speed
         rad of a Hinge, a Weld, a Motor or the twist of a Cone, m of a Slider, a Wheel or a Distance, what the first row
         of a plugin's joint has, and the change per second; else 0
+    load
+        of what it bears: the mean force through breaking_force, or the mean torque through breaking_torque, whichever
+        is more. Above 1 it breaks; 0 if it cannot
     """
 
     impulse: np.ndarray
     torque: float | np.ndarray
     value: float
     speed: float
+    load: float
 
 
 class Joints(Plugin):
@@ -64,25 +67,30 @@ class Joints(Plugin):
         self._physics: Any = physics
         self._record: Any = physics.record(JOINTS)
         self._contents = world._contents()
-        self._seen: Any = None  # what the rows depend on
-        self._joints: dict[int, Joint] = {}  # by entity, which ascend
-        self._spans: dict[int, tuple[int, int]] = {}  # their rows
-        self._connected: dict[int, bool] = {}  # which of them may touch
+        self._rows = JointRows(self._record, physics.dimensions, world.registry)
+        self._joints: dict[int, Joint] = {}  # those that have rows, by entity, which ascend
         self._holds: list[Holds] | None = None  # what columns() measures, once they are asked for
-        self._wanted: dict[str, Any] | None = None  # what rows are to begin with after going back
+        # Entities that came, went or changed, and joints of which a field was set, since the last step.
+        self._touched: set[int] = set()
+        self._set: set[int] = set()
+        self._released: set[int] = set()  # bodies that were held otherwise before the world went back
+        self._given_away: dict[tuple[int, str], tuple[np.ndarray, bytes]] = {}  # vectors that the game may write into
+        self._table_version = -1  # at which all bodies of joints were there
+        self._parts_changes = PartChanges.count
         self._breaking = False
+        self._contents.log.followers.append(self._touched)
         world.events.define("joint_lost", "joint_broken")
         self._physics.extensions.followers.append(self._follow)
         self._physics.extensions.finishers.append(self._finish)
-        self._physics.extensions.waiting.append(lambda: self._breaking or self._now() != self._seen)
+        self._physics.extensions.waiting.append(self._waits)
         super().install(world)
 
     def __len__(self) -> int:
-        return len(self._joints)
+        return len(self._present())
 
     def of(self, body: int) -> list[int]:
         """The joints at a body, by their entities."""
-        return [entity for entity, joint in self._joints.items() if body in (joint.a, joint.b)]
+        return [entity for entity, joint in self._present().items() if body in (joint.a, joint.b)]
 
     @property
     def changes_energy(self) -> bool:
@@ -91,36 +99,53 @@ class Joints(Plugin):
 
     def state(self, entity: int) -> JointState:
         """Of the joint of that entity; KeyError if it has none that a step has taken."""
-        if entity not in self._joints:
+        joint = self._present().get(entity)
+        if joint is None:
             raise KeyError(f"entity {entity!r} has no joint that a step has taken")
-        start, stop = self._spans[entity]
-        impulses, torques = self._given(start, stop)
-        torque = torques.sum(axis=0)
-        value, speed = self._measure([entity], holds([self._joints[entity]]))
-        flat = self._physics.dimensions == 2
-        return JointState(impulses.sum(axis=0), float(torque[0]) if flat else torque, float(value[0]), float(speed[0]))
+        columns = self._columns({entity: joint}, holds([joint]))
+        values = (columns[name][0] for name in JointState._fields)
+        return JointState(*(value if value.ndim else float(value) for value in values))
 
     def columns(self) -> dict[str, np.ndarray]:
         """Of all joints what :meth:`state` has: ``entity (n,)``, ``impulse (n, d)``, ``torque (n,)``, in 3D (n, 3),
-        ``value (n,)`` and ``speed (n,)``."""
-        columns = self._done()
+        ``value (n,)``, ``speed (n,)`` and ``load (n,)``."""
+        present = self._present()
+        if present is not self._joints:
+            return self._columns(present, holds(present.values()))
         if self._holds is None:
-            self._holds = holds(self._joints.values())
-        value, speed = self._measure(list(self._joints), self._holds)
-        return columns | {"value": value, "speed": speed}
+            self._holds = holds(present.values())
+        return self._columns(present, self._holds)
 
     def anchors(self) -> tuple[np.ndarray, np.ndarray]:
         """(n, d) where the anchors of all joints are, on each a and on each b: to draw ropes and hinges."""
-        return anchors(self._physics.table, self._joints.values())
+        return anchors(self._physics.table, self._present().values())
 
-    def _done(self) -> dict[str, np.ndarray]:
-        """What the joints have done in the last step."""
-        starts = [start for start, _ in self._spans.values()]
-        impulses, torques = self._given(0, self._record.count)
-        if starts:
+    def _present(self) -> dict[int, Joint]:
+        """The joints that have rows, but for those that are gone since the last step."""
+        log, dead = self._contents.log, self._contents.dead
+        if not (self._touched or log.touched or dead):
+            return self._joints
+        gone = [e for e in {*self._touched, *log.touched, *dead}.intersection(self._joints)
+                if e in dead or self._joint_of(e) is not self._joints[e]]  # fmt: skip
+        return {e: joint for e, joint in self._joints.items() if e not in gone} if gone else self._joints
+
+    def _columns(self, joints: dict[int, Joint], found: list[Holds]) -> dict[str, np.ndarray]:
+        """What :meth:`columns` has, of some of the joints in their order."""
+        bears, entities = self._bears(), list(joints)
+        own = np.searchsorted(bears["entity"], entities)
+        value, speed = self._measure(joints, found)
+        return {name: column[own] for name, column in bears.items()} | {"value": value, "speed": speed}
+
+    def _bears(self) -> dict[str, np.ndarray]:
+        """What all joints have done in the last step."""
+        record, starts, dt = self._record, self._rows.starts(), self.world.settings.dt if self.world else 1.0
+        impulses, torques = self._given(0, record.count)
+        if len(starts):
             impulses, torques = np.add.reduceat(impulses, starts), np.add.reduceat(torques, starts)
+        force, turn = (np.linalg.norm(done, axis=1) / dt for done in (impulses, torques))
+        load = np.maximum(force / record.breaking_force[starts], turn / record.breaking_torque[starts])
         torque = torques[:, 0] if self._physics.dimensions == 2 else torques
-        return {"entity": np.array(list(self._spans), np.int64), "impulse": impulses, "torque": torque}
+        return {"entity": record.joint[starts], "impulse": impulses, "torque": torque, "load": load}
 
     def _given(self, start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
         """The impulses and the torques of some rows, (k, d) each."""
@@ -130,13 +155,13 @@ class Joints(Plugin):
         turned = np.where(given, record.total[start:stop, None] * record.turn_b[start:stop], along)
         return impulse, np.where(kind >= TURN, turned, 0.0)
 
-    def _measure(self, entities: list[int], found: list[Holds]) -> tuple[np.ndarray, np.ndarray]:
+    def _measure(self, joints: dict[int, Joint], found: list[Holds]) -> tuple[np.ndarray, np.ndarray]:
         """The values of these joints and their changes per second; of those of plugins what their first rows say."""
         table, record = self._physics.table, self._record
-        value, speed = measure(table, found, len(entities))
-        own = [k for k, entity in enumerate(entities) if type(self._joints[entity]) in self._own]
+        value, speed = measure(table, found, len(joints))
+        own = [k for k, joint in enumerate(joints.values()) if type(joint) in self._own]
         if own:
-            rows = [self._spans[entities[k]][0] for k in own]
+            rows = np.searchsorted(record.joint[: record.count], np.array(list(joints))[own])
             value[own] = record.value[rows]
             speed[own] = moving(table, record.entity_a[rows]).rate(record.along_a[rows], record.turn_a[rows])
             speed[own] += moving(table, record.entity_b[rows]).rate(record.normal[rows], record.turn_b[rows])
@@ -148,52 +173,164 @@ class Joints(Plugin):
         """What the rows have done in the last step, with the entities of the joints and of their bodies."""
         record, count = self._record, self._record.count
         own = OF_PLUGINS if (record.kind[:count] == GIVEN).any() else ()
-        return self._wanted or {name: getattr(record, name)[:count].copy() for name in (*KEY, *KEPT, *own)}
+        rows = {name: getattr(record, name)[:count].copy() for name in (*KEY, *KEPT, *own)}
+        return rows | {"released": sorted(self._released)}
 
     def take_back(self, world: Any, saved: Any) -> None:
-        """Rows begin with that."""
-        self._wanted = saved
-        self._joints, self._spans, self._seen = {}, {}, None
+        """The rows are those of the joints that there are now, with that; what no step has taken waits for the next."""
+        contents, record = self._contents, self._record
+        for joint in self._joints.values():
+            joint._taken = None
+        self._joints, self._holds, self._given_away, self._table_version = {}, None, {}, -1
+        self._touched.clear()
+        self._set.clear()
+        self._rows.clear()
+        found = {e: contents.components_of(e)[c] for c in (*KINDS, *self._own) for e in contents.members.get(c, ())}
+        for entity, joint in sorted(found.items()):
+            if joint.attached:
+                joint.fit(self._physics.dimensions, entity)
+                self._take(entity, joint)
+            if joint.changed:
+                self._touched.add(entity)
+                self._set.add(entity)
+        had = by_row(saved)
+        now = put_kept(record, slice(0, record.count), had)
+        self._released = {*saved["released"], *(body for key in had.keys() ^ now for body in key[3:5])}
+        for name in BEFORE_STEP:
+            getattr(record, f"old_{name}")[:] = getattr(record, name)
 
     # -- before a step ----------------------------------------------------------------------------
 
+    def _waits(self) -> bool:
+        """Whether there is something to do before or after this step."""
+        changed = self._touched or self._set or self._released or self._parts_changes != PartChanges.count
+        return bool(changed or self._given_away or self._breaking)
+
     def _follow(self, world: World) -> None:
-        """Which joints there are, and their fields, if anything has changed."""
-        now = self._now()
-        same = self._seen is not None and now[:2] == self._seen[:2]
-        if same and now[2] != self._seen[2]:
-            self._check_apart(self._joints)
-        if now == self._seen or (same and self._update()):
-            self._seen = now
+        """Which joints there are, and their fields, as far as anything has changed."""
+        for (entity, name), (array, known) in list(self._given_away.items()):
+            if array.tobytes() != known:
+                now = array.copy()
+                array[:] = np.frombuffer(known)
+                setattr(self._joints[entity], name, now)  # as if it had been set
+        table, touched = self._physics.table, self._touched
+        if self._contents.members.get(PartOf) and (
+            self._parts_changes != PartChanges.count
+            or any(PartOf in self._contents.entities.types_of(entity) for entity in touched)
+        ):
+            for entity, joint in self._present().items():
+                joint.check_apart(self._contents, entity)
+        self._parts_changes = PartChanges.count
+        if not (touched or self._set or self._released or self._table_version != table.version):
             return
-        found = self._present()
-        lost = [entity for entity, joint in found.items() if self._is_lost(joint)]
-        ended = [(entity, found.pop(entity)) for entity in lost]
-        for entity, joint in found.items():
+        come: dict[int, Joint] = {}
+        gone, lost = set(), self._lost() if self._table_version != table.version else {}
+        for entity in sorted(touched | self._set):
+            joint, before = self._joint_of(entity), self._joints.get(entity)
+            if before is not None and before is not joint:
+                gone.add(entity)
+            if joint is None or entity in lost:
+                continue
+            if before is not joint and self._is_lost(joint):
+                lost[entity] = joint
+            elif before is not joint or entity in self._set:
+                come[entity] = joint
+        self._prepare(come)
+        held = self._released | {body for joint in lost.values() for body in (joint.a, joint.b)} | self._drop(gone)
+        for entity, joint in come.items():
+            held |= self._take(entity, joint)
+            joint.keep(changed=False)
+        if self._physics.sleepers.on:
+            self._physics.sleepers.disturb(np.array(sorted(held - {WORLD}), np.int64))
+        self._end(list(lost.items()), "joint_lost")  # whose rows take no part, and go with the next step
+        for seen in (touched, self._set, self._released):
+            seen.clear()
+        self._table_version = table.version
+
+    def _prepare(self, joints: dict[int, Joint]) -> None:
+        """These joints have hold of their bodies; ValueError, before any row is another one, if one cannot."""
+        for entity, joint in joints.items():
+            joint._taken = None  # until it has rows: what looks at its vectors here does not write into them
             joint.fit(self._physics.dimensions, entity)
             if not joint.attached:
                 self._attach(entity, joint)
-        self._check_apart(found)
-        self._write(found)
-        self._end(ended, "joint_lost")
-        self._seen = self._now()
+                self._holds = None
+            elif entity not in self._joints:
+                joint.check_apart(self._contents, entity)
 
-    def _present(self) -> dict[int, Joint]:
-        """All joints of the world, in the order of their entities."""
-        contents, found = self._contents, {}
-        for kind in (*KINDS, *self._own):
-            for entity in contents.members.get(kind, ()):
-                found[entity] = contents.components_of(entity)[kind]
-        return {entity: found[entity] for entity in sorted(found)}
+    def _take(self, entity: int, joint: Joint) -> set[int]:
+        """Rows for a joint that has hold of its bodies; these, and those that it has held."""
+        joint._taken = None
+        rows = joint.rows(self._physics.dimensions)
+        bodies, other = self._rows.put(joint, rows)
+        joint._taken = self
+        self._breaking = self._breaking or not (joint.breaking_force is joint.breaking_torque is None)
+        if entity not in self._joints:
+            last = next(reversed(self._joints), 0)
+            self._joints[entity], self._holds = joint, None
+            if entity < last:
+                self._joints = dict(sorted(self._joints.items()))
+        if other and any(TURN <= row.kind < GIVEN and row.rule != HOLD for row in rows) and not self._turns(joint):
+            names = ", ".join(f"entity {body}" for body in (joint.a, joint.b) if body != WORLD)
+            self.world.report_fault(
+                f"entity {entity}: this {type(joint).__name__} turns nothing, for it joins bodies without Spin: {names}",
+                kind="a joint turns nothing", entity=entity,
+            )  # fmt: skip
+        return bodies
 
-    def _check_apart(self, joints: dict[int, Joint]) -> None:
-        """ValueError for one whose bodies have become parts of one body."""
-        for entity, joint in joints.items() if self._contents.members.get(PartOf) else ():
-            joint.check_apart(self._contents, entity)
+    def _turns(self, joint: Joint) -> bool:
+        """Whether one of its bodies can turn."""
+        entities = self._contents.entities
+        bodies = [whole_body(self._contents, body) for body in (joint.a, joint.b) if body != WORLD]
+        return any(
+            Spin in entities.types_of(body) and entities.handle(body, RigidBody).kind == "dynamic" for body in bodies
+        )
 
-    def _now(self) -> tuple[int, int, int, int]:
-        """Another value whenever entities or bodies have come or gone, or a field of joints or of parts was set."""
-        return self._contents.log.rounds, self._physics.table.version, PartChanges.count, Changes.count
+    def _drop(self, entities: set[int]) -> set[int]:
+        """These joints have no rows any more; the bodies that they have held."""
+        if not entities:
+            return set()
+        self._rows.remove(sorted(entities))
+        joints = [self._joints.pop(entity) for entity in sorted(entities)]
+        for joint in joints:
+            joint._taken = None
+        self._given_away = {key: value for key, value in self._given_away.items() if key[0] not in entities}
+        self._holds = None
+        return {body for joint in joints for body in (joint.a, joint.b)}
+
+    def _joint_of(self, entity: int) -> Joint | None:
+        """The joint that an entity has."""
+        types = self._contents.entities.types_of(entity)
+        kind = next((kind for kind in types if isinstance(kind, type) and issubclass(kind, Joint)), None)
+        return None if kind is None else self._contents.components_of(entity)[kind]
+
+    def note(self, joint: Joint, names: Iterable[str]) -> None:
+        """Fields of a joint were set: its rows follow at once, unless a step runs or bodies have to wake for it.
+        Vectors that the game has got show it."""
+        if joint.attached and type(joint) in KINDS and not (self._physics.table.in_step or self._physics.sleepers.on):
+            self._take(joint.entity, joint)
+            joint.keep(changed=False)
+        else:
+            self._set.add(joint.entity)
+        for name in names if self._given_away else ():
+            if (joint.entity, name) in self._given_away:
+                array, _ = self._given_away[joint.entity, name]
+                array[:] = getattr(joint, name)
+                joint.keep(**{name: array})
+                self._given_away[joint.entity, name] = array, array.tobytes()
+
+    def watch(self, joint: Joint, name: str, array: np.ndarray) -> None:
+        """The game has got a vector of a joint."""
+        if (joint.entity, name) not in self._given_away:
+            self._given_away[joint.entity, name] = array, array.tobytes()
+
+    def _lost(self) -> dict[int, Joint]:
+        """The joints with rows of which a body is gone."""
+        record, table, lost = self._record, self._physics.table, np.zeros(self._record.count, bool)
+        for bodies in (record.entity_a[: record.count], record.entity_b[: record.count]):
+            lost |= (bodies != WORLD) & (table.rows_of(bodies) < 0)
+        there = ((entity, self._joint_of(entity)) for entity in np.unique(record.joint[: record.count][lost]).tolist())
+        return {entity: joint for entity, joint in there if joint is not None}
 
     def _is_lost(self, joint: Joint) -> bool:
         """Whether one of its bodies is gone; of a joint that has not taken hold yet: whether it was deleted since."""
@@ -249,115 +386,17 @@ class Joints(Plugin):
         axes = np.array(((c, -s), (s, c))) if d == 2 else _matrix(rotation)
         return Place(table.column("position")[row].copy(), axes, angle)
 
-    def _update(self) -> bool:
-        """Fields were set, and no more: the rows of these joints as they are now. False if they are other rows."""
-        changed = [(entity, joint) for entity, joint in self._joints.items() if joint.changed]
-        record, d = self._record, self._physics.dimensions
-        rows = {}
-        for entity, joint in changed:
-            joint.fit(d, entity)
-            rows[entity] = joint.rows(d) if joint.attached else []
-            span = slice(*self._spans[entity])
-            before = list(zip(record.kind[span].tolist(), record.rule[span].tolist(), strict=True))
-            same = before == [(row.kind, row.rule) for row in rows[entity]]
-            if not same or joint.collide_connected != self._connected[entity]:
-                return False
-        for entity, joint in changed:
-            for j, row in enumerate(rows[entity], self._spans[entity][0]):
-                self._put(j, joint, row)
-        self._finish_changes(set())
-        return True
-
-    def _write(self, joints: dict[int, Joint]) -> None:
-        """The rows of these joints, which begin with what they had."""
-        record, d, wanted = self._record, self._physics.dimensions, _by_row(self.saved(self.world))
-        rows = [(entity, row) for entity, joint in joints.items() for row in joint.rows(d)]
-        other = ("apart_a", "apart_b", "numbers", "axes_a", "axes_b")
-        record.reserve(max(len(rows), 1), *record.columns().keys() - other)
-        own = [numbers_of(joints[entity], d) if row.kind == GIVEN else () for entity, row in rows]
-        ends = np.cumsum([0, *map(len, own)])
-        record.numbers_at[: len(rows)] = ends[:-1]
-        if ends[-1]:
-            record.reserve(d * len(rows), "axes_a", "axes_b")
-            record.reserve(int(ends[-1]), "numbers")
-        self._joints, self._spans, self._wanted = joints, {}, None
-        for j, (entity, row) in enumerate(rows):
-            record.joint[j] = entity
-            for name in (*KEPT, *OF_PLUGINS):
-                getattr(record, name)[j] = 0.0
-            record.normal[j] = np.eye(d)[0]
-            self._put(j, joints[entity], row)
-            self._spans[entity] = self._spans.get(entity, (j, j))[0], j + 1
-        record.count, record.active, record.rows_version = len(rows), 0, -1
-        now = _by_row({name: getattr(record, name)[: len(rows)] for name in KEY})
-        for j, key in enumerate(now):
-            for name, value in zip((*KEPT, *OF_PLUGINS), wanted.get(key, ()), strict=False):
-                getattr(record, name)[j] = value
-        for name in BEFORE_STEP:
-            getattr(record, f"old_{name}")[:] = getattr(record, name)
-        self._connected = {entity: joint.collide_connected for entity, joint in joints.items()}
-        self._keep_apart(joints)
-        self._finish_changes({body for key in wanted.keys() ^ now.keys() for body in key[3:5]})
-
-    def _put(self, j: int, joint: Joint, row: Row) -> None:
-        """A row of a joint as it is now."""
-        record = self._record
-        record.kind[j], record.rule[j] = row.kind, row.rule
-        record.entity_a[j], record.entity_b[j] = joint.a, joint.b
-        record.anchor_a[j], record.anchor_b[j] = row.ends or (joint.at_a, joint.at_b)
-        record.axis[j] = np.eye(self._physics.dimensions)[0] if row.axis is None else row.axis
-        for name in ("low", "high", "target", "most", "frequency", "damping_ratio"):
-            getattr(record, name)[j] = getattr(row, name)
-        if row.kind == GIVEN:
-            self._put_own(j, joint, row.part)
-
-    def _put_own(self, j: int, joint: Joint, part: int) -> None:
-        """What a row of a plugin's joint calls; a PluginError if its function cannot be compiled."""
-        record, own, start = self._record, self._own[type(joint)], self._record.numbers_at[j]
-        given = numbers_of(joint, self._physics.dimensions)
-        record.part[j], record.numbers[start : start + len(given)] = part, given
-        try:
-            record.function[j] = linked_joint(own, self._physics.dimensions).address
-        except errors.NumbaError as error:
-            raise PluginError(
-                f"plugin {own.plugin}: constraint of joint {type(joint).__name__} cannot be compiled; use numbers, "
-                f"tuples, math, carom.framework.vectors, and helpers marked @plugin.kernel: {error}"
-            ) from error
-
-    def _finish_changes(self, bodies: set[int]) -> None:
-        """These bodies have had other rows; they wake if they sleep, and so do those whose joints have changed."""
-        self._holds = None
-        self._breaking = any(joint.breaking_force is not None for joint in self._joints.values())
-        for joint in self._joints.values():
-            if joint.changed:
-                bodies |= {joint.a, joint.b}
-                joint.keep(changed=False)
-        for body in sorted(bodies - {WORLD}):
-            if self._row(body) >= 0:
-                self._physics.wake(body)
-
-    def _keep_apart(self, joints: dict[int, Joint]) -> None:
-        pairs = sorted({
-            (min(joint.a, joint.b), max(joint.a, joint.b)) for joint in joints.values()
-            if not joint.collide_connected and WORLD not in (joint.a, joint.b)
-        })  # fmt: skip
-        record = self._record
-        record.reserve(len(pairs), "apart_a", "apart_b")
-        record.apart = len(pairs)
-        if pairs:
-            record.apart_a[: len(pairs)], record.apart_b[: len(pairs)] = np.array(pairs, np.int64).T
-
     # -- after a step -----------------------------------------------------------------------------
 
     def _finish(self, world: World) -> None:
         """Joints that have borne too much are gone."""
         if not self._breaking:
             return
-        columns, dt = self._done(), world.settings.dt
-        force = np.linalg.norm(columns["impulse"], axis=1) / dt
-        pairs = zip(self._joints.items(), force.tolist(), strict=True)
-        broken = [(entity, joint) for (entity, joint), size in pairs if size > (joint.breaking_force or np.inf)]
-        self._end(broken, "joint_broken")
+        limits = np.minimum(*(getattr(self._record, name)[: self._record.count] for name in BREAKING))
+        self._breaking = bool((limits < np.inf).any())
+        bears = self._bears()
+        broken = bears["entity"][bears["load"] > 1.0].tolist()
+        self._end([(entity, self._joints[entity]) for entity in broken], "joint_broken")
 
     def _end(self, joints: list[tuple[int, Joint]], event: str) -> None:
         """Tell of these joints, and delete them: last, for if a handler raises the step is taken again."""
@@ -365,17 +404,6 @@ class Joints(Plugin):
             for entity, joint in joints:
                 self.world.events.dispatch(event, entity, joint)
             self._contents.delete([entity for entity, _ in joints])
-
-
-def _by_row(columns: dict[str, Any]) -> dict[tuple[int, ...], tuple[Any, ...]]:
-    """What rows keep, by what they are known by and how many such rows are before them, in their order."""
-    rows: dict[tuple[int, ...], tuple[Any, ...]] = {}
-    seen: dict[tuple[int, ...], int] = {}
-    kept = [np.asarray(columns[name]) for name in (*KEPT, *OF_PLUGINS) if name in columns]
-    for j, key in enumerate(zip(*(np.asarray(columns[name]).tolist() for name in KEY), strict=True)):
-        seen[key] = seen.get(key, -1) + 1
-        rows[*key, seen[key]] = tuple(column[j] for column in kept)
-    return rows
 
 
 def _matrix(q: Any) -> np.ndarray:

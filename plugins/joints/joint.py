@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
-from typing import Any, ClassVar, NamedTuple
+from collections.abc import Collection, Set
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from ...components import RigidBody
 from ...components.part_of import PartOf
-from ...framework.data.columns import special_column
+from ...framework.data.columns import Column, special_column
 from ...framework.data.component import Component
 from ...framework.typing import Vector
 from ...systems.contacts.solving.joints.records import ALIGN, DRIVE, GIVEN, HOLD, LIMIT, SPRING, TURN
@@ -53,10 +53,25 @@ class Place(NamedTuple):
         return self.position + self.axes @ np.asarray(local, float)
 
 
-class Changes:
-    """How often a field of any joint has been set: worlds look again when that is another number."""
+class Watched(Column):
+    """A vector that may be written in place: the world's Joints are told of each that the game has got."""
 
-    count = 0
+    def __get__(self, handle: Any, owner: type | None = None) -> Any:
+        value = super().__get__(handle, owner)
+        if handle is None or not isinstance(value, np.ndarray):
+            return value
+        if self.optional and np.isnan(value[0]):
+            return None
+        if handle._taken is not None:
+            handle._taken.watch(handle, self.name, value)
+        return value
+
+    def value_of(self, handle: Any) -> Any:
+        """The same for reading only."""
+        taken, handle._taken = handle._taken, None
+        value = self.__get__(handle)
+        handle._taken = taken
+        return value
 
 
 def optional(**options: Any) -> Any:
@@ -69,11 +84,12 @@ class Joint(Component, abstract=True):
 
     collide_connected
         whether the two bodies may touch
-    breaking_force
-        N, or None: the joint is gone after a step in which its mean force was higher, and joint_broken is sent
+    breaking_force, breaking_torque
+        N, N m, or None: the joint is gone after a step in which its mean force or torque was higher, and joint_broken
+        is sent
     """
 
-    __slots__ = ()
+    __slots__ = ("_contents", "_taken")
     plugin: ClassVar[str] = "joints"
     dimensions: ClassVar[tuple[int, ...]] = (2, 3)  # of its worlds
     fixed: ClassVar[tuple[str, ...]] = ("anchor",)  # where these, a or b are set the joint begins anew
@@ -82,6 +98,7 @@ class Joint(Component, abstract=True):
     b: int | None
     collide_connected: bool = special_column(default=False, dtype=bool, kw_only=True)
     breaking_force: float | None = special_column(default=None, optional=True, positive=True, kw_only=True)
+    breaking_torque: float | None = special_column(default=None, optional=True, positive=True, kw_only=True)
     attached: bool = special_column(default=False, init=False, dtype=bool)
     changed: bool = special_column(default=True, init=False, dtype=bool)  # since the last step: its bodies wake
     at_a: Vector = special_column(default=0.0, init=False, item="vector")  # the anchors, along the axes of each body
@@ -93,14 +110,26 @@ class Joint(Component, abstract=True):
     side_a: Vector = special_column(default=0.0, init=False, item="vector")
     side_b: Vector = special_column(default=0.0, init=False, item="vector")
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        for name, column in list(vars(cls).items()):
+            if isinstance(column, Column) and column.item == "vector" and column.constructor:
+                setattr(cls, name, Watched(**vars(column)))
+        super().__init_subclass__(**options)
+
+    def __new__(cls, *args: Any, **values: Any) -> Self:
+        self = super().__new__(cls)
+        self._contents = self._taken = None  # of the world; the Joints that have rows for it
+        return self
+
     def __init__(self, *args: Any, **values: Any) -> None:
         given = self._named(args, values)
         for name in ("a", "b"):
             if given.get(name, WORLD) is None:
                 given[name] = WORLD
+            elif isinstance(given.get(name), Component):
+                raise TypeError(f"{type(self).__name__}.{name} must be an entity, got its {given[name]}")
         super().__init__(**given)
-        if self.a == self.b:
-            raise ValueError(f"{type(self).__name__} needs two bodies, got {self.a or None} twice")
+        self.check_ends()
         self.check()
 
     @classmethod
@@ -115,25 +144,45 @@ class Joint(Component, abstract=True):
 
     def set_together(self, **values: Any) -> None:
         """Set fields that only fit each other; ValueError, with all as it was, if they do not."""
-        before, version = dict(self._values or {}), self._version
+        held, version, taken = self._values or {}, self._version, self._taken
+        before, ends = {name: held.get(name) for name in values}, not values.keys().isdisjoint(("a", "b"))
+        self._taken = None  # what looks at vectors here does not write into them
         try:
             for name, value in values.items():
                 super().__setattr__(name, WORLD if name in ("a", "b") and value is None else value)
             self.check()
-            if version < -1:  # of a world of so many dimensions
+            whole = all(map(np.isscalar, map(held.get, values)))
+            if version < -1 and not whole:  # of a world of so many dimensions
                 self.fit(-version)
+            if ends:
+                self.check_ends()
+                if self._contents is not None:
+                    self.check_in(self._contents, self._entity)
         except ValueError as error:
-            self._values, self._version = before, version
+            held.update(before)
+            self._version = version
             if str(error).startswith("entity "):
                 raise
             raise ValueError(str(error).replace(type(self).__name__, self._name(), 1)) from None
-        now = self._values or {}
-        if any(name in ("a", "b", *self.fixed) for name in values):
-            self.keep(attached=False)
-        elif all(np.isscalar(value) and np.all(before.get(name) == now[name]) for name, value in values.items()):
+        finally:
+            self._taken = taken
+        self._version = version if whole else self._version
+        if ends or not values.keys().isdisjoint(self.fixed):
+            self.let_go(values.keys())
+        elif whole and all(np.isscalar(before[name]) and before[name] == held[name] for name in values):
             return  # a game may set its motors in each step
-        self.keep(changed=True)
-        Changes.count += 1
+        held["changed"] = True
+        if taken is not None:
+            taken.note(self, values)
+
+    def let_go(self, names: Set[str]) -> None:
+        """These fields were set: the joint takes hold anew."""
+        self.keep(attached=False)
+
+    def check_ends(self) -> None:
+        """ValueError unless a and b are two."""
+        if self.a == self.b:
+            raise ValueError(f"{type(self).__name__} needs two bodies, got {self.a or None} as a and as b")
 
     def _name(self) -> str:
         """For messages."""
@@ -163,6 +212,7 @@ class Joint(Component, abstract=True):
     def check_in(self, contents: Any, entity: int | None, beside: Collection[type[Any]] = ()) -> None:
         """ValueError unless it has two bodies, or one and the world, one of which is dynamic, and an entity of its own.
         """
+        self._contents = contents
         name, dynamic = f"{'' if entity is None else f'entity {entity}: '}{type(self).__name__}", False
         for other in sorted({*beside, *contents.entities.types_of(entity)} - {type(self)}, key=lambda o: o.__name__):
             if issubclass(other, Joint) or getattr(other, "makes_body", False):
@@ -170,19 +220,19 @@ class Joint(Component, abstract=True):
         for body in (self.a, self.b):
             if body == WORLD:
                 continue
-            body = body if body in contents.dead else _whole(contents, body)
+            body = body if body in contents.dead else whole_body(contents, body)
             types = () if body in contents.dead else contents.entities.types_of(body)
             if not any(getattr(kind, "makes_body", False) for kind in types):
                 why = "is no body of this world" if types else "does not exist in this world"
                 raise ValueError(f"{name} joins entity {body}, which {why}")
             dynamic |= RigidBody in types and contents.entities.handle(body, RigidBody).kind == "dynamic"
         if not dynamic:
-            raise ValueError(f"{name} joins no dynamic body")
+            raise ValueError(f"{name} joins no dynamic body: a is {self.a or None}, b is {self.b or None}")
         self.check_apart(contents, entity)
 
     def check_apart(self, contents: Any, entity: int | None) -> None:
         """ValueError if both are parts of one body, or one is a part of the other."""
-        if WORLD not in (self.a, self.b) and _whole(contents, self.a) == (body := _whole(contents, self.b)):
+        if WORLD not in (self.a, self.b) and whole_body(contents, self.a) == (body := whole_body(contents, self.b)):
             name = f"{'' if entity is None else f'entity {entity}: '}{type(self).__name__}"
             raise ValueError(f"{name} joins entity {self.a} and entity {self.b}, which are both of one body, {body}")
 
@@ -205,14 +255,17 @@ class Joint(Component, abstract=True):
 
     def hold(self, a: Place, b: Place, anchor: Any) -> None:
         """Anchors at a point of the world."""
-        at_a, at_b = a.local(anchor), b.local(anchor)
-        for body, at in ((self.a, at_a), (self.b, at_b)):
-            if body != WORLD and np.abs(at).max() > FARTHEST:
-                raise ValueError(
-                    f"entity {self.entity}: {type(self).__name__} holds entity {body} at {at.tolist()} along its axes, "
-                    f"which must be at most {FARTHEST:g} m away"
-                )
-        self.keep(at_a=at_a, at_b=at_b, start=b.angle - a.angle)
+        self.keep(at_a=self.local(a, self.a, anchor), at_b=self.local(b, self.b, anchor), start=b.angle - a.angle)
+
+    def local(self, place: Place, body: int | None, point: Any) -> np.ndarray:
+        """A point of the world, along the axes of a body that stands there; ValueError if it is too far away."""
+        at = place.local(point)
+        if body != WORLD and np.abs(at).max() > FARTHEST:
+            raise ValueError(
+                f"entity {self.entity}: {type(self).__name__} holds entity {body} at {at.tolist()} along its axes, "
+                f"which must be at most {FARTHEST:g} m away"
+            )
+        return at
 
     def hold_axis(self, a: Place, b: Place, axis: Any) -> None:
         """In space, an axis of both."""
@@ -241,7 +294,7 @@ class Joint(Component, abstract=True):
         self._values.update(values)  # type: ignore[union-attr]
 
 
-def _whole(contents: Any, body: Any) -> int:
+def whole_body(contents: Any, body: Any) -> int:
     """The body that an entity is a part of; itself, if it is none."""
     while PartOf in contents.entities.types_of(body):
         body = contents.entities.handle(body, PartOf).body
@@ -266,6 +319,16 @@ class Driven(Joint, abstract=True):
         if limits is not None:
             values["lower"], values["upper"] = self._ends("limits", limits)
         super().__init__(*args, **values)
+
+    @property
+    def limits(self) -> tuple[float | None, float | None] | None:
+        """The least and the most, None where there is no limit."""
+        return None if self.lower is self.upper is None else (self.lower, self.upper)
+
+    @limits.setter
+    def limits(self, value: Any) -> None:
+        lower, upper = (None, None) if value is None else self._ends("limits", value)
+        self.set_together(lower=lower, upper=upper)
 
     def check(self) -> None:
         self.in_order("limits", self.lower, self.upper)

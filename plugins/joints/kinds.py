@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Set
 from typing import Any, ClassVar
 
 import numpy as np
@@ -31,8 +32,9 @@ class Distance(Joint):
 
     a, b
         entities of two bodies; None: the world
-    anchor_a, anchor_b
-        m from the position of each, along its own axes; of the world a place
+    point_a, point_b
+        where it holds each of them, in the world, where the bodies are when the world takes the joint; None: at the
+        position of the body
     length
         m; None: the distance when the world takes the joint. Two numbers, the least and the most: (0, 2) is a rope
     frequency, damping_ratio
@@ -40,18 +42,26 @@ class Distance(Joint):
     """
 
     __slots__ = ()
-    fixed: ClassVar[tuple[str, ...]] = ()
+    fixed: ClassVar[tuple[str, ...]] = ("point_a", "point_b")
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(default=WORLD, dtype=int, minimum=0)
-    anchor_a: Vector = special_column(default=0.0, item="vector", largest=MOST)
-    anchor_b: Vector = special_column(default=0.0, item="vector", largest=MOST)
+    point_a: Vector | None = optional(item="vector", largest=MOST, also=("anchor_a",))
+    point_b: Vector | None = optional(item="vector", largest=MOST, also=("anchor_b",))
     least: float | None = optional(minimum=0.0, largest=MOST)
     most: float | None = optional(minimum=0.0, largest=MOST)
     frequency: float | None = optional(positive=True, largest=MOST)
     damping_ratio: float = special_column(default=0.0, minimum=0.0, largest=MOST, kw_only=True)
+    # whether it has hold of each body where that was taken: what is moved is one of the two
+    held_a: bool = special_column(default=False, init=False, dtype=bool)
+    held_b: bool = special_column(default=False, init=False, dtype=bool)
 
     def __init__(self, *args: Any, length: Any = None, **values: Any) -> None:
+        for name in sorted(values.keys() & {"anchor_a", "anchor_b"}):
+            raise TypeError(
+                f"Distance.{name} was relative to the body, along its axes: give point_{name[-1]}, a place of the "
+                f"world as the anchors of all joints are, where the bodies are when the world takes the joint"
+            )
         if length is not None:
             values["least"], values["most"] = self._ends("length", length) if np.ndim(length) else (length, length)
         super().__init__(*args, **values)
@@ -74,11 +84,22 @@ class Distance(Joint):
         if self.frequency is not None and low < high and (self.least is not None or self.most is not None):
             raise ValueError(f"Distance: a spring has one length, got {self.length!r}")
 
+    def let_go(self, names: Set[str]) -> None:
+        held_a = self.held_a and names.isdisjoint(("a", "point_a"))
+        self.keep(held_a=held_a, held_b=self.held_b and names.isdisjoint(("b", "point_b")))
+        super().let_go(names)
+
     def attach(self, a: Place, b: Place) -> None:
-        self.keep(start=float(np.linalg.norm(b.point(self.anchor_b) - a.point(self.anchor_a))))
+        new = not (self.held_a or self.held_b)
+        if not self.held_a:
+            self.keep(at_a=self.local(a, self.a, a.position if self.point_a is None else self.point_a))
+        if not self.held_b:
+            self.keep(at_b=self.local(b, self.b, b.position if self.point_b is None else self.point_b))
+        if new:
+            self.keep(start=float(np.linalg.norm(b.point(self.at_b) - a.point(self.at_a))))
+        self.keep(held_a=True, held_b=True)
 
     def rows(self, dimensions: int) -> list[Row]:
-        self.keep(at_a=self.anchor_a, at_b=self.anchor_b)
         low, high = self.in_order("length", self.least, self.most)
         if self.least is None and self.most is None:
             low = high = self.start
@@ -319,6 +340,16 @@ class Cone(Joint):
         if twist is not None:
             values["lower"], values["upper"] = self._ends("twist", twist)
         super().__init__(*args, **values)
+
+    @property
+    def twist(self) -> tuple[float | None, float | None] | None:
+        """The least and the most, None where there is no limit."""
+        return None if self.lower is self.upper is None else (self.lower, self.upper)
+
+    @twist.setter
+    def twist(self, value: Any) -> None:
+        lower, upper = (None, None) if value is None else self._ends("twist", value)
+        self.set_together(lower=lower, upper=upper)
 
     def check(self) -> None:
         self.in_order("twist", self.lower, self.upper)

@@ -52,7 +52,7 @@ def build(settings: Settings | None = None, seed: int = 0, *, mass: float = MASS
         Slider(None, trolley, direction=(1.0, 0.0), limits=(0.0, SPAN), motor_speed=0.0, max_force=400.0)
     )
     crate = world.create_entity(Transform((0.0, CRATE)), RigidBody(mass=mass), BoxCollider((CRATE, CRATE)), Spin())
-    rope = world.create_entity(Distance(trolley, crate, anchor_b=(0.0, CRATE), length=(0.0, ROPE + CRATE)))
+    rope = world.create_entity(Distance(trolley, crate, point_b=(0.0, 2 * CRATE), length=(0.0, ROPE + CRATE)))
     world.add_system(Driver(rope, rail))
     return world
 

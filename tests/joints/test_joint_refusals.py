@@ -45,7 +45,7 @@ def test_numbers_that_no_step_can_take_are_refused_with_their_field(number):
     for make, field in (
         (lambda: Distance(1, 2, length=number), "Distance.least"),
         (lambda: Distance(1, 2, length=(0.0, number)), "Distance.most"),
-        (lambda: Distance(1, 2, anchor_b=(0, number)), "Distance.anchor_b"),
+        (lambda: Distance(1, 2, point_b=(0, number)), "Distance.point_b"),
         (lambda: Hinge(1, 2, anchor=(0, number)), "Hinge.anchor"),
         (lambda: Hinge(1, 2, anchor=(0, 0, 0), axis=(0, 0, number)), "Hinge.axis"),
         (lambda: Hinge(1, 2, anchor=(0, 0), limits=(-number, 0.0)), "Hinge.lower"),
@@ -102,23 +102,37 @@ def test_what_no_world_can_have_is_refused_at_the_call(add):
 
 
 @pytest.mark.plain
-def test_what_comes_to_be_wrong_is_told_by_the_step_and_can_be_cured():
+def test_bodies_that_do_not_exist_are_refused_at_the_call_and_what_comes_to_be_wrong_by_the_step():
     world, joints = joint_world(gravity=(0, 0))
     a, b, c = (disc(world, (k, 0)) for k in range(3))
+    wall, floor = (world.create_entity(Transform((0, y)), SphereCollider(0.1)) for y in (5, 6))
     joint = Ball(a, b, anchor=(0.5, 0))
     entity = world.create_entity(joint)
-    joint.b = 99
-    for _ in range(2):
-        with pytest.raises(ValueError, match=rf"entity {entity}: .* 99, which does not exist.*delete_entity"):
-            world.step()
+    wrong = (
+        ({"b": 99}, "99, which does not exist"), ({"b": a}, "needs two bodies"), ({"b": entity}, "no body"),
+        ({"a": None, "b": None}, "two bodies"), ({"a": wall, "b": floor}, "no dynamic body"),
+    )  # fmt: skip
+    for ends, why in wrong:
+        with pytest.raises(ValueError, match=f"Ball.*{why}"):
+            joint.set_together(**ends)
+        assert (joint.a, joint.b) == (a, b)
+    with pytest.raises(TypeError, match=r"Ball\.a must be an entity, got its Transform"):
+        Ball(at(world, a), b, anchor=(0.5, 0))
+    kinds = [world.component_for_entity(body, RigidBody) for body in (a, b)]
+    for kind in ("static", "dynamic"):
+        for body in kinds:
+            body.kind = kind
+        if kind == "static":
+            with pytest.raises(ValueError, match=rf"entity {entity}: Ball joins no dynamic body.*delete_entity"):
+                world.step()
     joint.b, joint.anchor = c, (0.5, 1e9)
     with pytest.raises(ValueError, match=rf"entity {entity}: Ball holds entity {a} at .* at most 1e\+08 m away"):
         world.step()
     joint.anchor = (0.5, 0)
     world.step()
     assert joints.of(c) == [entity]
-    joint.b = 99
     world.delete_entity(entity)
+    assert len(joints) == 0
     world.step()
     assert len(joints) == 0
 
@@ -226,10 +240,10 @@ def test_ends_that_do_not_fit_the_world_are_refused_at_the_call():
     rope = world.create_entity(Distance(disc(world, (0, 0)), disc(world, (2, 0))))
     world.step()
     joint = world.component_for_entity(rope, Distance)
-    joint.anchor_b = (0.5, 0.5)
+    joint.point_b = (2.5, 0.5)
     world.step()
     assert joints.state(rope).value == pytest.approx(math.hypot(2.5, 0.5), abs=0.5)
-    with pytest.raises(ValueError, match=r"Distance\.anchor_b must have 2 components"):
-        joint.anchor_b = (0, 0, 1)
-    assert np.array_equal(joint.anchor_b, (0.5, 0.5))
+    with pytest.raises(ValueError, match=r"Distance\.point_b must have 2 components"):
+        joint.point_b = (0, 0, 1)
+    assert np.array_equal(joint.point_b, (2.5, 0.5))
     world.step()

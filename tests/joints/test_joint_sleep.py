@@ -20,7 +20,7 @@ def test_joined_bodies_sleep_and_wake_together():
     for a, b in itertools.pairwise(bodies):
         world.create_entity(Distance(a, b))
     for body in bodies:
-        world.create_entity(Distance(None, body, anchor_a=(at(world, body).x, 2.0)))
+        world.create_entity(Distance(None, body, point_a=(at(world, body).x, 2.0)))
     run(world, 300)
     asleep = [world.component_for_entity(body, RigidBody).asleep for body in bodies]
     assert all(asleep)
@@ -36,7 +36,7 @@ def hanging(world):
     """A disc on a rope above a ball that holds it, asleep; and its rope."""
     body = disc(world, (0.0, 0.0), 0.3)
     world.create_entity(Transform((0, -10.3)), SphereCollider(10.0))
-    rope = world.create_entity(Distance(None, body, anchor_a=(0.0, 2.0), length=(0.0, 2.1)))
+    rope = world.create_entity(Distance(None, body, point_a=(0.0, 2.0), length=(0.0, 2.1)))
     run(world, 200)
     assert world.component_for_entity(body, RigidBody).asleep
     return body, rope

@@ -54,7 +54,7 @@ def test_joints_of_deleted_bodies_are_lost():
 def test_joint_breaks_at_its_force():
     world, joints = joint_world()
     for x, most in enumerate((1.2 * G, 0.9 * G)):
-        world.create_entity(Distance(None, disc(world, (x, -1)), anchor_a=(x, 0), breaking_force=most))
+        world.create_entity(Distance(None, disc(world, (x, -1)), point_a=(x, 0), breaking_force=most))
     broken = []
     world.on("joint_broken", lambda entity, joint: broken.append((joint.breaking_force, world.step_count)))
     run(world, 30)
@@ -296,7 +296,7 @@ def test_columns_have_values_and_the_speeds_at_which_these_change(d):
     made = []
     for first in (body, lambda x: None):
         made += [
-            Distance(first(0), body(1), anchor_b=x, length=(0.0, 9.0)), Hinge(first(0), body(1), anchor=x, **axis),
+            Distance(first(0), body(1), point_b=x, length=(0.0, 9.0)), Hinge(first(0), body(1), anchor=x, **axis),
             Slider(first(0), body(1), direction=side), Weld(first(0), body(1), anchor=x),
             Ball(first(0), body(1), anchor=x), Motor(first(0) or body(2), body(1), speed=1.0, max_torque=0.1, **axis),
         ]  # fmt: skip

@@ -143,7 +143,7 @@ def test_springs_without_damping_give_no_energy(springs, frequency):
     body = disc(world, (0.1, 0.05))
     for angle in 2.0 * math.pi * np.arange(springs) / springs:
         end = math.cos(angle), math.sin(angle)
-        world.create_entity(Distance(None, body, anchor_a=end, length=1.0, frequency=frequency))
+        world.create_entity(Distance(None, body, point_a=end, length=1.0, frequency=frequency))
     energies = []
     for _ in range(1200):
         world.step()
@@ -241,7 +241,7 @@ def test_springs_of_any_stiffness_gain_no_energy_in_a_chain(frequency, damping_r
     spring = {"length": 1.0, "frequency": frequency, "damping_ratio": damping_ratio}
     for a, b in itertools.pairwise([None, *bodies]):
         world.create_entity(Distance(a, b, **spring))
-    last = world.create_entity(Distance(bodies[-1], None, anchor_b=(21.0, 0.0), **spring))
+    last = world.create_entity(Distance(bodies[-1], None, point_b=(21.0, 0.0), **spring))
     before = world.kinetic_energy()
     for _ in range(300):
         world.step()

@@ -100,7 +100,12 @@ def test_rod_as_a_function_moves_as_the_built_in_one(dimensions):
         world.component_for_entity(a, RigidBody).linear_velocity = (0, 3, 1)[:dimensions]
         world.component_for_entity(a, Spin).angular_velocity = 2.0 if dimensions == 2 else np.array((1.0, 2.0, 3.0))
         for one, other, ends in ((a, b, ((0.1, 0, 0.3), (0, 0.2, 0.1))), (None, a, ((0, 2, 1), (0.0, 0.1, -0.2)))):
-            world.create_entity(kind(one, other, *(end[:dimensions] for end in ends)))
+            ends = [np.array(end[:dimensions]) for end in ends]
+            if kind is Distance:
+                point_a = ends[0] + (at(world, one).position if one else 0.0)
+                world.create_entity(Distance(one, other, point_a=point_a, point_b=at(world, other).position + ends[1]))
+            else:
+                world.create_entity(Rod(one, other, *ends))
         run(world, 120)
         places.append([np.hstack((at(world, each).position, at(world, each).rotation)) for each in (a, b)])
     np.testing.assert_allclose(places[0], places[1], atol=1e-9)
@@ -177,7 +182,7 @@ def build():
     pulley = world.create_entity(Pulley(a, b, (0, 0), (2, 0), anchor_a=(0.1, 0.1)))
     gear = world.create_entity(Gear(a, b, 0.7))
     world.component_for_entity(a, Spin).angular_velocity = 5.0
-    world.create_entity(Distance(None, b, anchor_a=(2.5, 0)))
+    world.create_entity(Distance(None, b, point_a=(2.5, 0)))
     return world, joints, (pulley, gear, *hinges)
 
 
@@ -218,7 +223,7 @@ def test_step_that_fails_while_balls_bounce_on_a_body_leaves_the_directions_of_f
         board = plank(world, (0.3, -1))
         for (x, y), end in (((0.0, 0.0), (-0.4, 0.0)), ((1.0, 0.2), (0.4, 0.0))):
             if kind is Distance:
-                world.create_entity(Distance(None, board, (x, y), end))
+                world.create_entity(Distance(None, board, point_a=(x, y), point_b=(0.3 + end[0], -1.0)))
             else:
                 world.create_entity(Pulley(None, board, (0, -1), (x, y), anchor_b=end))
         for k in range(3):

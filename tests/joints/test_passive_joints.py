@@ -20,10 +20,10 @@ def random_joint(random: np.random.Generator, d: int, a: tuple[Any, Any], b: tup
     ends, middle = (a[0], b[0]), 0.5 * (a[1] + b[1])
     axis = {"axis": random.normal(size=3)} if d == 3 else {}
     limits = (-0.5, 0.5) if random.random() < 0.5 else None
-    place, length = (a[1] if a[0] is None else np.zeros(d)), float(np.linalg.norm(b[1] - a[1]))
+    length = float(np.linalg.norm(b[1] - a[1]))
     kinds = [
-        lambda: Distance(*ends, anchor_a=place),
-        lambda: Distance(*ends, anchor_a=place, length=(0.0, length)),
+        lambda: Distance(*ends, point_a=a[1]),
+        lambda: Distance(*ends, point_a=a[1], length=(0.0, length)),
         lambda: Hinge(*ends, anchor=middle, limits=limits, **axis),
         lambda: Ball(*ends, anchor=middle),
         lambda: Weld(*ends, anchor=middle),

@@ -346,7 +346,7 @@ def test_ropes_and_parts_in_space_are_drawn_and_the_ground_ends_with_the_view():
     with World(Physics(dimensions=3, gravity=(0.0, 0.0, 0.0)), Rotation(), *plugins) as world:
         world.create_entity(Transform((0, -4, 0)), HalfSpaceCollider((0, 1, 0)))
         ball = world.create_entity(Transform((2, 1, 3)), RigidBody(), SphereCollider(0.5))
-        world.create_entity(Distance(None, ball, anchor_a=(0, 6, 0)))
+        world.create_entity(Distance(None, ball, point_a=(0, 6, 0)))
         holder = world.create_entity(Transform(5 * UP, rotation=facing(np.pi / 3)), RigidBody(kind="kinematic"))
         world.create_entity(PartOf(holder, (4, 0, 0)), BoxCollider((0.4, 0.4, 0.4)))
         sheet, projection = final_sheet(world, 1, LOWER, UPPER)
