@@ -271,9 +271,9 @@ class Joints(Plugin):
             if entity < last:
                 self._joints = dict(sorted(self._joints.items()))
         if other and any(TURN <= row.kind < GIVEN and row.rule != HOLD for row in rows) and not self._turns(joint):
-            names = ", ".join(f"entity {body}" for body in (joint.a, joint.b) if body != WORLD)
+            name, ends = type(joint).__name__, ", ".join(f"entity {e}" for e in (joint.a, joint.b) if e != WORLD)
             self.world.report_fault(
-                f"entity {entity}: this {type(joint).__name__} turns nothing, for it joins bodies without Spin: {names}",
+                f"entity {entity}: this {name} turns nothing, for it joins bodies without Spin: {ends}",
                 kind="a joint turns nothing", entity=entity,
             )  # fmt: skip
         return bodies
