@@ -166,6 +166,8 @@ class Scene:
         bodies, capacity = self.state.bodies, self.table.capacity
         kept = [*(getattr(bodies, name) for name in KEPT_COLUMNS), *self.rotated_columns.values()]
         kept = [column for column in kept if len(column)]  # without colliders there is the first alone
+        if len(self._axes) == capacity:  # else they are made again, see refresh_rotation
+            kept += [self._axes, bodies.axes_rotation.reshape(capacity, -1)]
         self._keeps = bool(kept) and not self._several and all(len(column) == capacity for column in kept)
         if self._keeps:
             self._moved.bind(kept, [ARRIVED, *[None] * (len(kept) - 1)])
@@ -336,25 +338,30 @@ class Scene:
     # -- what changes from step to step -----------------------------------------------------------
 
     def refresh_rotation(self) -> None:
-        """Axes of the bodies where something needs them; the shapes' parameters as they are in the world then."""
+        """Axes of the bodies where something needs them, of those alone that are turned as they were not before; the
+        shapes' parameters as they are in the world then."""
         if self.linked is None:
             return
         table, bodies = self.table, self.state.bodies
         rotation = self._sound_rotation()
-        before, self.rotated = self.rotated, any_rotated(rotation) or self.spins()
+        before, self.rotated = self.rotated, self.spins() or any_rotated(rotation)
         self.state.rotated, self.state.rotation_stale = self.rotated, False
         count, needed = table.count, self.rotated or self.linked.needs_axes
         fresh = needed and len(self._axes) != table.capacity
         if fresh:
             self._axes = np.zeros((table.capacity, self.state.dimensions, self.state.dimensions))
+            self._columns_made += 1
             bodies.axes = self._axes.reshape(-1)
             bodies.axes_rotation = np.full(table.capacity * (1 if self.state.dimensions == 2 else 4), np.nan)
         if fresh or self.rotated != before:
             self._bind_shapes()
             self.state.statics_version += 1
         if needed:
-            self._axes[:count] = axes_of(rotation, self.state.dimensions)
-            bodies.axes_rotation[: rotation.size] = rotation.reshape(-1)
+            known = bodies.axes_rotation[: rotation.size].reshape(rotation.shape)
+            old = rotation != known
+            rows = (old if old.ndim == 1 else old.any(axis=1)).nonzero()[0]
+            self._axes[rows] = axes_of(rotation[rows], self.state.dimensions)
+            known[rows] = rotation[rows]
         if self.state.several_levels:  # a box that is stretched may reach out of the level around it
             turned = rotation != 0.0 if self.state.dimensions == 2 else rotation[:, 1:].any(axis=1)
             bodies.level_not_enclosing[:count] = self.stretches & turned

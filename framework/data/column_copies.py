@@ -45,7 +45,8 @@ class ColumnCopies:
         self._blocks = make_record(BLOCKS, 2)
         self._pairs: list[tuple[np.ndarray, np.ndarray]] = []  # copy and column
         self._buffers: dict[str, np.ndarray] = {}
-        self._made_of: Any = None
+        self._columns_version = -1  # of the table, when these were made
+        self._row_bytes, self._count = np.empty(0, np.int64), -1  # of the columns; the rows that are copied
         self._unmade: list[str] = []  # columns on demand that had no memory
         self.kept = False
 
@@ -56,19 +57,24 @@ class ColumnCopies:
 
     def bind(self) -> None:
         """Follow which rows and columns there are."""
-        table = self._table
-        made_of = (table.version, table.members_version, len(table.arrays))
-        if made_of != self._made_of:
-            self._made_of = made_of
-            if self._keys is None:
-                keys = [key for key in table.arrays if key != "entity" and not key.startswith("has:")]
-                self._unmade = table.unmade()
-            else:
-                keys = list(self._keys)
-            self._pairs = [(self._buffer(key), table.column(key)) for key in keys]
-            self._blocks.sources = np.array([column.ctypes.data for _, column in self._pairs], np.int64)
-            self._blocks.targets = np.array([copy.ctypes.data for copy, _ in self._pairs], np.int64)
-            self._blocks.sizes = np.array([column.nbytes for _, column in self._pairs], np.int64)
+        table, count = self._table, self._table.count
+        if table.columns_version != self._columns_version:
+            self._columns_version = table.columns_version
+            self._bind_columns()
+        elif count == self._count:
+            return
+        self._count, self._blocks.sizes = count, self._row_bytes * count
+
+    def _bind_columns(self) -> None:
+        arrays = self._table.arrays
+        keys = self._keys
+        if keys is None:
+            keys = tuple(key for key in arrays if key != "entity" and not key.startswith("has:"))
+            self._unmade = self._table.unmade()
+        self._pairs = [(self._buffer(key), arrays[key]) for key in keys]
+        self._blocks.sources = np.array([column.ctypes.data for _, column in self._pairs], np.int64)
+        self._blocks.targets = np.array([copy.ctypes.data for copy, _ in self._pairs], np.int64)
+        self._row_bytes = np.array([column[:1].nbytes for _, column in self._pairs], np.int64)
 
     def keep(self) -> None:
         """Copy the columns."""
@@ -79,7 +85,7 @@ class ColumnCopies:
     def put_back(self) -> None:
         """Write the copies into the columns."""
         for copy, column in self._pairs:
-            column[...] = copy
+            column[: self._count] = copy[: self._count]
         self._table.reset(self._unmade)
 
     def sizes(self) -> list[tuple[str, np.ndarray]]:
@@ -90,4 +96,4 @@ class ColumnCopies:
         array, buffer = self._table.arrays[key], self._buffers.get(key)
         if buffer is None or buffer.shape != array.shape:
             buffer = self._buffers[key] = np.empty_like(array)
-        return buffer[: self._table.count]
+        return buffer

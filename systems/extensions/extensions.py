@@ -46,7 +46,9 @@ class Extensions:
         self._state, self._scene, self._table = state, scene, scene.table
         self._adoption, self._registry = adoption, registry
         self.stages: tuple[PluginStage, ...] = ()
+        self._about: list[tuple[type[Component], ...]] = []  # the components of each
         self.written = ColumnCopies(self._table, ())
+        self._bound: Any = None  # the stages, and what columns there were, when these were bound
         self._own: dict[PluginStage, Record] = {}  # what each of them gets
         # Of plugins' own; these are shared.
         self._records: dict[Schema, Record] = {JOINTS: state.solver.joints, PARTS: state.parts}
@@ -68,14 +70,17 @@ class Extensions:
         if changed:
             self._take(stages, program)
         if stages:
-            self._bind(program)
+            if self._bound != (stages, self._table.columns_version):
+                self._bind(program)
+                self._bound = stages, self._table.columns_version  # of those that it has made, too
+            self.written.bind()
         return changed
 
     def _take(self, stages: tuple[PluginStage, ...], program: Program) -> None:
         dimensions = self._state.dimensions
         self._adoption.register(dict.fromkeys(component for stage in stages for component in stage.components))
         program.take(tuple(placed(stages, dimensions)))
-        self.stages = stages
+        self.stages, self._about = stages, [stage.components for stage in stages]
         self._own = {stage: make_record(own_schema(stage, dimensions), dimensions) for stage in stages}
         reads, writes = ({name for stage in stages for name in getattr(stage, what)} for what in ("reads", "writes"))
         kept = {name for name in writes if name in OF_TABLE or self._table.has_column(name)}.difference(MADE_AGAIN)
@@ -98,7 +103,6 @@ class Extensions:
                     setattr(own, name, self.record(source))
                 else:
                     self._show(source, getattr(own, name))
-        self.written.bind()
         addresses[program.index["keep_written"]] = self.written.address
         self._state.extensions = addresses
 
@@ -125,12 +129,11 @@ class Extensions:
 
     def present(self) -> tuple[bool, ...]:
         """Of each stage, whether some body has all components that it is about."""
-        table = self._table
-        return tuple(
-            bool(np.logical_and.reduce([table.has_mask(each)[: table.count] for each in stage.components]).any())
-            if stage.components else True
-            for stage in self.stages
-        )  # fmt: skip
+        table, found = self._table, {}
+        for components in dict.fromkeys(self._about):
+            masks = [table.has_mask(each)[: table.count] for each in components]
+            found[components] = not masks or bool(np.logical_and.reduce(masks).any())
+        return tuple(found[components] for components in self._about)
 
     def conditions(self, met: dict[str, bool]) -> dict[str, bool]:
         """Which of the stages are needed, by name, where these conditions are met."""

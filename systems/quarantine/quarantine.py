@@ -94,7 +94,7 @@ class Quarantine:
             self._generation = self._table.generation
             self.told.clear()
             self._far.clear()
-        if self.told or len(self._state.bodies.quarantined):
+        if self.told or self._state.bodies.quarantined.any():
             told = np.isin(self._table.column("entity"), list(self.told))  # also those that no column shows
             self._scene.take_out(self._find_bad() | told)
 
