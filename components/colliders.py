@@ -27,6 +27,7 @@ class MaterialFields(TypedDict, total=False):
     sensor: bool
     layer: int
     mask: int
+    group: int
 
 
 class ColliderFields(MaterialFields, total=False):
@@ -48,6 +49,8 @@ class Collider(Component, abstract=True):
         reports contacts and does not react to them
     layer, mask
         two colliders meet if each one's layer has a bit in the other's mask
+    group
+        colliders of the same group, a whole number other than 0, never meet
     """
 
     __slots__ = ()
@@ -55,7 +58,7 @@ class Collider(Component, abstract=True):
     makes_body: ClassVar[bool] = True
     _largest: ClassVar[float] = LONGEST
     stack: ClassVar[str] = "collider"
-    stacked_columns: ClassVar[tuple[str, ...]] = ("offset", "restitution", "friction", "sensor", "layer", "mask")
+    stacked_columns: ClassVar[tuple[str, ...]] = ("offset", "restitution", "friction", "sensor", "layer", "mask", "group")
 
     offset: VectorField = special_column(default=0.0, item="vector", kw_only=True, on_demand=True, also=("centre",))
     restitution: float = special_column(
@@ -64,10 +67,13 @@ class Collider(Component, abstract=True):
     friction: float | None = special_column(default=None, optional=True, minimum=0.0, kw_only=True, on_demand=True)
     sensor: bool = special_column(default=False, dtype=bool, kw_only=True, on_demand=True, also=("trigger",))
     layer: int = special_column(
-        default=1, dtype=int, kw_only=True, on_demand=True, also=("category", "group"),
+        default=1, dtype=int, kw_only=True, on_demand=True, also=("category",),
         nonzero="in no layer it meets nothing; mask=0 says so",
     )  # fmt: skip
     mask: int = special_column(default=ALL_LAYERS, dtype=int, kw_only=True, on_demand=True, also=("collides_with",))
+    group: int = special_column(
+        default=0, dtype=int, kw_only=True, on_demand=True, also=("group_index", "collision_group")
+    )
 
     rotates: ClassVar[bool] = False  # True if its functions need the body's axes in the world, as ``shape.axes``
     dimensions: ClassVar[tuple[int, ...]] = (2, 3)  # dimensions of the worlds that support it

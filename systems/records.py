@@ -187,6 +187,7 @@ COLLIDERS = Schema(
     sensor=flags(stacked=True, default=default_of(Collider.sensor)),
     layer=ints(stacked=True, default=default_of(Collider.layer)),
     mask=ints(stacked=True, default=default_of(Collider.mask)),
+    group=ints(stacked=True, default=default_of(Collider.group)),
 )
 
 # Linked functions and parameters of the scene's shapes, cheapest first; a pair is at first * count + second, where

@@ -74,6 +74,7 @@ CAUSES = {  # what wakes the tower of these boxes
     "grown": lambda world, boxes: setattr(part(world, boxes[1], AABBCollider), "half_extents", (0.6, 0.6)),
     "heavier": lambda world, boxes: write(world, boxes[2], "mass", lambda _: 5.0),
     "other layer": lambda world, boxes: setattr(part(world, boxes[0], AABBCollider), "layer", 4),
+    "one group": lambda world, boxes: [setattr(part(world, box, AABBCollider), "group", 3) for box in boxes],
     "sensor": lambda world, boxes: setattr(part(world, boxes[1], AABBCollider), "sensor", True),
     "lighter": lambda world, boxes: setattr(part(world, boxes[1], RigidBody), "gravity_scale", 0.5),
     "gravity": lambda world, boxes: setattr(world, "gravity", (0.0, -5.0)),

@@ -92,7 +92,9 @@ class Game(World):
 def colliders() -> list[Component]:
     """Constructor arguments are those of the columns; the last ones are wrong."""
     made: list[Component] = [
-        SphereCollider(0.5, restitution=0.9, friction=None, offset=(0.0, 1.0), sensor=False, layer=2, mask=ALL_LAYERS),
+        SphereCollider(
+            0.5, restitution=0.9, friction=None, offset=(0.0, 1.0), sensor=False, layer=2, mask=ALL_LAYERS, group=1
+        ),
         SphereCollider(radius=np.float64(0.5)),
         AABBCollider((0.5, 1.0)),
         AABBCollider(np.ones(2), offset=0.5),

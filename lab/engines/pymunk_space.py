@@ -38,7 +38,7 @@ class Bodies(NamedTuple):
 
     ``shaped (n,)`` false without a collider; ``corners``: of each collider (m, 2), about the body's position and along
     its axes, a disc has one; ``rounding (n,)``: how far it goes beyond these; ``restitution`` and ``friction (n,)``,
-    NaN: the other body's; ``moment (n,)``: infinite for what does not spin; ``layer`` and ``mask (n,)``.
+    NaN: the other body's; ``moment (n,)``: infinite for what does not spin; ``layer``, ``mask`` and ``group (n,)``.
     """
 
     corners: list[Floats]
@@ -54,6 +54,7 @@ class Bodies(NamedTuple):
     friction: Floats
     layer: np.ndarray
     mask: np.ndarray
+    group: np.ndarray
 
 
 def moving_and_fixed(world: World) -> tuple[Bodies, Bodies, Bodies]:
@@ -70,7 +71,7 @@ def _plain(world: World, bodies: Any) -> Bodies:
     count, angle, moves = len(bodies), np.array(bodies.rotation), np.isin(bodies.entity, world.bodies.dynamic.entity)
     friction, restitution, rounding = np.full(count, np.nan), np.zeros(count), np.zeros(count)
     corners, shaped = [np.zeros((1, 2))] * count, np.zeros(count, bool)
-    layer, mask = np.ones(count, np.int64), np.ones(count, np.int64)
+    layer, mask, group = np.ones(count, np.int64), np.ones(count, np.int64), np.zeros(count, np.int64)
     for collider in (SphereCollider, AABBCollider, *OUTLINES):
         has = np.asarray(bodies.has(collider), bool)
         if not has.any():
@@ -78,7 +79,8 @@ def _plain(world: World, bodies: Any) -> Bodies:
         columns = getattr(bodies, collider.prefix[:-1])
         _refuse("bodies with two colliders", shaped & has)
         _refuse("sensors", columns.sensor[has])
-        layer[has], mask[has] = columns.layer[has] & ALL_LAYERS, columns.mask[has] & ALL_LAYERS
+        for filters, values in ((layer, columns.layer), (mask, columns.mask), (group, columns.group)):
+            filters[has] = values[has] & ALL_LAYERS
         _refuse("turned boxes", (collider is AABBCollider) * angle[has])
         shaped |= has
         friction[has], restitution[has] = columns.friction[has], columns.restitution[has]
@@ -99,7 +101,7 @@ def _plain(world: World, bodies: Any) -> Bodies:
     order = np.argsort(bodies.entity, kind="stable")
     position, velocity, mass = np.array(bodies.position), np.array(bodies.linear_velocity), np.array(bodies.mass)
     kept: tuple[Any, ...] = position, velocity, angle, spin, mass, moment, shaped, rounding, restitution, friction
-    kept = *kept, layer, mask
+    kept = *kept, layer, mask, group
     return Bodies([corners[k] for k in order], *(column[order] for column in kept))
 
 
@@ -159,7 +161,7 @@ class PymunkSpace:
             for k in np.flatnonzero(rows.shaped).tolist():
                 shape = _shape(pymunk, bodies[k], rows.corners[k].tolist(), float(rows.rounding[k]))
                 shape.elasticity, shape.friction = restitution, float(friction[k])
-                shape.filter = pymunk.ShapeFilter(categories=int(rows.layer[k]), mask=int(rows.mask[k]))
+                shape.filter = pymunk.ShapeFilter(int(rows.group[k]), int(rows.layer[k]), int(rows.mask[k]))
                 self.space.add(shape)
         self._join(pymunk, world)
         if index == "hash":

@@ -182,8 +182,8 @@ def first_passage(world: World) -> Passage | None:
     """The pair of bodies that may tunnel at the shortest step, if collisions are discrete.
 
     They overlap over a path as long as the sum of their smallest extents; the speed at which they may meet is the sum
-    of both speeds. Excluded: sensors, bodies with ``ccd``, pairs whose layers do not meet or of which none is dynamic.
-    A tile map counts as one body. None if no pair is left, or nothing moves.
+    of both speeds. Excluded: sensors, bodies with ``ccd``, pairs that never meet by their layers or groups, or
+    of which none is dynamic. A tile map counts as one body. None if no pair is left, or nothing moves.
     """
     bodies, services = world.bodies, world.physics
     size, solid, group = _sizes(services)
@@ -195,12 +195,12 @@ def first_passage(world: World) -> Passage | None:
         return None
     dynamic = np.arange(len(bodies)) < bodies.dynamic.rows.stop
     layers = np.unique(np.column_stack((group, dynamic))[solid], axis=0)
-    members = [np.flatnonzero(solid & (group == g[:2]).all(axis=1) & (dynamic == g[2])) for g in layers]
+    members = [np.flatnonzero(solid & (group == g[:3]).all(axis=1) & (dynamic == g[3])) for g in layers]
     pairs = [
         (i, j)
         for i, one in enumerate(layers)
         for j, other in enumerate(layers[: i + 1])
-        if (one[2] or other[2]) and one[0] & other[1] and other[0] & one[1]
+        if (one[3] or other[3]) and one[0] & other[1] and other[0] & one[1] and not one[2] == other[2] != 0
     ]
     best: tuple[float, int, int] | None = None
     limit = 4 * float(size[solid].max()) / float(speed[solid].max())  # more than any
@@ -229,11 +229,11 @@ def first_passage(world: World) -> Passage | None:
 
 
 def _sizes(services: Any) -> tuple[Any, Any, Any]:
-    """Of every row: its smallest extent (m; inf if unbounded), whether it is solid, and (layer, mask)."""
+    """Of every row: its smallest extent (m; inf if unbounded), whether it is solid, and (layer, mask, group)."""
     table = services.table
     count = table.count
     services.refresh_for_queries()
-    size, solid, group = np.zeros(count), np.zeros(count, bool), np.zeros((count, 2), np.int64)
+    size, solid, group = np.zeros(count), np.zeros(count, bool), np.zeros((count, 3), np.int64)
     if services.scene.linked is None:
         return size, solid, group
     services.scene.refresh_rotation()
@@ -242,9 +242,9 @@ def _sizes(services: Any) -> tuple[Any, Any, Any]:
     services.queries.forget()
     bodies, rows = services.state.bodies, np.arange(count)
     slot = bodies.collider_slot[:count]
-    sensor, layer, mask = (table.stack(f"{Collider.stack}.{name}")[slot, rows] for name in ("sensor", "layer", "mask"))
+    names = "sensor", "layer", "mask", "group"
+    sensor, *filters = (table.stack(f"{Collider.stack}.{name}")[slot, rows] for name in names)
     endless = np.isinf(bodies.upper[:count] - bodies.lower[:count]).all(axis=1)
     size = np.where(endless, np.inf, bodies.min_extent[:count])
     solid = (services.scene.levels[0, :count] >= 0) & ~sensor
-    group = np.column_stack((layer, mask))
-    return size, solid, group
+    return size, solid, np.column_stack(filters)

@@ -34,7 +34,7 @@ def create_chain(
     thickness
         m, how far behind the line the centres of bodies may be that are still pushed out to the front
     material
-        friction, restitution, sensor, layer and mask, of all segments
+        friction, restitution, sensor, layer, mask and group, of all segments
     """
     if world.dimensions != 2:
         raise ValueError(f"create_chain: a chain is for 2D worlds, this world is {world.dimensions}D")

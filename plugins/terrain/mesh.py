@@ -34,7 +34,7 @@ def create_triangle_mesh(
     thickness
         m, how far behind a triangle the centres of bodies may be that are still pushed out to its front
     material
-        friction, restitution, sensor, layer and mask, of all triangles
+        friction, restitution, sensor, layer, mask and group, of all triangles
     """
     if world.dimensions != 3:
         raise ValueError(f"create_triangle_mesh: a mesh is for 3D worlds, this world is {world.dimensions}D")

@@ -74,8 +74,8 @@ class BroadPhase(StagedSystem):
             "bodies sleep",
         ),
         Stage(
-            leave_out_joined, "pairs that a joint keeps from touching", ("candidates", "layer", "mask"),
-            ("candidates",), "joints",
+            leave_out_joined, "pairs that a joint keeps from touching",
+            ("candidates", "layer", "mask", "group"), ("candidates",), "joints",
         ),
         Stage(leave_out_parts, "pairs of parts of one body", ("candidates",), ("candidates",), "parts"),
     )  # fmt: skip

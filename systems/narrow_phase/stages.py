@@ -115,21 +115,22 @@ def sort_few(state):
 
 @part
 def all_layers_meet(state):
-    """Whether no layer or mask keeps any two bodies apart (usual, and then no pair need be asked)."""
-    layer, mask = state.colliders.layer, state.colliders.mask
+    """Whether no layer, mask or group keeps any two bodies apart (usual, and then no pair need be asked)."""
+    layer, mask, group = state.colliders.layer, state.colliders.mask, state.colliders.group
     apart = False
-    for slot in range(state.slot_count if len(layer) > 0 or len(mask) > 0 else 0):
+    for slot in range(state.slot_count if len(layer) > 0 or len(mask) > 0 or len(group) > 0 else 0):
         for i in range(state.count):
-            apart |= mask[slot, i] != -1 or layer[slot, i] == 0
+            apart |= mask[slot, i] != -1 or layer[slot, i] == 0 or group[slot, i] != 0
     return not apart
 
 
 @inlined
 def layers_meet(state, a, b):
-    """Whether each one's layer is in the other's mask."""
+    """Whether each one's layer is in the other's mask, and they are not of one group."""
     colliders, slot = state.colliders, state.bodies.collider_slot
-    layer, mask = colliders.layer, colliders.mask
-    return layer[slot[a], a] & mask[slot[b], b] != 0 and layer[slot[b], b] & mask[slot[a], a] != 0
+    layer, mask, group = colliders.layer, colliders.mask, colliders.group
+    accepted = layer[slot[a], a] & mask[slot[b], b] != 0 and layer[slot[b], b] & mask[slot[a], a] != 0
+    return accepted and (group[slot[a], a] == 0 or group[slot[a], a] != group[slot[b], b])
 
 
 @inlined
@@ -174,7 +175,7 @@ def find_fast_turns(state):
 
 
 def select_pairs(state, dt):
-    """The candidates whose layers meet become pairs; they are counted by the shapes of the two bodies."""
+    """The candidates whose layers and groups let them meet become pairs, counted by the shapes of the two bodies."""
     candidates, pairs, bodies, shapes = state.candidates, state.pairs, state.bodies, state.shapes
     if candidates.count > len(pairs.a):
         state.needed = candidates.count

@@ -30,7 +30,9 @@ class NarrowPhase(StagedSystem):
             order_candidates, "canonical order of the candidates, by entity id", ("candidates",), ("candidates",),
             "colliders",
         ),
-        Stage(select_pairs, "layers and masks", ("candidates", "layer", "mask"), ("pairs",), "colliders"),
+        Stage(
+            select_pairs, "layers, masks and groups", ("candidates", "layer", "mask", "group"), ("pairs",), "colliders",
+        ),
         Stage(
             weigh_sleepers, "what forces would do to sleepers", ("still", "flown_velocity"), ("force_speed_change",),
             "sleeping", "bodies sleep",

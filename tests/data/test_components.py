@@ -129,7 +129,7 @@ def test_the_kinds_are_contiguous_slices():
 def test_unbound_components_hold_what_they_were_given():
     transform = Transform((1, 2), rotation=0.5)
     body = RigidBody(2, (3, 4), constant_force=(0, -1), gravity_scale=0, linear_damping=0.1, kind="kinematic")
-    sphere = SphereCollider(0.5, offset=(0.1, 0), restitution=0.8, friction=0.3, sensor=True, layer=2, mask=6)
+    sphere = SphereCollider(0.5, offset=(0.1, 0), restitution=0.8, friction=0.3, sensor=True, layer=2, mask=6, group=-3)
     assert transform.position.tolist() == [1.0, 2.0]
     assert (transform.x, transform.y, transform.rotation, transform.entity) == (1.0, 2.0, 0.5, None)
     with pytest.raises(IndexError):
@@ -137,7 +137,8 @@ def test_unbound_components_hold_what_they_were_given():
     assert (body.mass, body.gravity_scale, body.linear_damping, body.kind) == (2.0, 0.0, 0.1, "kinematic")
     assert (body.linear_velocity.tolist(), body.max_linear_speed) == ([3.0, 4.0], None)
     assert (sphere.radius, sphere.restitution, sphere.friction, sphere.sensor) == (0.5, 0.8, 0.3, True)
-    assert (sphere.layer, sphere.mask, SphereCollider(1).mask) == (2, 6, -1)
+    assert (sphere.layer, sphere.mask, sphere.group) == (2, 6, -3)
+    assert (SphereCollider(1).mask, SphereCollider(1).group) == (-1, 0)
     assert SphereCollider(1).friction is None
     transform.y = 7
     body.mass = 3.5

@@ -32,6 +32,7 @@ WRONG = [
     (lambda v: SphereCollider(1, sensor=v), "SphereCollider.sensor", [1, 0, "yes", None]),
     (lambda v: SphereCollider(1, layer=v), "SphereCollider.layer", [1.0, True, "1", 2**63, None]),
     (lambda v: SphereCollider(1, mask=v), "SphereCollider.mask", [0.5, 2**64 - 1]),
+    (lambda v: SphereCollider(1, group=v), "SphereCollider.group", [0.5, "doll", None, True, 2**63]),
     (lambda v: AABBCollider(v), "AABBCollider.half_extents", [(1, -1), (NAN, 1), (1, 2, 3, 4), -1.0, "big"]),
     (lambda v: AABBCollider(1, offset=v), "AABBCollider.offset", [(INF, 0), (1, 2, 3, 4)]),
     (lambda v: Everything(1, size=v), "Everything.size", [0.0, -1.0, NAN]),

@@ -142,11 +142,12 @@ def test_what_does_not_translate_is_refused(words, parts):
     world.close()
 
 
-@pytest.mark.parametrize(("mask", "apart"), [(1, False), (2, True), (-1, True)])
-def test_layers_and_masks_are_those_of_carom(mask, apart):
+@pytest.mark.parametrize(("mask", "group", "apart"), [(1, 0, False), (2, 0, True), (-1, 1, True), (-1, -4, False)])
+def test_layers_masks_and_groups_are_those_of_carom(mask, group, apart):
     world = plane()
     for x, layer in ((0.0, 1), (0.5, 2)):
-        world.create_entity(Transform((x, 0)), RigidBody(), SphereCollider(0.5, layer=layer, mask=mask | layer // 2))
+        filters = {"layer": layer, "mask": mask | layer // 2, "group": group * layer if group > 0 else group}
+        world.create_entity(Transform((x, 0)), RigidBody(), SphereCollider(0.5, **filters))
     space = PymunkSpace(world)
     space.step(30)
     (one, _), (other, _) = space.state()[0]

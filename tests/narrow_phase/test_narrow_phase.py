@@ -155,10 +155,16 @@ def test_rotation_is_read_again_in_every_step():
         ({"mask": 0}, {}, False),
         ({"layer": 6, "mask": 2}, {"layer": 2, "mask": 4}, True),
         ({"layer": 1 << 62, "mask": -1}, {"layer": 1, "mask": 1 << 62}, True),
+        ({"group": 3}, {"group": 3}, False),
+        ({"group": -(2**63 - 1)}, {"group": -(2**63 - 1)}, False),
+        ({"group": 3}, {"group": 4}, True),
+        ({"group": 3}, {}, True),
+        ({"group": 3, "mask": 2}, {"group": 4}, False),
     ],
 )
-def test_layers_and_masks(maker, one, two, meet):
-    """Two colliders meet if each one's layer has a bit in the other's mask; else they pass through each other."""
+def test_layers_masks_and_groups(maker, one, two, meet):
+    """Two colliders meet if each one's layer has a bit in the other's mask, and they are not of one group; else they
+    pass through each other."""
     world = make_world()
     a, b = maker(world, -1, 1.0, restitution=1.0, **one), maker(world, 1, -1.0, restitution=1.0, **two)
     seen = 0

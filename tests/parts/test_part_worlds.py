@@ -357,6 +357,30 @@ def test_a_table_that_is_pressed_into_the_floor_is_put_back_once_not_by_each_foo
 
 
 @pytest.mark.compiled
+@pytest.mark.parametrize("mode", MODES)
+def test_pieces_of_one_group_fall_through_each_other_and_onto_all_else(mode, tmp_path):
+    world, parts = parts_world((0, -G), collision=mode, sleeping=True)
+    ground, met = floor(world, friction=0.5), set()
+    pieces = [piece(world, parts, (0.05 * k, 0.5 + 0.8 * k), U, group=1 + k // 2, friction=0.5) for k in range(4)]
+    group = {entity: 1 + k // 2 for k, own in enumerate(pieces) for entity in own}
+    world.on("contact_begin", lambda contact: met.add((contact.entity_a, contact.entity_b)))
+    world.on("impact", lambda contact: met.add((contact.entity_a, contact.entity_b)))
+    run(world, 60)
+    world.save(tmp_path / "pieces")
+    loaded = World.load(tmp_path / "pieces", Physics(dimensions=2), Rotation(), Parts())
+    run(world, 120)
+    run(loaded, 120)
+    assert loaded.state_hash() == world.state_hash()
+    groups = {(group.get(a, 0), group.get(b, 0)) for a, b in met if ground not in (a, b)}
+    assert groups
+    assert groups <= {(1, 2), (2, 1)}
+    assert all(any((ground, entity) in met for entity in own) for own in pieces[:2])
+    heights = [at(world, own[0]).y for own in pieces]
+    assert min(heights) > 0.2
+    assert max(heights) < 1.3  # stacked one on the other they are 2.4 m high
+
+
+@pytest.mark.compiled
 def test_snapshots_rollback_and_files_go_on_to_the_bit(tmp_path):
     world, parts = parts_world((0, -G))
     floor(world, friction=0.5)

@@ -65,6 +65,9 @@ def test_a_pair_without_handler_is_an_error_with_both_shapes_and_the_ways_out():
     world.component_for_entity(a, lonely).mask = 2  # now it meets no other body
     world.step()
     world.component_for_entity(a, lonely).mask = -1
+    world.component_for_entity(a, lonely).group = world.component_for_entity(b, SphereCollider).group = -5
+    world.step()
+    world.component_for_entity(a, lonely).group = 5
     with pytest.raises(UnhandledPairError):
         world.step()
     world.delete_entity(b)

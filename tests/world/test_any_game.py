@@ -79,7 +79,9 @@ class Solid:
 
     def may_meet(self, other):
         a, b = self.collider, other.collider
-        return {self.kind, other.kind} != {"static"} and bool(a.layer & b.mask) and bool(b.layer & a.mask)
+        together = a.group == b.group != 0
+        moves = {self.kind, other.kind} != {"static"}
+        return moves and bool(a.layer & b.mask) and bool(b.layer & a.mask) and not together
 
 
 def box_depth(a, half_a, b, half_b):
@@ -200,12 +202,15 @@ class Game(RuleBasedStateMachine):
         if entity is not None:
             self.world.component_for_entity(entity, SphereCollider).radius = size
 
-    @rule(number=number, layer=st.sampled_from(LAYERS), mask=st.sampled_from((-1, 1, 2)), sensor=st.booleans())
-    def change_filters(self, number, layer, mask, sensor):
-        entity = self.pick(number, AABBCollider)
+    @rule(
+        number=number, layer=st.sampled_from(LAYERS), mask=st.sampled_from((-1, 1, 2)), sensor=st.booleans(),
+        group=st.sampled_from((0, 0, 7, -7)), kind=st.sampled_from((AABBCollider, AABBCollider, SphereCollider)),
+    )  # fmt: skip
+    def change_filters(self, number, layer, mask, sensor, group, kind):
+        entity = self.pick(number, kind)
         if entity is not None:
-            collider = self.world.component_for_entity(entity, AABBCollider)
-            collider.layer, collider.mask, collider.sensor = layer, mask, sensor
+            collider = self.world.component_for_entity(entity, kind)
+            collider.layer, collider.mask, collider.sensor, collider.group = layer, mask, sensor, group
 
     @rule(number=number, kind=kind)
     def change_kind(self, number, kind):
