@@ -58,7 +58,9 @@ class Collider(Component, abstract=True):
     makes_body: ClassVar[bool] = True
     _largest: ClassVar[float] = LONGEST
     stack: ClassVar[str] = "collider"
-    stacked_columns: ClassVar[tuple[str, ...]] = ("offset", "restitution", "friction", "sensor", "layer", "mask", "group")
+    stacked_columns: ClassVar[tuple[str, ...]] = (
+        "offset", "restitution", "friction", "sensor", "layer", "mask", "group",
+    )  # fmt: skip
 
     offset: VectorField = special_column(default=0.0, item="vector", kw_only=True, on_demand=True, also=("centre",))
     restitution: float = special_column(

@@ -9,13 +9,18 @@ import numpy as np
 
 from ..framework.data.columns import special_column
 from ..framework.data.component import Component
+from ..framework.data.interpolation import interpolated, restart
 from ..framework.typing import RotationField, VectorField
 
 
 def _teleport(table: Any, row: int) -> None:
     """An assigned position is a teleport: no sweep, and interpolation restarts."""
-    if "previous_position" in table.arrays:
-        table.arrays["previous_position"][row] = table.arrays["position"][row]
+    restart(table, row, ("position",))
+
+
+def _turn_at_once(table: Any, row: int) -> None:
+    """The same of an assigned rotation."""
+    restart(table, row, ("rotation",))
 
 
 class Transform(Component, flat=True):
@@ -28,7 +33,9 @@ class Transform(Component, flat=True):
     __slots__ = ()
 
     position: VectorField = special_column(item="vector", on_write=_teleport, also=("pos", "location"))
-    rotation: RotationField = special_column(default=0.0, item="rotation", on_demand=True, also=("angle",))
+    rotation: RotationField = special_column(
+        default=0.0, item="rotation", on_demand=True, on_write=_turn_at_once, also=("angle",)
+    )
 
     def _fill(self, given: Mapping[str, Any]) -> None:
         position = given.get("position", ())
@@ -75,9 +82,17 @@ class Transform(Component, flat=True):
     @property
     def interpolated_position(self) -> np.ndarray:
         """(d,) between the last two steps, by ``world.alpha``: the position to draw."""
+        return self._interpolated("position")
+
+    @property
+    def interpolated_rotation(self) -> float | np.ndarray:
+        """The rotation to draw, of a body that turns by its Spin: an angle in 2D, (4,) in 3D."""
+        found = self._interpolated("rotation")
+        return found if found.ndim else float(found)
+
+    def _interpolated(self, name: str) -> np.ndarray:
         store = self._store
-        if store is None or "previous_position" not in store.arrays:
-            return np.array(self.position)
+        if not hasattr(store, "clock"):  # of no world
+            return np.array(getattr(self, name))
         row = self._row if self._version == store.version else self._locate()
-        before, now = store.arrays["previous_position"][row], store.arrays["position"][row]
-        return before + store.clock.alpha * (now - before)
+        return interpolated(store, name, row)

@@ -157,6 +157,7 @@ BODIES = Schema(
         static_position=vectors(),  # from row 0
     ),
     rotation=floats(),  # one angle, in 3D four numbers per body; without rows no body is rotated
+    previous_rotation=floats(),  # the same at the start of the step, in worlds where bodies turn: for drawing
     shape=ints("int8"),  # of the last level; -1: none
     offset=vectors(),  # of the last level, in the world
     level_not_enclosing=flags(),  # a rotated level may reach out of the one around it

@@ -225,8 +225,9 @@ class Scene:
         for name in SLEEP_COLUMNS:
             if f"_{name}" in table.arrays:
                 setattr(bodies, name, table.arrays[f"_{name}"])
-        if "rotation" in table.arrays:
-            bodies.rotation = table.arrays["rotation"].reshape(-1)
+        for name in ("rotation", "previous_rotation"):
+            if name in table.arrays:
+                setattr(bodies, name, table.arrays[name].reshape(-1))
         for name in COLLIDERS.fields:
             stack = table.stacks.get(f"{Collider.stack}.{name}")
             if stack is not None:
@@ -398,6 +399,7 @@ def make_table(dimensions: int) -> Table:
     for component in (Transform, RigidBody):
         table.add_component_type(component)
     table.add_array("previous_position", "vector")
+    table.add_array("previous_rotation", "rotation", fill=table.default_of("rotation"), on_demand=True)
     table.add_array("force", "vector", on_demand=True)
     table.add_array("torque", "angular", on_demand=True)
     table.add_array("inverse_mass")

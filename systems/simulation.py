@@ -12,6 +12,7 @@ from ..framework.data.adoption import Adoption
 from ..framework.data.bodies import Bodies
 from ..framework.data.column_copies import ColumnCopies
 from ..framework.data.esper_bridge import Membership
+from ..framework.data.interpolation import restart
 from ..framework.jit.records.record import Record, make_record
 from ..framework.jit.records.schema import Schema
 from ..framework.schedule.phases import System
@@ -310,6 +311,7 @@ class Simulation:
             self.contacts.show(self.contacts_before)
         if len(bodies.place):
             bodies.place[:] = -1
+        restart(table, slice(0, table.count), ("rotation",))
         table.static_version += 1
         self.queries.forget()
         table.in_step = False

@@ -19,6 +19,7 @@ from .change_log import Arrival
 from .component import Component
 from .esper_bridge import Contents
 from .handles import Contained, bind_handles, write_handles
+from .interpolation import restart
 from .table import FEW, HAS_OBJECTS, STATIC, Table
 
 Ids = set[int]
@@ -406,8 +407,8 @@ class Adoption:
         at: Any = rows[0] if len(rows) == 1 else rows  # one is much faster by its number
         for mask in archetype.masks:
             table.arrays[mask][at] = True
-        if archetype.anchored and "previous_position" in table.arrays:
-            table.arrays["previous_position"][at] = table.arrays["position"][at]
+        if archetype.anchored:
+            restart(table, at)
         for entity, row, now in zip(entities, rows, contents, strict=True):
             for component in columns:
                 handle = now[component]
@@ -430,8 +431,7 @@ class Adoption:
                 else:
                     table.write_one(column.key, rows, store.constants[column.key][1])
             table.has_mask(component)[rows] = True
-        if "previous_position" in table.arrays:
-            table.arrays["previous_position"][rows] = table.arrays["position"][rows]
+        restart(table, rows)
 
 
 def _kind_of(carrier: Component) -> int:

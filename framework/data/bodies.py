@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..names import did_you_mean
 from ..typing import BodiesColumn, Integers
 from .component import Component
+from .interpolation import interpolated
 from .table import DYNAMIC, KINDS, KINEMATIC, STATIC, Table
 
 
@@ -30,6 +31,7 @@ class Bodies:
         previous_position: BodiesColumn
         linear_velocity: BodiesColumn
         rotation: BodiesColumn
+        previous_rotation: BodiesColumn
         mass: BodiesColumn
         inverse_mass: BodiesColumn
         force: BodiesColumn
@@ -73,6 +75,16 @@ class Bodies:
     def asleep(self) -> np.ndarray:
         """Mask (n,) of the bodies that sleep, a copy: see ``Settings.sleeping``."""
         return self._table.asleep(self.rows)
+
+    @property
+    def interpolated_position(self) -> np.ndarray:
+        """(n, d) m between the last two steps, by ``world.alpha``: where to draw the bodies. A copy."""
+        return interpolated(self._table, "position", self.rows)
+
+    @property
+    def interpolated_rotation(self) -> np.ndarray:
+        """The same of rotations: (n,) rad in 2D, (n, 4) in 3D. Between two steps is what turns by its Spin."""
+        return interpolated(self._table, "rotation", self.rows)
 
     def row_of(self, entity: int) -> int:
         """The row of that entity among all bodies; KeyError if it is no body."""

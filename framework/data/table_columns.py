@@ -12,7 +12,10 @@ from .columns import Column
 from .component import Component
 
 # Attributes of Bodies:
-RESERVED = ("asleep", "column_names", "dynamic", "has", "kinematic", "row_of", "rows", "rows_of", "static")
+RESERVED = (
+    "asleep", "column_names", "dynamic", "has", "interpolated_position", "interpolated_rotation", "kinematic", "row_of",
+    "rows", "rows_of", "static",
+)  # fmt: skip
 
 
 class TableColumns:

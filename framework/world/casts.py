@@ -89,8 +89,8 @@ class CastVerbs:
 
         ``shape`` is any collider, used as a value: ``SphereCollider(0.5)``. It is moved in a straight line and not
         turned, its offset counts, its layer, mask and group do not. It starts at ``position``, where a Transform would
-        be. What it touches there is hit at distance 0, with the normal along which the two part soonest; that also is the
-        answer for a displacement of zero. ``mask`` and ``exclude`` as in :meth:`ray_cast`.
+        be. What it touches there is hit at distance 0, with the normal along which the two part soonest; that also is
+        the answer for a displacement of zero. ``mask`` and ``exclude`` as in :meth:`ray_cast`.
         """
         services = self._synchronized()
         columns = self._values(shape, "shape_cast", services.dimensions)

@@ -316,6 +316,8 @@ class Parts(Plugin):
             turned = turned_by(rotation[bodies], record.turn[:count])
             if (rotation[rows] != turned).any():
                 rotation[rows] = turned
+                if (before := arrays.get("previous_rotation")) is not None:
+                    before[rows] = turned_by(before[bodies], record.turn[:count])
 
     def _write(self, places: dict[int, Place], gone: list[int]) -> None:
         """The record of the parts."""

@@ -10,6 +10,7 @@ import numpy as np
 from ...framework.data.adoption import Adoption
 from ...framework.data.column_copies import ColumnCopies
 from ...framework.data.component import Component
+from ...framework.data.interpolation import restart
 from ...framework.jit.records.record import Record, make_record
 from ...framework.jit.records.schema import Schema
 from ...framework.plugins.registry import PluginStage, Registry
@@ -81,6 +82,9 @@ class Extensions:
         self._adoption.register(dict.fromkeys(component for stage in stages for component in stage.components))
         program.take(tuple(placed(stages, dimensions)))
         self.stages, self._about = stages, [stage.components for stage in stages]
+        if any("rotation" in stage.writes for stage in stages) and "previous_rotation" not in self._table.arrays:
+            self._table.make("previous_rotation")
+            restart(self._table, slice(0, self._table.count), ("rotation",))
         self._own = {stage: make_record(own_schema(stage, dimensions), dimensions) for stage in stages}
         reads, writes = ({name for stage in stages for name in getattr(stage, what)} for what in ("reads", "writes"))
         kept = {name for name in writes if name in OF_TABLE or self._table.has_column(name)}.difference(MADE_AGAIN)

@@ -73,6 +73,11 @@ def keep_start(state, dt):
         for i in range(state.first, state.kept_rows):
             bodies.kept_previous[i] = previous[i]
             previous[i] = position[i]
+    turned, rotation, width = bodies.previous_rotation, bodies.rotation, 1 if len(zero_of(state)) == 2 else 4
+    if len(turned) > 0 and len(rotation) > 0:
+        first = state.first if state.boxed_version == state.statics_version else 0  # else other rows sleep
+        for k in range(width * first, width * state.kept_rows):
+            turned[k] = rotation[k]
     if state.limits_speed:  # systems may have pushed since the forces were summed
         for i in range(state.first, state.dynamic):
             if not bodies.quarantined[i]:

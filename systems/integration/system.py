@@ -65,8 +65,8 @@ class Integration(StagedSystem):
             ("still",), "sleeping", "bodies sleep",
         ),
         Stage(
-            keep_start, "keeps where the step starts, and the step before", (*MOTION, "previous_position"),
-            ("kept_previous", "previous_position", "start_velocity", "linear_velocity"),
+            keep_start, "keeps where the step starts, and the step before", (*MOTION, "previous_position", "rotation"),
+            ("kept_previous", "previous_position", "start_velocity", "linear_velocity", "previous_rotation"),
         ),
         Stage(
             drift, "no force acts: position + dt velocity, unless a body is damped", MOTION, ("position",), "standard",

@@ -155,7 +155,7 @@ def test_what_does_not_meet_does_not_count():
 
 @pytest.mark.parametrize("seed", range(6))
 def test_the_first_passage_against_all_pairs(seed):
-    """Random sizes, speeds, filters and kinds: the shortest (size + size') / (speed + speed') of all pairs that meet."""
+    """Random sizes, speeds, filters, kinds: the shortest (size + size') / (speed + speed') of all pairs that meet."""
     random = np.random.default_rng(seed)
     world = make_world()
     bodies = []

@@ -310,6 +310,78 @@ def test_a_world_with_the_plugin_but_without_a_spin_runs_the_same_stages_and_bit
     assert found[0] == found[1]
 
 
+# -- drawing --------------------------------------------------------------------------------------
+
+
+def turned(start, turn):
+    """A rotation, turned along the world's axes by an angle, in 3D by a vector; a quaternion as w, x, y, z."""
+    if np.ndim(turn) == 0:
+        return start + turn
+    x = scipy.spatial.transform.Rotation.from_quat(np.roll(start, -1))
+    return np.roll((scipy.spatial.transform.Rotation.from_rotvec(turn) * x).as_quat(), 1)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("seed", range(2))
+def test_what_turns_is_drawn_evenly_at_144_hz(seed, d):
+    """Constant spins of round bodies: a step behind, each has turned by w (t - dt), from any rotation, in 3D about any
+    axis and with either sign of the quaternion. Columns and Transforms say the same; what does not turn stays."""
+    random = np.random.default_rng(seed)
+    with space(d) as world:
+        spins = random.uniform(-20, 20, (12, 3)) if d == 3 else random.uniform(-20, 20, 12)
+        transforms = [Transform(5.0 * k * np.eye(d)[0], random.normal(size=4) if d == 3 else k) for k in range(13)]
+        for k, each in enumerate(transforms[:12]):
+            body = RigidBody(linear_velocity=np.eye(d)[1], kind=("dynamic", "kinematic")[k % 2])
+            world.create_entity(each, body, Spin(spins[k]), SphereCollider(0.5))
+        world.create_entity(transforms[12], SphereCollider(0.5))
+        starts = np.array([each.rotation for each in transforms])
+        for n in range(1, 100):
+            world.advance(1 / 144)
+            passed = max(n / 144 - 1 / 60, 0.0)
+            rows = world.bodies.rows_of(np.array([each.entity for each in transforms]))
+            places, drawn = world.bodies.interpolated_position[rows], world.bodies.interpolated_rotation[rows]
+            np.testing.assert_allclose(places[:12, 1], passed, rtol=0, atol=1e-9)
+            for k, each in enumerate(transforms):
+                np.testing.assert_array_equal(each.interpolated_rotation, drawn[k])
+                np.testing.assert_array_equal(each.interpolated_position, places[k])
+                right = turned(starts[k], passed * spins[k]) if k < 12 else starts[k]
+                error = min(np.abs(drawn[k] - right).max(), np.abs(drawn[k] + right).max() if d == 3 else np.inf)
+                assert error < 1e-9
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("d", [2, 3])
+def test_what_is_turned_by_hand_has_lost_its_spin_or_sleeps_is_drawn_as_it_is(d):
+    with space(d, (0, -10, 0)[:d], sleeping=True) as world:
+        world.create_entity(Transform(-np.eye(d)[1]), BoxCollider(np.where(np.arange(d) == 1, 1.0, 90.0), friction=0.5))
+        hand, lost, falls = (Transform(np.eye(d)[1] * (4.0, 3.0, 0.52)[k] + 9.0 * k * np.eye(d)[0]) for k in range(3))
+        for each in (hand, lost, falls):
+            own = RigidBody(kind="dynamic" if each is falls else "kinematic")
+            spin = 0.0 if each is falls else 3.0 * np.eye(3)[2] if d == 3 else 3.0
+            world.create_entity(each, own, Spin(spin), BoxCollider([0.5] * d, friction=0.5))
+        tilt = 0.02 if d == 2 else (math.cos(0.01), 0.0, 0.0, math.sin(0.01))
+        falls.rotation = tilt
+        world.advance(2.5 / 60)
+        assert np.any(hand.interpolated_rotation != hand.rotation)
+        assert np.any(lost.interpolated_rotation != lost.rotation)
+        hand.rotation = tilt
+        world.remove_component(lost.entity, Spin)
+        world.advance(0.0)
+        np.testing.assert_array_equal(hand.interpolated_rotation, hand.rotation)
+        kept, drawn = world.snapshot(), world.bodies.interpolated_rotation
+        world.advance(2 / 60)
+        np.testing.assert_array_equal(lost.interpolated_rotation, lost.rotation)
+        world.restore(kept)
+        np.testing.assert_array_equal(world.bodies.interpolated_rotation, drawn)
+        while not world.component_for_entity(falls.entity, RigidBody).asleep:
+            assert world.time < 10.0
+            world.step()
+        world.step()
+        world.advance(0.5 / 60)
+        np.testing.assert_array_equal(falls.interpolated_rotation, falls.rotation)
+
+
 # -- bad input ------------------------------------------------------------------------------------
 
 
