@@ -13,7 +13,9 @@ from ...components.part_of import PartOf
 from ...components.spin import Spin
 from ...framework import NoPhysicsError, Plugin, World
 from ...framework.plugins.joints import Placed, rows_of
-from ...systems.contacts.solving.joints.records import DRIVE, GIVEN, HOLD, JOINTS, LIMIT, POINT, SERVO, SPRING, TURN
+from ...systems.contacts.solving.joints.records import (
+    DRIVE, FREE, GIVEN, HOLD, JOINTS, LIMIT, POINT, SERVO, SPRING, TURN,
+)  # fmt: skip
 from ...systems.tracking import BEFORE_STEP
 from .arms import arm_of, moment
 from .joint import WORLD, Driven, Joint, Place, Row, whole_body
@@ -95,7 +97,7 @@ class Joints(Plugin):
     @property
     def changes_energy(self) -> bool:
         """Whether any has a motor, a spring or a limit: energy comes and goes by intent."""
-        return bool((self._record.rule[: self._record.count] != HOLD).any())
+        return not np.isin(self._record.rule[: self._record.count], (HOLD, FREE)).all()
 
     def state(self, entity: int) -> JointState:
         """Of the joint of that entity; KeyError if it has none that a step has taken."""
@@ -158,10 +160,11 @@ class Joints(Plugin):
     def _measure(self, joints: dict[int, Joint], found: list[Holds]) -> tuple[np.ndarray, np.ndarray]:
         """The values of these joints and their changes per second; of those of plugins what their first rows say."""
         table, record = self._physics.table, self._record
-        value, speed = measure(table, found, len(joints))
+        first = np.searchsorted(record.joint[: record.count], list(joints))
+        value, speed = measure(table, found, len(joints), record.value[first])
         own = [k for k, joint in enumerate(joints.values()) if type(joint) in self._own]
         if own:
-            rows = np.searchsorted(record.joint[: record.count], np.array(list(joints))[own])
+            rows = first[own]
             value[own] = record.value[rows]
             speed[own] = moving(table, record.entity_a[rows]).rate(record.along_a[rows], record.turn_a[rows])
             speed[own] += moving(table, record.entity_b[rows]).rate(record.normal[rows], record.turn_b[rows])
@@ -235,10 +238,10 @@ class Joints(Plugin):
                 lost[entity] = joint
             elif before is not joint or entity in self._set:
                 come[entity] = joint
-        self._prepare(come)
+        fresh = self._prepare(come)
         held = self._released | {body for joint in lost.values() for body in (joint.a, joint.b)} | self._drop(gone)
         for entity, joint in come.items():
-            held |= self._take(entity, joint)
+            held |= self._take(entity, joint, entity in fresh)
             joint.keep(changed=False)
         if self._physics.sleepers.on:
             self._physics.sleepers.disturb(np.array(sorted(held - {WORLD}), np.int64))
@@ -247,22 +250,25 @@ class Joints(Plugin):
             seen.clear()
         self._table_version = table.version
 
-    def _prepare(self, joints: dict[int, Joint]) -> None:
-        """These joints have hold of their bodies; ValueError, before any row is another one, if one cannot."""
+    def _prepare(self, joints: dict[int, Joint]) -> set[int]:
+        """These joints have hold of their bodies; ValueError, before any row is another one, if one cannot. Returns
+        those that have just taken hold."""
+        fresh = {entity for entity, joint in joints.items() if not joint.attached}
         for entity, joint in joints.items():
             joint._taken = None  # until it has rows: what looks at its vectors here does not write into them
             joint.fit(self._physics.dimensions, entity)
-            if not joint.attached:
+            if entity in fresh:
                 self._attach(entity, joint)
                 self._holds = None
             elif entity not in self._joints:
                 joint.check_apart(self._contents, entity)
+        return fresh
 
-    def _take(self, entity: int, joint: Joint) -> set[int]:
-        """Rows for a joint that has hold of its bodies; these, and those that it has held."""
+    def _take(self, entity: int, joint: Joint, fresh: bool = False) -> set[int]:
+        """Rows for a joint that has hold of its bodies, since now if it is fresh; these, and those it has held."""
         joint._taken = None
         rows = joint.rows(self._physics.dimensions)
-        bodies, other = self._rows.put(joint, rows)
+        bodies, other = self._rows.put(joint, rows, fresh)
         joint._taken = self
         self._breaking = self._breaking or not (joint.breaking_force is joint.breaking_torque is None)
         if entity not in self._joints:
@@ -270,7 +276,7 @@ class Joints(Plugin):
             self._joints[entity], self._holds = joint, None
             if entity < last:
                 self._joints = dict(sorted(self._joints.items()))
-        if other and any(TURN <= row.kind < GIVEN and row.rule != HOLD for row in rows) and not self._turns(joint):
+        if other and any(TURN <= row.kind < GIVEN and row.rule not in (HOLD, FREE) for row in rows) and not self._turns(joint):
             name, ends = type(joint).__name__, ", ".join(f"entity {e}" for e in (joint.a, joint.b) if e != WORLD)
             self.world.report_fault(
                 f"entity {entity}: this {name} turns nothing, for it joins bodies without Spin: {ends}",

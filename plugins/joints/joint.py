@@ -13,10 +13,10 @@ from ...components.part_of import PartOf
 from ...framework.data.columns import Column, special_column
 from ...framework.data.component import Component
 from ...framework.typing import Vector
-from ...systems.contacts.solving.joints.records import ALIGN, DRIVE, GIVEN, HOLD, LIMIT, SPRING, TURN
+from ...systems.contacts.solving.joints.records import ALIGN, DRIVE, FREE, GIVEN, HOLD, LIMIT, SPRING, TURN
 
 WORLD = 0  # in place of a body
-FREE = -math.inf, math.inf
+UNLIMITED = -math.inf, math.inf
 MOST = 1e15  # m, rad, Hz and the like: further away numbers have no digits for what a step changes
 FARTHEST = 1e8  # m from a body: further away its mass is lost beside the inertia of the arm
 LEAST = 1e-100  # of an axis, whose square is taken
@@ -282,6 +282,10 @@ class Joint(Component, abstract=True):
             return Row(TURN, HOLD, self.start)
         return Row(TURN, HOLD, axis=self.axis_a, ends=(self.side_a, self.side_b))
 
+    def counted(self, rows: list[Row], dimensions: int) -> list[Row]:
+        """These rows of angles; in space, if there are none, one that is only counted: in a plane rotations are."""
+        return rows if rows or dimensions == 2 else [self.turn(dimensions)._replace(rule=FREE)]
+
     def aligned(self, dimensions: int) -> list[Row]:
         """The axes of both bodies stay parallel."""
         if dimensions == 2:
@@ -343,6 +347,6 @@ class Driven(Joint, abstract=True):
         if self.frequency is not None:
             low, ratio = row.low + self.rest, self.damping_ratio
             rows.append(row._replace(rule=SPRING, low=low, frequency=self.frequency, damping_ratio=ratio))
-        if limits != FREE:  # solved last: no motor is stronger
+        if limits != UNLIMITED:  # solved last: no motor is stronger
             rows.append(row._replace(rule=LIMIT, low=row.low + limits[0], high=row.low + limits[1]))
         return rows

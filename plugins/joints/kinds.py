@@ -22,7 +22,7 @@ from ...systems.contacts.solving.joints.records import (
     SPRING,
     TWIST,
 )  # fmt: skip
-from .joint import FREE, LEAST, MOST, WORLD, Driven, Joint, Place, Row, optional
+from .joint import LEAST, MOST, UNLIMITED, WORLD, Driven, Joint, Place, Row, optional
 
 SQUARE = 1e-6  # cosine between directions that are at right angles
 
@@ -142,7 +142,8 @@ class Hinge(Driven):
         self.hold_axis(a, b, self.axis)
 
     def rows(self, dimensions: int) -> list[Row]:
-        return [Row(POINT, HOLD), *self.aligned(dimensions), *self.moving(self.turn(dimensions), self.max_torque)]
+        turns = self.counted(self.moving(self.turn(dimensions), self.max_torque), dimensions)
+        return [Row(POINT, HOLD), *self.aligned(dimensions), *turns]
 
 
 class Ball(Joint):
@@ -361,11 +362,11 @@ class Cone(Joint):
         self.hold_axis(a, b, self.axis)
 
     def rows(self, dimensions: int) -> list[Row]:
-        rows, twist = [Row(POINT, HOLD)], self.in_order("twist", self.lower, self.upper)
-        rows.append(Row(CONE, LIMIT, -math.inf, self.swing, axis=self.side_a, ends=(self.axis_a, self.axis_b)))
-        if twist != FREE:
-            rows.append(self.turn(dimensions)._replace(kind=TWIST, rule=LIMIT, low=twist[0], high=twist[1]))
-        return rows
+        twist = self.in_order("twist", self.lower, self.upper)
+        limit = self.turn(dimensions)._replace(rule=LIMIT, low=twist[0], high=twist[1])
+        swing = Row(CONE, LIMIT, -math.inf, self.swing, axis=self.side_a, ends=(self.axis_a, self.axis_b))
+        turns = self.counted([limit] if twist != UNLIMITED else [], dimensions)
+        return [Row(POINT, HOLD), swing, *(row._replace(kind=TWIST) for row in turns)]
 
 
 class MousePull(Joint):

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...systems.contacts.solving.joints.rows import FOLDED
+from ...systems.contacts.solving.joints.rows import FOLDED, FULL_TURN
 from .joint import Joint
 from .kinds import Cone, Distance, Hinge, Motor, Slider, Weld, Wheel
 
@@ -130,11 +130,14 @@ def anchors(table: Any, joints: Collection[Joint]) -> tuple[np.ndarray, np.ndarr
     return ends[0], ends[1]
 
 
-def measure(table: Any, found: list[Holds], count: int) -> tuple[np.ndarray, np.ndarray]:
-    """(count,) values, in m or rad, 0 of what has none, and their changes per second."""
+def measure(table: Any, found: list[Holds], count: int, counted: Any) -> tuple[np.ndarray, np.ndarray]:
+    """(count,) values, in m or rad, 0 of what has none, and their changes per second. counted: (count,) the angles
+    in space that the steps have counted."""
     value, speed = np.zeros(count), np.zeros(count)
     for of in found:
         value[of.joints], speed[of.joints] = of.measure(of, moving(table, of.a), moving(table, of.b))
+        if table.dimensions == 3 and of.measure in (_angle, _twist):
+            value[of.joints] += FULL_TURN * np.round((counted[of.joints] - value[of.joints]) / FULL_TURN)
     return value, speed
 
 

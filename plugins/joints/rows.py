@@ -20,8 +20,8 @@ from .joint import WORLD, Joint, Row
 KEY = ("joint", "kind", "rule", "entity_a", "entity_b")
 NUMBERS = ("low", "high", "target", "most", "frequency", "damping_ratio")
 MADE = ("anchor_a", "anchor_b", "axis", *NUMBERS, "breaking_force", "breaking_torque", "function", "part", "numbers_at")
-KEPT = ("load", "pull", "normal", "total", "thrust")
-OF_PLUGINS = ("value", "along_a", "turn_a", "turn_b")
+KEPT = ("load", "pull", "normal", "total", "thrust", "value")
+OF_PLUGINS = ("along_a", "turn_a", "turn_b")
 MOVED = (*KEY, *MADE, *KEPT, *OF_PLUGINS)
 # Columns that have no row for each row of a joint.
 APART, OWN = ("apart_a", "apart_b"), ("numbers", "axes_a", "axes_b")
@@ -53,9 +53,10 @@ class JointRows:
         self._record.count = self._record.apart = 0
         self._pairs, self._places, self._free = {}, {}, []
 
-    def put(self, joint: Joint, rows: list[Row]) -> tuple[set[int], bool]:
-        """The rows of a joint as it is now; those that it has had, of the same two bodies, go on from there. Returns
-        the bodies that it holds, or has held, and whether these are other rows."""
+    def put(self, joint: Joint, rows: list[Row], fresh: bool) -> tuple[set[int], bool]:
+        """The rows of a joint as it is now; those that it has had, of the same two bodies, go on from there, and its
+        angle unless it has just taken hold. Returns the bodies that it holds, or has held, and whether these are other
+        rows."""
         record, entity, span = self._record, joint.entity, self.span(joint.entity)
         address = self._link(joint) if type(joint) in self._registry.joints else 0
         bodies, now = {joint.a, joint.b}, [(row.kind, row.rule, joint.a, joint.b) for row in rows]
@@ -67,6 +68,8 @@ class JointRows:
             for j, key in enumerate(now, span.start):
                 record.joint[j], (record.kind[j], record.rule[j], record.entity_a[j], record.entity_b[j]) = entity, key
             put_kept(record, span, had)
+        if fresh and rows and rows[0].kind != GIVEN:
+            record.value[span.start] = 0.0
         if address:
             self._put_own(joint, span, rows, address)
         anchors, force, torque = (joint.at_a, joint.at_b), joint.breaking_force, joint.breaking_torque
@@ -192,6 +195,10 @@ def put_kept(record: Any, span: slice, had: dict[tuple[int, ...], tuple[Any, ...
         getattr(record, name)[span] = 0.0
     record.normal[span] = np.eye(record.dimensions)[0]
     keys = list(by_row({name: getattr(record, name)[span] for name in KEY}))
+    angles = {key[0]: kept[KEPT.index("value")] for key, kept in reversed(had.items())}
+    for j, key in enumerate(keys, span.start):  # whatever rows it has now: the angle stays with the joint
+        if key[1] != GIVEN and (j == span.start or key[0] != record.joint[j - 1]):
+            record.value[j] = angles.get(key[0], 0.0)
     for j, key in enumerate(keys, span.start):
         for name, value in zip((*KEPT, *OF_PLUGINS), had.get(key, ()), strict=False):
             getattr(record, name)[j] = value

@@ -19,6 +19,7 @@ from .event_stages import publish_contacts
 from .events import disabled_pairs
 from .response_stages import begin_response
 from .resting import find_resting, find_touching, linearise
+from .solving.joints.bodies import count_turns
 from .solving.prediction import predict_rest
 from .solving.solver import solve_contacts, solve_joined_contacts, solve_turning_contacts
 from .solving.warm_start import match_warm_start, store_warm_start
@@ -78,6 +79,7 @@ class Response(StagedSystem):
             carry_parts, "parts go where contacts have sent and turned their bodies", MOTION, (*MOTION, "rotation"),
             "parts",
         ),
+        Stage(count_turns, "how far joints in space have turned", ("rotation",), ("solver",), "joints"),
         Stage(
             resolve_static_penetration, "what is in what cannot be moved, or through it, as that turns or the solver "
             "has pushed, is put back", ("pairs",), MOTION, "colliders", NEAR,

@@ -20,9 +20,9 @@ def written(monkeypatch):
     found: list[int] = []
     put = JointRows.put
 
-    def counted(rows: Any, joint: Any, made: Any) -> Any:
+    def counted(rows: Any, joint: Any, made: Any, fresh: bool) -> Any:
         found.append(joint.entity)
-        return put(rows, joint, made)
+        return put(rows, joint, made, fresh)
 
     monkeypatch.setattr(JointRows, "put", counted)
     return found

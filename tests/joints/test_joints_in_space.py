@@ -75,6 +75,70 @@ def test_motor_turns_to_an_angle_in_space():
     assert joints.state(motor).value == pytest.approx(1.0, abs=0.01)
 
 
+def hinged(limits: Any = None, **fields: Any) -> tuple[World, Joints, int, int]:
+    """A body on a skew hinge through its centre, without weight."""
+    world, joints = space(0)
+    body = world.create_entity(Transform((1, 2, 3), TURN), RigidBody(), Spin(inertia=np.full(3, 2.0)))
+    hinge = Hinge(None, body, anchor=(1, 2, 3), axis=(1, 2, 2), limits=limits, **fields)
+    return world, joints, body, world.create_entity(hinge)
+
+
+@pytest.mark.parametrize("limits", [(0.0, 3.2), (-0.5, 6.5), (-1.0, 15.0), (-1.0, 3.0)])
+def test_hinge_turns_to_its_limit_however_far_that_is(limits: Any):
+    world, joints, body, hinge = hinged(limits, motor_speed=4.0, max_torque=8.0)
+    for _ in range(300):  # it reaches 4 rad/s in a second, 2 rad from where it was
+        world.step()
+        assert joints.state(hinge).value < limits[1] + 1e-3
+        assert np.linalg.norm(spin_of(world, body)) < 4.0 + 1e-6
+    assert joints.state(hinge).value == pytest.approx(limits[1], abs=1e-3)
+
+
+@pytest.mark.parametrize("angle", [3.1, 3.2, -10.0, 40.0])
+def test_servo_turns_to_its_angle_however_far_that_is(angle: float):
+    world, joints = space(0)
+    body = world.create_entity(Transform((1, 2, 3), TURN), RigidBody(), Spin(inertia=np.full(3, 2.0)))
+    servo = world.create_entity(Motor(None, body, angle=angle, max_torque=20.0, axis=(1, 2, 2)))
+    run(world, 600)
+    assert joints.state(servo).value == pytest.approx(angle, abs=1e-3)
+    assert np.linalg.norm(spin_of(world, body)) < 1e-3
+
+
+@pytest.mark.parametrize("speed", [7.0, -400.0])
+def test_whole_turns_of_a_hinge_are_counted_through_changes_snapshots_and_files(speed: float, tmp_path: Any):
+    world, joints, body, hinge = hinged()
+    world.component_for_entity(body, Spin).angular_velocity = speed * np.array((1.0, 2.0, 2.0)) / 3.0
+    run(world, 60)
+    assert joints.state(hinge).value == pytest.approx(speed, rel=1e-9)
+    field = world.component_for_entity(hinge, Hinge)
+    field.lower = -1e6  # other rows
+    run(world, 60)
+    before = world.snapshot()
+    world.save(tmp_path / "turns.carom")
+    run(world, 60)
+    assert joints.state(hinge).value == joints.columns()["value"][0] == pytest.approx(3 * speed, rel=1e-9)
+    after = world.state_hash(), joints.state(hinge).value
+    world.restore(before)
+    run(world, 60)
+    assert (world.state_hash(), joints.state(hinge).value) == after
+    again = Joints()
+    with World.load(tmp_path / "turns.carom", Physics(dimensions=3), Rotation(), again) as loaded:
+        run(loaded, 60)
+        assert (loaded.state_hash(), again.state(hinge).value) == after
+    field.anchor = (1.0, 2.0, 3.0)  # it takes hold once more: of the body as it is
+    world.step()
+    assert joints.state(hinge).value == pytest.approx(speed / 60, rel=1e-6)
+
+
+@pytest.mark.parametrize("twist", [None, (-1.0, 8.0)])
+def test_twist_of_a_cone_counts_whole_turns(twist: Any):
+    world, joints = space(0)
+    body = world.create_entity(Transform((1, 2, 3), TURN), RigidBody(), Spin(inertia=np.full(3, 2.0)))
+    cone = world.create_entity(Cone(None, body, anchor=(1, 2, 3), axis=(1, 2, 2), swing=0.5, twist=twist))
+    world.component_for_entity(body, Spin).angular_velocity = np.array((2.0, 4.0, 4.0))
+    run(world, 120)
+    assert joints.state(cone).value == pytest.approx(12.0 if twist is None else 8.0, abs=1e-3)
+
+
 def test_welded_blocks_fly_as_one():
     world, _ = space(0)
     a, b = block(world, (0, 0, 0), rotation=TURN), block(world, (1, 0.3, 0))

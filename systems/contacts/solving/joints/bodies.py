@@ -13,7 +13,9 @@ from ....integration.turning import change_of_spin, cross_spin
 from ....narrow_phase.stages import layers_meet
 from ..rows import turn_body
 from ..warm_start import row_of
-from .records import DRIVE, GIVEN, POINT, SLIDE, TURN
+from .records import DRIVE, FREE, GIVEN, POINT, SLIDE, TURN, TWIST
+from .rows import turn_about
+from .springs import first_of
 
 
 @inlined
@@ -45,7 +47,9 @@ def find_active(state):
         joints.old_normal[j], joints.old_along_a[j] = joints.normal[j], joints.along_a[j]
         joints.total[j], joints.thrust[j] = 0.0, zero_of(state)
         gone = (a < 0 and joints.entity_a[j] > 0) or (b < 0 and joints.entity_b[j] > 0)
-        if not (gone or left_out(state, a) or left_out(state, b)) and (may_move(state, a) or may_move(state, b)):
+        if gone or left_out(state, a) or left_out(state, b) or joints.rule[j] == FREE:
+            continue
+        if may_move(state, a) or may_move(state, b):
             joints.order[found] = j
             found += 1
     joints.active, joints.kept_in = found, state.step_number + 1
@@ -78,6 +82,12 @@ def begin_joints(state, dt):
     return OK
 
 
+@inlined
+def spin_about(state, i, axis):
+    """rad/s of body i, or the world, about an axis."""
+    return dot(axis, state.bodies.spin[owner_of(state, i)]) if i >= 0 else 0.0
+
+
 @part
 def find_driven(state, dt):
     """By how much motors, which act in the solver, may turn each body in the step beyond what its spin does, and how
@@ -93,8 +103,7 @@ def find_driven(state, dt):
         axis, missing = joints.axis[j], joints.target[j]
         if a >= 0 and len(axis) == 3:
             axis = turned(state, a, axis)
-        missing -= dot(axis, bodies.spin[owner_of(state, b)]) if b >= 0 else 0.0
-        missing += dot(axis, bodies.spin[owner_of(state, a)]) if a >= 0 else 0.0
+        missing -= spin_about(state, b, axis) - spin_about(state, a, axis)
         hold = j  # the first row of the joint: the point about which they turn
         while hold > 0 and joints.joint[hold - 1] == joints.joint[j]:
             hold -= 1
@@ -217,3 +226,19 @@ def lay_joints(state):
         joints.base_b[j] = turned(state, b, joints.anchor_b[j]) if b >= 0 else joints.anchor_b[j]
         if joints.kind[j] == SLIDE or len(zero) == 3:
             joints.rail[j] = turned(state, a, joints.axis[j]) if a >= 0 else joints.axis[j]
+
+
+def count_turns(state, dt):
+    """The angles of joints in space where the step ends, with whole turns."""
+    joints = state.solver.joints
+    for j in range(joints.count if len(zero_of(state)) == 3 else 0):
+        a, b, above = joints.row_a[j], joints.row_b[j], max(j - 1, 0)
+        if joints.kind[j] in (TURN, TWIST) and not (left_out(state, a) or left_out(state, b)):
+            axis, end_a = joints.axis[j], joints.anchor_a[j]
+            axis, end_a = (turned(state, a, axis), turned(state, a, end_a)) if a >= 0 else (axis, end_a)
+            end_b, axis_b = joints.anchor_b[j], joints.anchor_b[above]
+            end_b, axis_b = (turned(state, b, end_b), turned(state, b, axis_b)) if b >= 0 else (end_b, axis_b)
+            if joints.rule[j] == FREE:  # others have been counted in each substep
+                joints.value[first_of(joints, j)] += dt * (spin_about(state, b, axis) - spin_about(state, a, axis))
+            turn_about(joints, j, axis, (end_a, end_b), axis_b)
+    return OK

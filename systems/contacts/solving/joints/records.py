@@ -5,14 +5,14 @@ from __future__ import annotations
 from .....framework.jit.records.schema import Schema, flags, floats, integer, ints, number, vectors
 
 POINT, LINE, SLIDE, TURN, ALIGN, CONE, TWIST, GIVEN = range(8)
-HOLD, LIMIT, DRIVE, SPRING, SERVO = range(5)
+HOLD, LIMIT, DRIVE, SPRING, SERVO, FREE = range(6)
 
 JOINTS = Schema(
     "Joints",
     count=integer(),
     joint=ints(),  # the entity of a row's joint
     kind=ints("int8"),  # POINT, LINE, SLIDE, TURN, ALIGN, CONE, TWIST, GIVEN
-    rule=ints("int8"),  # HOLD, LIMIT, DRIVE, SPRING, SERVO
+    rule=ints("int8"),  # HOLD, LIMIT, DRIVE, SPRING, SERVO, FREE
     entity_a=ints(),  # 0: the world
     entity_b=ints(),
     anchor_a=vectors(),  # m from the body's position, along its own axes, of the world a place; of angles in space unit
@@ -37,7 +37,8 @@ JOINTS = Schema(
     thrust=vectors(),
     normal=vectors(),  # along which it acts, or about which
     along_a=vectors(),  # of a GIVEN: the same for the first body
-    value=floats(),  # m or rad of a GIVEN, after the last substep
+    value=floats(),  # m or rad of a GIVEN, after the last substep; of the first row of a joint in space that has a TURN
+    # or a TWIST the angle of that, with whole turns: it stays with the joint while that holds the same bodies
     old_load=floats(),  # the same before the step
     old_pull=vectors(),
     old_normal=vectors(),

@@ -4,10 +4,11 @@ A joint is a few rows, which stand next to each other. POINT holds two anchors t
 SLIDE how far b's anchor is along an axis of a. Others are angles: TURN about an axis; in space ALIGN, by how much an
 axis of b leads away from one of a in one direction, CONE, by how much in all, and TWIST, behind a CONE, how far b turns
 about its axis beyond the shortest way there. GIVEN is what a plugin says, see given. A row HOLDs its value, keeps it
-within LIMITs, DRIVEs it at a speed, brings it there as a SERVO, or is a SPRING. What holds is as soft as a spring of a
-frequency that follows the rate of the substeps, and is solved without that in the passes that do not push; limits are
-not soft, so that no motor is stronger. Springs are solved in the pass that pushes alone. One that swings faster than
-substeps can follow holds its value.
+within LIMITs, DRIVEs it at a speed, brings it there as a SERVO, or is a SPRING; what is FREE has an angle that is
+counted, and no more. Whole turns count: in space against the angle that the joint had before. What holds is as soft as
+a spring of a frequency that follows the rate of the substeps, and is solved without that in the passes that do not
+push; limits are not soft, so that no motor is stronger. Springs are solved in the pass that pushes alone. One that
+swings faster than substeps can follow holds its value.
 
 Joints come before the contacts of their range, in the pass that pushes and once in those that do not. Their bodies have
 the columns of bodies that spin, as contacts of such bodies have: see solving.rows.JOINTED.
@@ -25,6 +26,7 @@ from .given import measure_given, push_given, speed_of_given
 from .records import ALIGN, DRIVE, GIVEN, HOLD, LIMIT, POINT, SERVO, SLIDE, SPRING, TURN, TWIST
 from .springs import first_of, left_to
 
+FULL_TURN = 2.0 * math.pi
 FOLDED = 1e-2  # 1 + cosine of a swing: beyond it a twist is nearly any angle
 LEAST_SHARE = 1e-9  # of its mass that a spring without damping takes part with
 BRAKES = 0.9  # of the speed from which a servo could just stop in time
@@ -152,6 +154,21 @@ def multiplied(diagonal, others, v):
 
 
 @inlined
+def turn_about(joints, j, axis, ends, axis_b):
+    """The same of a TURN or a TWIST in space, of which its joint keeps the angle. ends: the directions between which
+    it is; axis_b: of a TWIST the axis of b."""
+    (end_a, end_b), rate, first = ends, axis, first_of(joints, j)
+    if joints.kind[j] == TWIST:  # what is left where the shortest way has brought b's axis to a's
+        between = add(axis, axis_b)
+        rate = scale(between, 1.0 / max(FOLDED, dot(between, axis)))
+        end_b = add_scaled(end_b, rate, -dot(axis, end_b))
+    angle = math.atan2(dot(axis, cross_spin(end_a, end_b)), dot(end_a, end_b))
+    angle += FULL_TURN * math.floor((joints.value[first] - angle) / FULL_TURN + 0.5)
+    joints.value[first] = angle
+    return rate, angle
+
+
+@inlined
 def angle_of(solver, j):
     """(along which a spin changes it, angle) of a row of angles: for most rows the axis."""
     joints = solver.joints
@@ -160,16 +177,12 @@ def angle_of(solver, j):
         return rail, joints.angle[j] + item(solver.turn[b], 0) - item(solver.turn[a], 0)
     axis = turned_with(solver, a, rail)
     end_a, end_b = turned_with(solver, a, joints.base_a[j]), turned_with(solver, b, joints.base_b[j])
-    if joints.kind[j] == TWIST:  # what is left where the shortest way has brought b's axis, of the row before, to a's
-        between = add(axis, turned_with(solver, b, joints.base_b[j - 1]))
-        rate = scale(between, 1.0 / max(FOLDED, dot(between, axis)))
-        end_b = add_scaled(end_b, rate, -dot(axis, end_b))
-        return rate, math.atan2(dot(axis, cross_spin(end_a, end_b)), dot(end_a, end_b))
+    if joints.kind[j] in (TURN, TWIST):
+        axis_b = turned_with(solver, b, joints.base_b[j - 1]) if joints.kind[j] == TWIST else axis  # of the CONE before
+        return turn_about(joints, j, axis, (end_a, end_b), axis_b)
     across = cross_spin(end_a, end_b)
     if joints.kind[j] == ALIGN:
         return axis, dot(axis, across)
-    if joints.kind[j] == TURN:
-        return axis, math.atan2(dot(axis, across), dot(end_a, end_b))
     size = length(across)
     return scale(across, 1.0 / size) if size > 0.0 else axis, math.atan2(size, dot(end_a, end_b))
 
