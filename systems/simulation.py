@@ -151,7 +151,7 @@ class Simulation:
 
     def set_gravity(self, gravity: Any) -> None:
         self.gravity = gravity_vector(gravity, self.dimensions)
-        self.state.gravity = self.gravity[None].copy()
+        self.state.gravity, self.state.pushed = self.gravity[None].copy(), True  # sleepers look at their forces
 
     # -- a step -----------------------------------------------------------------------------------
 

@@ -315,7 +315,7 @@ class Adoption:
         if table.on_written is not None:
             staying = [table.find(entity) for own in fresh.values() for entity, _ in own]
             for row in {*staying, *(row for losing in changes.missing.values() for row in losing)}:
-                table.on_written("", row)
+                table.on_written(row, "", None)
         carriers = fresh.get(table.kind_carrier)  # type: ignore[arg-type]
         if carriers is not None:
             rows = table.rows_of(np.array([entity for entity, _ in carriers]))

@@ -281,6 +281,8 @@ class Column:
             return
         self.check_dimensions(value, store.dimensions, handle._entity)
         row = handle._row if handle._version == store.version else handle._locate()
+        if store.on_written is not None:
+            store.on_written(row, self.key, value)
         array = store.arrays.get(self.key)
         (store.make(self.key) if array is None else array)[row] = value
         store.written(self, row)

@@ -286,6 +286,7 @@ class RowStore:
     """
 
     version = 0
+    on_written = None
 
     def __init__(
         self, arrays: dict[str, np.ndarray], dimensions: int, constants: dict[str, tuple[Column, Any]], count: int

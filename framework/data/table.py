@@ -46,7 +46,8 @@ class Table(TableColumns):
         self._types_version: Any = None
         self._by_id, self._by_id_version = np.empty(0, np.int64), -1
         self._next_row = 0  # after the one that was looked up last
-        self.on_written: Callable[[str, int], None] | None = None  # called with what code of the game has written
+        # called with what code of the game writes to a row, before it is; None: its components are others
+        self.on_written: Callable[[int, str, Any], None] | None = None
         self.on_rows_moved: Callable[[RowPlan], None] = lambda plan: None
         self.on_arrays_changed: Callable[[], None] = lambda: None  # called when a row has got another array
         self.on_changed_inside: Callable[[Any, int, int, np.ndarray], None] = lambda *_: None  # see changed_inside
@@ -256,7 +257,5 @@ class Table(TableColumns):
     def written(self, column: Column, row: int) -> None:
         if row >= self.stops[1]:
             self.static_version += 1
-        if self.on_written is not None:
-            self.on_written(column.key, row)
         if column.on_write is not None:
             column.on_write(self, row)

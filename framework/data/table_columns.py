@@ -219,6 +219,11 @@ class TableColumns:
         fill = self._fills[key]
         array[row] = fill if type(fill) is np.ndarray and type(value) is float else value  # 3D: no rotation
 
+    def is_other(self, key: str, row: int, value: Any) -> bool:
+        """Whether a value, as a handle writes it, is not the one that the row has; NaN is like NaN."""
+        now = self.column(key)[row]
+        return not np.all((now == value) | ((now != now) & (value != value)))
+
     def _is_default(self, key: str, value: Any) -> bool:
         """Whether that value has the bits of the default of a column on demand."""
         fill = self._fills[key]

@@ -191,6 +191,8 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
             raise TypeError(f"settings must be Settings, got {settings!r}")
         self._open()
         self._pipeline.must_be_between_steps("settings can be replaced")
+        if settings == self._settings:
+            return
         self._pipeline.physics.check_settings(settings)
         self._pipeline.clock.set_dt(settings.dt)
         self._settings = settings

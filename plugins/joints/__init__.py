@@ -14,7 +14,16 @@ from ...components.spin import Spin
 from ...framework import NoPhysicsError, Plugin, World
 from ...framework.plugins.joints import Placed, rows_of
 from ...systems.contacts.solving.joints.records import (
-    DRIVE, FREE, GIVEN, HOLD, JOINTS, LIMIT, POINT, SERVO, SPRING, TURN,
+    DRIVE,
+    FREE,
+    GIVEN,
+    HOLD,
+    JOINTS,
+    LIMIT,
+    POINT,
+    SERVO,
+    SPRING,
+    TURN,
 )  # fmt: skip
 from ...systems.tracking import BEFORE_STEP
 from .arms import arm_of, moment
@@ -276,21 +285,20 @@ class Joints(Plugin):
             self._joints[entity], self._holds = joint, None
             if entity < last:
                 self._joints = dict(sorted(self._joints.items()))
-        if other and any(TURN <= row.kind < GIVEN and row.rule not in (HOLD, FREE) for row in rows) and not self._turns(joint):
-            name, ends = type(joint).__name__, ", ".join(f"entity {e}" for e in (joint.a, joint.b) if e != WORLD)
-            self.world.report_fault(
-                f"entity {entity}: this {name} turns nothing, for it joins bodies without Spin: {ends}",
-                kind="a joint turns nothing", entity=entity,
-            )  # fmt: skip
+        if other and any(TURN <= row.kind < GIVEN and row.rule not in (HOLD, FREE) for row in rows):
+            self._tell_if_nothing_turns(joint)
         return bodies
 
-    def _turns(self, joint: Joint) -> bool:
-        """Whether one of its bodies can turn."""
-        entities = self._contents.entities
-        bodies = [whole_body(self._contents, body) for body in (joint.a, joint.b) if body != WORLD]
-        return any(
-            Spin in entities.types_of(body) and entities.handle(body, RigidBody).kind == "dynamic" for body in bodies
-        )
+    def _tell_if_nothing_turns(self, joint: Joint) -> None:
+        entities, name = self._contents.entities, type(joint).__name__
+        ends = [whole_body(self._contents, body) for body in (joint.a, joint.b) if body != WORLD]
+        if any(Spin in entities.types_of(e) and entities.handle(e, RigidBody).kind == "dynamic" for e in ends):
+            return
+        ends = ", ".join(f"entity {e}" for e in ends)
+        self.world.report_fault(
+            f"entity {joint.entity}: this {name} turns nothing, for it joins bodies without Spin: {ends}",
+            kind="a joint turns nothing", entity=joint.entity,
+        )  # fmt: skip
 
     def _drop(self, entities: set[int]) -> set[int]:
         """These joints have no rows any more; the bodies that they have held."""

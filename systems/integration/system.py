@@ -161,6 +161,7 @@ class Integration(StagedSystem):
         state, integrator = self._state, self.integrator
         state.moves_with_old_velocity = bool(getattr(integrator, "moves_with_old_velocity", False))
         state.flies = isinstance(integrator, Flight)
+        state.pushed |= state.has_force_systems  # one may be gone: sleepers look at their forces
         state.force_changes = bool(self.world.force_systems)
         by_stages = any("force" in stage.writes for stage in self._program.stages if stage.plugin)
         state.has_force_systems = state.force_changes or by_stages

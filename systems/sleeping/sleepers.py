@@ -209,13 +209,14 @@ class Sleepers:
         if self._table.in_step and self._state.moved:  # they look for others already
             self._join()
 
-    def _mark_row(self, key: str, row: int) -> None:
-        """Code of the game has written to that row. A push that is the same in each step wakes nothing."""
+    def _mark_row(self, row: int, key: str, value: Any) -> None:
+        """Code of the game writes to that row. A push that is the same in each step wakes nothing, nor does a value
+        that it has."""
         if key in PUSHES:
             self._pushed = True
             return
         still = self._table.arrays.get("_still")
-        if still is not None and still.item(row) > AWAKE:
+        if still is not None and still.item(row) > AWAKE and (key == "" or self._table.is_other(key, row, value)):
             still[row], self._disturbed = DISTURBED, True
 
     def watch(self, key: str) -> None:

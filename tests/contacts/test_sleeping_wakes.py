@@ -4,8 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers_sleeping import CAUSES, EVERYWHERE, GRAVITY, MODES, is_asleep, sleep, sleepy_world, tower, two_towers
-from worlds import ball, floor
+from helpers_sleeping import (
+    CAUSES,
+    EVERYWHERE,
+    GRAVITY,
+    MODES,
+    ground,
+    is_asleep,
+    part,
+    sleep,
+    sleepy_world,
+    tower,
+    two_towers,
+)
+from worlds import ball, box, floor
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Phase, Settings, System, World
@@ -257,6 +269,77 @@ def test_springs_and_other_force_systems_wake(integrator):
     wind.strength = 0.5
     world.step()
     assert is_asleep(world, *boxes) == [False]
+
+
+EQUAL = {  # what changes nothing
+    "settings": lambda world, boxes: setattr(world, "settings", world.settings.replace(dt=1 / 60)),
+    "gravity": lambda world, boxes: setattr(world, "gravity", (0.0, -GRAVITY)),
+    "velocity": lambda world, boxes: setattr(part(world, boxes[0], RigidBody), "linear_velocity", (0.0, 0.0)),
+    "position": lambda world, boxes: setattr(
+        part(world, boxes[0], Transform), "position", part(world, boxes[0], Transform).position.copy()
+    ),
+    "mass": lambda world, boxes: setattr(part(world, boxes[0], RigidBody), "mass", 1.0),
+    "limit": lambda world, boxes: setattr(part(world, boxes[0], RigidBody), "max_linear_speed", None),
+    "size": lambda world, boxes: setattr(part(world, boxes[0], AABBCollider), "half_extents", (0.5, 0.5)),
+    "kind": lambda world, boxes: setattr(part(world, boxes[0], RigidBody), "kind", "dynamic"),
+    "floor": lambda world, boxes: setattr(part(world, ground(world), AABBCollider), "friction", 0.5),
+}
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_equal_values_wake_nothing(mode):
+    world = sleepy_world(collision=mode)
+    boxes = tower(world, 0.0)
+    sleep(world, *boxes)
+    for cause, write in EQUAL.items():
+        write(world, boxes)
+        world.step()
+        assert all(is_asleep(world, *boxes)), cause
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("mode", MODES)
+def test_what_sleeps_falls_at_once_where_gravity_says(mode, d):
+    world = sleepy_world(d, collision=mode)
+    body, light = box(world, (0.0, 0.5, 0.0)[:d]), box(world, (5.0, 0.5, 0.0)[:d])
+    world.component_for_entity(light, RigidBody).gravity_scale = 0.0
+    sleep(world, body, light)
+    snapshot = world.snapshot()
+    hashes = []
+    for again in (False, True):
+        world.gravity = (0.0, GRAVITY, 0.0)[:d]
+        if again:
+            world.restore(world.snapshot())  # what wakes is not forgotten
+        for _ in range(60):
+            world.step()
+        risen = 0.5 * GRAVITY * (1.0 if mode == "event_driven" else 1.0 + 1 / 60)  # semi-implicit
+        assert world.component_for_entity(body, Transform).position[1] == pytest.approx(0.5 + risen, abs=2e-3)
+        assert is_asleep(world, body, light) == [False, True]
+        hashes.append(world.state_hash())
+        world.restore(snapshot)
+    assert hashes[0] == hashes[1]
+
+
+def test_a_force_system_that_comes_or_goes_wakes_what_it_pushes():
+    class Wind(ForceSystem):
+        strength = 0.5
+
+        def add_forces(self, bodies, time):
+            bodies.force += (self.strength, 0.0)
+
+    world, wind = sleepy_world(), Wind()
+    boxes = tower(world, 0.0)
+    sleep(world, *boxes)
+    for change in (world.add_system, world.remove_system):
+        change(wind)
+        world.step()
+        assert not any(is_asleep(world, *boxes))
+        sleep(world, *boxes)
+    wind.strength = 0.0
+    for change in (world.add_system, world.remove_system):
+        change(wind)
+        world.step()
+        assert all(is_asleep(world, *boxes))
 
 
 @pytest.mark.parametrize("column", [False, True])
