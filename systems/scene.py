@@ -125,9 +125,11 @@ class Scene:
         if self._columns_version != table.columns_version:
             self.bind_columns()
         state.count, state.version = count, table.version
-        state.statics_version += int(state.first > 0 and state.sleepers != table.blocks[0])  # other rows sleep
-        state.sleepers, state.dynamic, state.moving, _ = table.blocks
-        state.first = min(state.first, state.sleepers)
+        sleepers, state.dynamic, state.moving, _ = table.blocks
+        if state.first > 0:
+            state.statics_version += int(state.sleepers != sleepers)  # other rows sleep
+            state.first = min(state.first, sleepers)
+        state.sleepers = sleepers
 
     def _build(self, present: list[type[Any]]) -> None:
         """Make everything that depends on which colliders there are."""
@@ -179,8 +181,10 @@ class Scene:
         bodies, linked = state.bodies, self.linked
         if len(self._taken_out[0]) or (linked and count - moving > len(bodies.static_position)):
             return False
-        if linked and (self._shapes_version != table.columns_version or linked.has_array_columns):
+        if linked and self._shapes_version != table.columns_version:
             self._bind_shapes()
+        else:
+            self.follow_arrays()
         shapes, slots, collides = bodies.shape[:count], state.shapes.slots, False
         arrived = self._arrived if self._arrived_in == table.version else (shapes == ARRIVED).nonzero()[0]
         if len(arrived) <= FEW:
@@ -359,10 +363,11 @@ class Scene:
             self.state.statics_version += 1
         if needed:
             known = bodies.axes_rotation[: rotation.size].reshape(rotation.shape)
-            old = rotation != known
-            rows = (old if old.ndim == 1 else old.any(axis=1)).nonzero()[0]
-            self._axes[rows] = axes_of(rotation[rows], self.state.dimensions)
-            known[rows] = rotation[rows]
+            old = rotation != known  # of the four numbers of a quaternion any
+            rows = (old if old.ndim == 1 else old.view(np.int32)[:, 0]).nonzero()[0]
+            if len(rows):
+                self._axes[rows] = axes_of(rotation[rows], self.state.dimensions)
+                known[rows] = rotation[rows]
         if self.state.several_levels:  # a box that is stretched may reach out of the level around it
             turned = rotation != 0.0 if self.state.dimensions == 2 else rotation[:, 1:].any(axis=1)
             bodies.level_not_enclosing[:count] = self.stretches & turned

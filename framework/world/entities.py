@@ -181,15 +181,15 @@ class EntityVerbs:
         except KeyError:
             raise KeyError(f"no entity {entity!r} in this world") from None
 
-    def _check(self, components: Iterable[Any], entity: int | None) -> None:
-        components = tuple(components)
-        dimensions, types = self.dimensions, {type(component) for component in components}
+    def _check(self, components: Collection[Any], entity: int | None) -> None:
+        dimensions, contents, types = self.dimensions, self._contents(), set(map(type, components))
         for component in components:
             if isinstance(component, Component):
-                self.registry.require(type(component), entity)
+                if component.plugin:
+                    self.registry.require(type(component), entity)
                 if dimensions is not None:
                     component.fit(dimensions, entity)
-                component.check_in(self._contents(), entity, types)
+                component.check_in(contents, entity, types)
             elif isinstance(component, type):
                 raise TypeError(f"components are instances: {component.__name__}(...), got the class itself")
             elif isinstance(component, (list, tuple, Many)):

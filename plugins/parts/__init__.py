@@ -151,7 +151,8 @@ class Parts(Plugin):
         ids, bits, shared = self._look()
         bodies = self._table.column("part_of.body")[self._table.rows_of(ids)]
         same = np.zeros(len(ids), bool)
-        before, known, then = self._followed if self._seen is not None else (ids[:0], bits[:0], None)
+        nothing = ids[:0], bits[:0], None
+        before, known, then = (self._followed or nothing) if self._seen is not None else nothing
         if shared == then and len(before) and known.shape[1] == bits.shape[1]:
             at = np.minimum(before.searchsorted(ids), len(before) - 1)
             same = (before[at] == ids) & (known[at] == bits).all(axis=1) & ~np.isin(bodies, ids)
@@ -166,6 +167,10 @@ class Parts(Plugin):
         if self._generation != self._table.generation:  # ids mean other entities
             self._generation, self._seen = self._table.generation, None
             self._added, self._weighed, self._places = {}, {}, {}
+        table = self._table
+        if not (self._added or self._record.count or table.has_mask(PartOf)[: table.count].any()):
+            self._seen, self._followed = self._now(), None  # no parts
+            return
         changed, gone, body_of = self._find_changed()
         places = {entity: self._place(entity, body_of) for entity in changed}
         lost = [entity for entity, place in places.items() if self._table.row_of(place.holder) < 0]
@@ -174,7 +179,8 @@ class Parts(Plugin):
             del places[entity]
         for entity, place in places.items():
             self._check(entity, place.holder)
-        self._add_masses(places, [*gone, *lost])
+        if places or gone or lost:
+            self._add_masses(places, [*gone, *lost])
         for entity, place in places.items():
             self._put(entity, place)
         if changed or gone or self._record.count != len(self._places):

@@ -62,7 +62,10 @@ class Extensions:
 
     def unsettled(self) -> bool:
         """Whether a plugin has something to do before or after this step."""
-        return bool(self.waiting) and any(waits() for waits in self.waiting)
+        for waits in self.waiting:  # noqa: SIM110  called in every step
+            if waits():
+                return True
+        return False
 
     def follow(self, program: Program) -> bool:
         """Between two steps: what plugins and bodies there are now. True if the program has got other stages."""

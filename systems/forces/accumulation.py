@@ -80,7 +80,7 @@ class ForceAccumulation(StagedSystem):
     def kind(self) -> tuple[int, bool]:
         """How many force systems there are, and whether some give torques: bodies turn at each evaluation then."""
         systems = self.world.force_systems
-        return len(systems), any(Spin in system.requires for system in systems)
+        return len(systems), bool(systems) and any(Spin in system.requires for system in systems)
 
     def add_systems(self, time: float) -> None:
         """Let each force system add to ``force``: in place where all bodies have what it requires, else to copies."""

@@ -31,6 +31,7 @@ class StepLinks:
     ) -> None:
         self._scene, self._state, self._program = scene, scene.state, program
         self._integration, self._search, self._extensions = integration, search, extensions
+        self._joints, self._parts = self._state.solver.joints, self._state.parts
         self._state.links = np.zeros(len(PLACES), np.int64)
         self.version = NEVER  # of the scene
         self._forces = NEVER, False  # how many force systems there were, and whether some of them turn
@@ -47,7 +48,7 @@ class StepLinks:
         return self._scene.version == self.version and force_systems == self._forces and joined == self._joined
 
     def _have_joints_and_parts(self) -> tuple[bool, bool]:
-        return self._state.solver.joints.count > 0, self._state.parts.count > 0
+        return self._joints.count > 0, self._parts.count > 0
 
     def needs_sweeps(self) -> bool:
         """Whether some body is swept: all of them in the mode, or those whose ccd is set."""
@@ -103,7 +104,7 @@ class StepLinks:
         def wanted(stage: Stage) -> bool:
             return conditions.get(stage.needed, False)
 
-        parts = self._parts()
+        parts = self._parts_by_address()
         link_all((*self._functions_of_shapes(), *parts.values(), *self._program.functions(wanted)))
         for place, part in parts.items():
             state.links[place] = part.address
@@ -136,7 +137,7 @@ class StepLinks:
             sweeps = self._state.sweeps_ready or self._bounces
             yield from linked.all_functions(sweeps, self._scene.moments_asked)
 
-    def _parts(self) -> dict[int, Linked]:
+    def _parts_by_address(self) -> dict[int, Linked]:
         """The parts of stages that are called by address: those of swept bodies and of impacts only where there may be
         any."""
         if not self._state.collides:
@@ -156,7 +157,7 @@ class StepLinks:
     def link_impacts(self) -> None:
         """What impacts need, where nothing could bounce when the stages were linked."""
         self._bounces = True
-        for place, part in self._parts().items():
+        for place, part in self._parts_by_address().items():
             self._state.links[place] = part.address
         self.link_shapes()
 

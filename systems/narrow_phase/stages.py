@@ -17,25 +17,29 @@ SURE = 1.0 - 1e-12  # factor that makes a number less than the exact one, whatev
 
 @part
 def rank_rows(state):
-    """The place of each row in the order of entity ids: four sorted runs are merged."""
-    entity, rank = state.bodies.entity, state.bodies.rank
-    asleep, dynamic, kinematic, static = 0, state.sleepers, state.dynamic, state.moving
-    for place in range(state.count):
-        row, lowest = -1, 0
-        if asleep < state.sleepers:
-            row, lowest = asleep, entity[asleep]
-        if dynamic < state.dynamic and (row < 0 or entity[dynamic] < lowest):
-            row, lowest = dynamic, entity[dynamic]
-        if kinematic < state.moving and (row < 0 or entity[kinematic] < lowest):
-            row, lowest = kinematic, entity[kinematic]
-        if static < state.count and (row < 0 or entity[static] < lowest):
-            row = static
-        rank[row] = place
-        asleep += row == asleep
-        dynamic += row == dynamic
-        kinematic += row == kinematic
-        static += row == static
+    """The place of each row in the order of entity ids, which ascend in each of four runs: how many ids of its own run
+    and of the others are smaller."""
+    entity, rank, stops = state.bodies.entity, state.bodies.rank, block_stops(state)
+    start = 0
+    for run in range(4):
+        stop, first = stops[run], 0
+        for i in range(start, stop):
+            rank[i] = i - start
+        for other in range(4):
+            last, k = stops[other], first
+            for i in range(start, stop if other != run and first < last else start):
+                while k < last and entity[k] < entity[i]:
+                    k += 1
+                rank[i] += k - first
+            first = last
+        start = stop
     state.ranks_version = state.version
+
+
+@part
+def block_stops(state):
+    """The first row after those that sleep, the dynamic, the kinematic and the static ones."""
+    return state.sleepers, state.dynamic, state.moving, state.count
 
 
 def order_candidates(state, dt):

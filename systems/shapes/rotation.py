@@ -17,7 +17,7 @@ def axes_of(rotation: np.ndarray, dimensions: int) -> np.ndarray:
         matrices[:, 1, 0], matrices[:, 1, 1] = sine, cosine
         return matrices
     w, x, y, z = (rotation / np.linalg.norm(rotation, axis=1, keepdims=True)).T
-    matrices[:, 0] = np.stack((1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)), axis=1)
-    matrices[:, 1] = np.stack((2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)), axis=1)
-    matrices[:, 2] = np.stack((2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)), axis=1)
+    matrices[:, 0].T[:] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
+    matrices[:, 1].T[:] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
+    matrices[:, 2].T[:] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
     return matrices

@@ -71,12 +71,6 @@ class LinkedShapes:
         """Whether functions of some shape see the bodies' axes."""
         return any(shape.rotates for shape in self.shapes)
 
-    @cached_property
-    def has_array_columns(self) -> bool:
-        """Whether some shape has parameters in a pool of arrays, which may move when bodies come."""
-        columns = (shape.component.columns[name] for shape in self.shapes for name in shape.columns)
-        return any(isinstance(column, ArrayColumn) for column in columns)
-
     def fill(self, shapes: Record, sweeps: bool = False, moments: bool = False) -> None:
         """Write the tables of functions into a record of ``SHAPES``; compiles or loads what is new.
 
@@ -144,6 +138,11 @@ class ParameterRecords:
         self._linked = linked
         self.own = [make_parameter_record(shape, linked.dimensions) for shape in linked.shapes]
         self.world = list(self.own)
+        self._arrays = [
+            (number, name, column)
+            for number, shape in enumerate(linked.shapes) for name in shape.columns
+            if isinstance(column := shape.component.columns[name], ArrayColumn)
+        ]  # fmt: skip
         for number in linked.supported(moments):
             self.need_support(number)
 
@@ -173,12 +172,9 @@ class ParameterRecords:
 
     def follow_arrays(self) -> None:
         """Some rows have other arrays: their pools may have moved."""
-        for number, shape in enumerate(self._linked.shapes):
-            for name in shape.columns:
-                column = shape.component.columns[name]
-                if isinstance(column, ArrayColumn):
-                    show_pool(self.own[number], name, column)
-                    show_pool(self.world[number], name, column)
+        for number, name, column in self._arrays:
+            show_pool(self.own[number], name, column)
+            show_pool(self.world[number], name, column)
 
     def need_support(self, number: int) -> None:
         """Some pair takes this shape by the addresses of its support and rounding: put them into its records."""
