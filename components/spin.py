@@ -34,7 +34,7 @@ class Spin(Component):
         rad/s; in 3D (3,), along the world's axes
     inertia
         kg m^2 about the body's position; in 3D the (3,) principal moments about its own axes. None: of its mass, spread
-        evenly over its last collider
+        evenly over its last collider, also after that has been removed
     angular_damping
         rate c in 1/s: the angular velocity decays as exp(-c t)
     max_angular_speed
@@ -75,6 +75,9 @@ class Spin(Component):
     applied_torque: Angular = special_column(default=0.0, item="angular", init=False)
     applied_frame: int = special_column(default=-1, dtype=int, init=False, on_write=force_applied)
     step_torque: Angular = special_column(default=0.0, item="angular", init=False)
+    # m^2, of the collider that it had last: inertia per mass, in 3D xx, yy, zz and xy, xz, yz.
+    gyration: Angular | None = special_column(default=None, item="angular", optional=True, init=False)
+    gyration_products: Angular = special_column(default=0.0, item="angular", init=False)
 
     def apply_torque(self, torque: Angular) -> None:
         """Turn with ``torque``, N m; in 3D (3,), along the world's axes. How long it acts: as a force does, see
@@ -109,17 +112,17 @@ class Spin(Component):
         row = store.find(self._entity)
         parts, mass = rows_of_parts(store, int(store.column("entity")[row])), float(store.column("mass")[row])
         if not len(parts):
-            shape = mass_of_shape(store, row)
-            if shape is None:
+            found = inertia_without_parts(store, row, mass)
+            if found is None:
                 raise CaromError(f"entity {self._entity}: {UNKNOWN}")
-            return shape.inertia(mass)
+            return found
         masses, turns = store.column("part_of.added")[parts], store.column("part_of.turn")[parts]
         own, share = mass - masses.sum(), min(1.0, mass / max(masses.sum(), mass))
         total: Any = 0.0
         for k, weight, turn in zip((row, *parts), (own, *share * masses), (0.0, *turns), strict=True):
-            shape = mass_of_shape(store, k) if weight > 0.0 else None
-            if shape is not None:
-                total = total + shape.inertia(weight, turn)
+            found = inertia_without_parts(store, k, weight, turn) if weight > 0.0 else None
+            if found is not None:
+                total = total + found
         return total
 
     def _turned_by(self, twist: Any) -> Angular:
@@ -204,6 +207,35 @@ def mass_of_shape(store: Any, row: Any) -> MassOfShape | None:
     shape._bind(store, int(store.column("entity")[row]))
     moments, offset = colliders[0].second_moments(shape, store.dimensions), np.array(shape.offset)  # type: ignore[attr-defined]
     return MassOfShape(offset + np.array(moments[1 : 1 + store.dimensions]), moments, offset)
+
+
+def inertia_without_parts(store: Any, row: Any, mass: float, turn: Any = 0.0) -> Any:
+    """kg m^2 of a row by its collider, or the one that it had last; None if it had none that tells it."""
+    shape = mass_of_shape(store, row)
+    if shape is not None:
+        return shape.inertia(mass, turn)
+    if "spin.gyration" not in store.arrays or np.isnan(store.arrays["spin.gyration"][row]).any():
+        return None
+    if any(issubclass(component, Collider) for component in store.types_in(row)):
+        return None
+    own, products = (store.arrays[f"spin.{name}"][row] for name in ("gyration", "gyration_products"))
+    if store.dimensions == 2:
+        return mass * float(own)
+    (xx, yy, zz), (xy, xz, yz) = own, products
+    return mass * np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
+
+
+def keep_gyration(store: Any, component: type[Component], rows: np.ndarray) -> None:
+    """Bodies that are about to lose that component turn on as they do if it was their only collider."""
+    if not issubclass(component, Collider) or Spin not in store.mask_names:
+        return
+    for row in rows[store.has_mask(Spin)[rows]].tolist():
+        shape = mass_of_shape(store, row)
+        if shape is not None:
+            tensor = shape.inertia(1.0)
+            own, products = store.make("spin.gyration"), store.make("spin.gyration_products")
+            own[row] = np.diagonal(tensor) if np.ndim(tensor) else tensor
+            products[row] = tensor[(0, 0, 1), (1, 2, 2)] if np.ndim(tensor) else 0.0
 
 
 def spin_energy(store: Any, entities: np.ndarray) -> float:

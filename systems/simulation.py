@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..components import Transform
+from ..components.spin import keep_gyration
 from ..framework.data.adoption import Adoption
 from ..framework.data.bodies import Bodies
 from ..framework.data.column_copies import ColumnCopies
@@ -69,6 +71,7 @@ class Simulation:
         self.set_gravity(gravity)
         self.scene = Scene(self.state, self.table, world.registry, lambda: world.settings)
         self.adoption = Adoption(self.table, Transform, world._contents(), LevelCheck(self.table, world.registry))
+        self.adoption.on_losing = partial(keep_gyration, self.table)
         self.bodies = Bodies(self.table)
         source = RecordedContacts(self.state)
         self.contacts = Contacts(dimensions, self._membership, self._running_step, source)

@@ -7,7 +7,7 @@ log.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import compress
 from typing import Any
@@ -87,6 +87,8 @@ class Adoption:
     check_together
         may refuse, with a ValueError, what does not go together on one entity, see
         :class:`~carom.systems.shapes.geometry_levels.LevelCheck`
+    on_losing
+        called with a type and rows before these lose it
     """
 
     def __init__(self, table: Table, anchor: type[Component], contents: Contents, check_together: Any) -> None:
@@ -94,6 +96,7 @@ class Adoption:
         self._contents, self._log, self._entities = contents, contents.log, contents.entities
         self._check_together = check_together
         self._archetypes: dict[tuple[Any, ...], Archetype] = {}  # by the types of all components
+        self.on_losing: Callable[[type[Component], np.ndarray], None] = lambda component, rows: None
         contents.entities.table = table
 
     def settled(self) -> bool:
@@ -311,6 +314,7 @@ class Adoption:
         if lost or changes.detached:
             self._let_go([*changes.detached, *(handle for handle in lost if cleared or not self._has(handle))])
         for component, losing in changes.missing.items():
+            self.on_losing(component, np.array(losing))
             self._empty(component, np.array(losing))
         if table.on_written is not None:
             staying = [table.find(entity) for own in fresh.values() for entity, _ in own]

@@ -22,6 +22,16 @@ from ...systems.shapes.quaternions import product, rotate, rotation_in_space, se
 TRIPLE = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))  # of the step: the outer two of Yoshida's three
 HEAVY = 5.0  # damping times the step: above it the middle one, which goes back in time, enlarges rounding too much
 NOT_POSITIVE = "Spin.inertia must be positive and finite"
+NO_EXTENT = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+
+
+@part
+def gyration_of(state, spin, i):
+    """Inertia per mass of the collider that a body has had last."""
+    own, products = spin.gyration, spin.gyration_products
+    if len(zero_of(state)) == 2:
+        return 0.0, 0.0, own[i, 0], 0.0, 0.0, 0.0
+    return own[i, 0], own[i, 1], own[i, 2], products[i, 0], products[i, 1], products[i, 2]
 
 
 @part
@@ -36,9 +46,14 @@ def inertia_of(state, spin, i):
         if d == 2:
             return 0.0, 0.0, spin.inertia[i, 0], 0.0, 0.0, 0.0
         return spin.inertia[i, 0], spin.inertia[i, 1], spin.inertia[i, 2], 0.0, 0.0, 0.0
-    if has_parts(state, i):
-        return inertia_of_compound(state, i)
     shape = bodies.levels[0, i] if state.collides else -1
+    lost = shape < 0 and spin.gyration[i, 0] == spin.gyration[i, 0]
+    if has_parts(state, i):
+        return inertia_of_compound(state, i, gyration_of(state, spin, i) if lost else NO_EXTENT)
+    if lost:
+        xx, yy, zz, xy, xz, yz = gyration_of(state, spin, i)
+        m = bodies.mass[i]
+        return m * xx, m * yy, m * zz, m * xy, m * xz, m * yz
     several = state.collides and state.several_levels and bodies.levels[state.level_count - 1, i] != shape
     if shape < 0 or several or state.shapes.moments[shape] == 0:
         state.blamed = i + 1

@@ -59,7 +59,7 @@ def spin_of(state, spin, i):
 
 TURNS_BY = (
     "mass", "quarantined", "still", "levels", "shapes", "spin.inertia", "spin.angular_damping",
-    "spin.max_angular_speed", "spin.constant_torque", "spin.applied_torque",
+    "spin.max_angular_speed", "spin.constant_torque", "spin.applied_torque", "spin.gyration", "spin.gyration_products",
 )  # fmt: skip
 
 
@@ -149,7 +149,7 @@ def write_inverse_inertia(state, spin, i):
     after="check_flight", records=(Spin,),
     reads=(
         "mass", "quarantined", "shapes", "levels", "offset", "rotation", "spin.inertia", "spin.angular_velocity",
-        "spin.rolling_friction",
+        "spin.rolling_friction", "spin.gyration", "spin.gyration_products",
     ),
     writes=("spin", "inverse_inertia", "inverse_products", "rolling_radius", "rolling_friction", "turn", "reach"),
     needed="colliders or joints",

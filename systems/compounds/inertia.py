@@ -29,9 +29,10 @@ def inertia_of_row(state, i, mass):
 
 
 @part
-def inertia_of_compound(state, i):
+def inertia_of_compound(state, i, gyration):
     """The same of a body and all its parts, along its own axes. What of its mass is not that of parts is spread over
-    its own collider; without one it is at its centre. If parts have more than the whole, theirs count for less."""
+    its own collider; without one it has that inertia per mass. If parts have more than the whole, they count for
+    less."""
     bodies, parts, plane = state.bodies, state.parts, len(zero_of(state)) == 2
     of_parts, k = 0.0, bodies.next_part[i]
     while k >= 0:
@@ -40,7 +41,8 @@ def inertia_of_compound(state, i):
     own, share = bodies.mass[i] - of_parts, 1.0
     if own < 0.0:
         own, share = 0.0, bodies.mass[i] / of_parts
-    xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    xx, yy, zz, xy, xz, yz = gyration
+    xx, yy, zz, xy, xz, yz = own * xx, own * yy, own * zz, own * xy, own * xz, own * yz
     if own > 0.0 and state.collides and bodies.levels[state.level_count - 1, i] >= 0:
         xx, yy, zz, xy, xz, yz = inertia_of_row(state, i, own)
     k = bodies.next_part[i]

@@ -13,6 +13,7 @@ import scipy.spatial
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import CaromError, Phase, Settings, StepError, System, World
 from carom.plugins import Physics, capsule, convex_hull, convex_polygon
+from carom.plugins.parts import PartOf, Parts
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 pytestmark = pytest.mark.plain
@@ -308,6 +309,43 @@ def test_a_world_with_the_plugin_but_without_a_spin_runs_the_same_stages_and_bit
                 world.step()
             found.append((world.state_hash(), str(world.plan()).partition("columns, bytes per body")[0]))
     assert found[0] == found[1]
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("seed", range(2))
+def test_a_collider_that_is_gone_for_a_moment_leaves_the_inertia_as_it_was(seed, d, tmp_path):
+    """Free flight of lopsided boxes, some with a part, is to the bit that of twins which keep theirs, also in a file;
+    torques, impulses and energy too. Another mass counts, and so does another collider."""
+    random, found = np.random.default_rng(seed), []
+    values = [(random.uniform(0.1, 0.6, d), random.uniform(-0.3, 0.3, d), random.uniform(0.5, 4)) for _ in range(4)]
+    for goes in (False, True):
+        with World(Physics(d), Rotation(), Parts()) as world:
+            bodies = []
+            for k, (half, offset, mass) in enumerate(values):
+                body = RigidBody(mass), Spin(2.0 if d == 2 else (2.0, 1.0, -3.0)), BoxCollider(half, offset=offset)
+                bodies.append(world.create_entity(Transform(9.0 * k * np.eye(d)[0]), *body))
+            world.create_entity(PartOf(bodies[0], np.eye(d)[0], mass=0.3), SphereCollider(0.2))
+            world.step()
+            removed = [world.component_for_entity(body, BoxCollider) for body in bodies if goes]
+            for body in bodies[: len(removed)]:
+                world.remove_component(body, BoxCollider)
+            for _ in range(10):
+                world.component_for_entity(bodies[1], RigidBody).mass += 0.1
+                world.component_for_entity(bodies[2], Spin).apply_torque(0.5 if d == 2 else (0.5, 0.1, 0.2))
+                world.component_for_entity(bodies[3], Spin).apply_impulse(np.eye(d)[1], at=(27.5, 0.1, 0.2)[:d])
+                world.step()
+            if goes:
+                world.save(tmp_path / "twin")
+                world = World.load(tmp_path / "twin", Physics(d), Rotation(), Parts())
+            for body, collider in zip(bodies, removed, strict=False):
+                world.add_component(body, collider.copy())
+            for _ in range(3):
+                world.step()
+            found.append((*[getattr(world.bodies, name).copy() for name in ("position", "rotation", "linear_velocity")],
+                          world.bodies.spin.angular_velocity.copy(), world.kinetic_energy()))  # fmt: skip
+    for kept, without in zip(*found, strict=True):
+        np.testing.assert_array_equal(kept, without)
 
 
 # -- drawing --------------------------------------------------------------------------------------
