@@ -8,7 +8,7 @@ loads its module when it is first used, so ``import carom`` loads nothing else. 
 
 __version__ = "0.1.0"
 
-# Module: its names that are names of carom too. __init__.pyi says the same to editors and type checkers.
+# Module: its names that are names of carom too. A test writes __init__.pyi from it, for editors and type checkers.
 _NAMES = {
     "framework": (
         "Bodies", "CaromError", "CastHit", "CastHits", "Column", "Component", "Contact", "Contacts", "ContactsBetween",
@@ -27,7 +27,12 @@ _NAMES = {
     "plugins.convex_hull": ("ConvexHullCollider",),
     "plugins.convex_polygon": ("ConvexPolygonCollider",),
     "plugins.half_space": ("HalfSpaceCollider",),
+    "plugins.joints": (
+        "Ball", "Cone", "Distance", "Hinge", "JointState", "Joints", "Motor", "MousePull", "Slider", "Weld", "Wheel",
+    ),
     "plugins.one_way_segment": ("OneWaySegmentCollider",),
+    "plugins.parts": ("PartOf", "Parts", "parts_from_outline"),
+    "plugins.rotation": ("BoxCollider", "Rotation", "Spin"),
     "plugins.springs": ("Spring", "Springs"),
     "plugins.terrain": (
         "ChainSegmentCollider", "TerrainTriangleCollider",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import importlib
 import os
 import shutil
@@ -16,6 +15,7 @@ import pytest
 from helpers_folders import FLOORS, ROOT, imported, package_of
 
 import carom
+from carom.framework import Component, Plugin
 
 OUTSIDE = ("studies", "tests", "examples")  # not installed: nothing that is may import them
 
@@ -40,15 +40,24 @@ def test_every_folder_with_modules_is_a_package():
 
 
 def test_each_name_of_carom_is_one_of_its_module_and_of_the_stub():
-    stub = {}
-    for node in ast.parse((ROOT / "src" / "carom" / "__init__.pyi").read_text(encoding="utf-8")).body:
-        if isinstance(node, ast.ImportFrom):
-            module = importlib.import_module(f"carom.{node.module}")
-            names = [alias.name for alias in node.names]
-            stub.update(dict.fromkeys(module.__all__ if names == ["*"] else names, module))
-    assert set(carom.__all__) == set(stub) <= set(dir(carom))
-    for name in carom.__all__:
-        assert getattr(carom, name) is getattr(stub[name], name)
+    """The stub is made of the list; a module's components and plugins, and what makes bodies, are in it."""
+    lines = []
+    for module, names in sorted(carom._NAMES.items()):
+        found = importlib.import_module(f"carom.{module}")
+        public = getattr(found, "__all__", names)
+        assert {*names} <= {*public}
+        whole = len(names) == len(public)
+        lines += [f"from .{module} import *"] if whole and "." not in module else [
+            f"from .{module} import {name} as {name}" for name in sorted(names, key=str.lower)
+        ]
+        for value in vars(found).values():
+            if isinstance(value, type) and value.__module__.startswith(found.__name__) and value.__name__ not in names:
+                assert not issubclass(value, Plugin), value
+                assert not issubclass(value, Component) or value._abstract, value
+        for name in names:
+            assert getattr(carom, name) is getattr(found, name)
+    stub = "\n".join((*lines, "", "__version__: str", ""))
+    assert (ROOT / "src" / "carom" / "__init__.pyi").read_text(encoding="utf-8") == stub
     with pytest.raises(AttributeError, match="module 'carom' has no attribute 'Wrold'"):
         carom.Wrold  # noqa: B018
 
