@@ -48,7 +48,7 @@ def test_each_name_of_carom_is_one_of_its_module_and_of_the_stub():
         assert {*names} <= {*public}
         whole = len(names) == len(public)
         lines += [f"from .{module} import *"] if whole and "." not in module else [
-            f"from .{module} import {name} as {name}" for name in sorted(names, key=str.lower)
+            f"from .{module} import {name} as {name}" for name in sorted(names, key=lambda name: (name[0].islower(), name.lower()))
         ]
         for value in vars(found).values():
             if isinstance(value, type) and value.__module__.startswith(found.__name__) and value.__name__ not in names:
