@@ -47,9 +47,9 @@ def test_each_name_of_carom_is_one_of_its_module_and_of_the_stub():
         public = getattr(found, "__all__", names)
         assert {*names} <= {*public}
         whole = len(names) == len(public)
-        lines += [f"from .{module} import *"] if whole and "." not in module else [
-            f"from .{module} import {name} as {name}" for name in sorted(names, key=lambda name: (name[0].islower(), name.lower()))
-        ]
+        names = sorted(names, key=lambda name: (name[0].islower(), name.lower()))
+        each = [f"from .{module} import {name} as {name}" for name in names]
+        lines += [f"from .{module} import *"] if whole and "." not in module else each
         for value in vars(found).values():
             if isinstance(value, type) and value.__module__.startswith(found.__name__) and value.__name__ not in names:
                 assert not issubclass(value, Plugin), value
