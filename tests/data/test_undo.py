@@ -24,7 +24,7 @@ def fail_after(patch, world, kind):
         raise RuntimeError("no more")
 
     patch.setattr(system, "_parts", lambda: [*parts, PythonPart(system.name, no_more)])
-    world.settings = world.settings.replace()  # parts are looked at again
+    world.settings = world.settings.replace(max_steps_per_advance=7)  # parts are looked at again
 
 
 def busy_world(colliders):
