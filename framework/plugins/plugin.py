@@ -15,8 +15,7 @@ from ..errors import PluginError
 from ..jit.records.schema import Schema
 from ..settings import Settings
 from ..vectors import dot, scale
-from . import checks, joints
-from .joints import OwnJoint
+from . import checks
 from .registry import Convex, Pair, PluginStage, Registry, Shape
 
 Thing = TypeVar("Thing")
@@ -69,7 +68,7 @@ class Plugin:
         self.mixing_rules: dict[str, Any] = {}
         self.pair_filters: list[Callable[..., Any]] = []
         self.stages: dict[str, PluginStage] = {}
-        self.joints: dict[type[Component], OwnJoint] = {}
+        self.joints: dict[type[Component], Any] = {}
         self.systems: list[Callable[[], Any]] = []
         self.registries: weakref.WeakSet[Registry] = weakref.WeakSet()  # of the worlds it is in
 
@@ -168,9 +167,13 @@ class Plugin:
         done about the values: if nothing else is said, the first one stays as it was. ``dimensions = (2,)`` in the
         class makes it a joint of 2D worlds only.
         """
-        single, rows = joints.check_joint(self, component)
-        function = inlined(_function(component, "constraint"))
-        self._register(self.joints, component, OwnJoint(component, function, self.name, single, rows))
+        take = getattr(component, "of_plugin", None)
+        if take is None:
+            raise PluginError(
+                f"plugin {self.name}: joint {getattr(component, '__name__', component)!s} cannot be a joint: derive a "
+                f"class from carom.plugins.joints.Joint, and give it columns a and b"
+            )
+        self._register(self.joints, component, take(self))
         return component
 
     @_called_first("'name'")

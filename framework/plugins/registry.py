@@ -10,7 +10,6 @@ from ..data.component import Component
 from ..errors import PluginError
 from ..jit.records.schema import Schema
 from ..settings import AUTOMATIC, MIXING_RULES
-from .joints import OwnJoint
 
 
 class Convex:
@@ -151,7 +150,7 @@ class Registry:
     mixing_rules: dict[str, Any] = field(default_factory=dict)
     pair_filters: list[tuple[str, Any]] = field(default_factory=list)  # (plugin, function)
     stages: dict[str, PluginStage] = field(default_factory=dict)
-    joints: dict[type[Component], OwnJoint] = field(default_factory=dict)
+    joints: dict[type[Component], Any] = field(default_factory=dict)
     check_stages: Callable[[Iterable[PluginStage]], Any] = tuple  # PluginError for what no step can have
 
     def require(self, component: type[Component], entity: int | None = None) -> None:

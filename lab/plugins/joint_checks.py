@@ -11,10 +11,10 @@ from ...framework.compilation import kernel
 from ...framework.jit.records.record import Record, make_record
 from ...framework.jit.records.record_type import record_at
 from ...framework.plugins.checks import shown
-from ...framework.plugins.joints import OwnJoint, Placed, numbers_of, parameters_of, rows_of, sample_of
-from ...systems.contacts.solving.joints.given import call_given
-from ...systems.contacts.solving.joints.linked import linked_joint
 from ...systems.contacts.solving.records import SOLVER
+from ...systems.joints.given import call_given
+from ...systems.joints.linked import linked_joint
+from ...systems.joints.own import OwnJoint, Placed, numbers_of, parameters_of, rows_of, sample_of
 from ...systems.shapes.rotation import axes_of
 from .samples import Finding, Subject
 

@@ -12,8 +12,8 @@ from ...components.part_of import Changes as PartChanges
 from ...components.part_of import PartOf
 from ...components.spin import Spin
 from ...framework import NoPhysicsError, Plugin, World
-from ...framework.plugins.joints import Placed, rows_of
-from ...systems.contacts.solving.joints.records import (
+from ...systems.joints.own import Placed, rows_of
+from ...systems.joints.records import (
     DRIVE,
     FREE,
     GIVEN,

@@ -13,7 +13,8 @@ from ...components.part_of import PartOf
 from ...framework.data.columns import Column, special_column
 from ...framework.data.component import Component
 from ...framework.typing import Vector
-from ...systems.contacts.solving.joints.records import ALIGN, DRIVE, FREE, GIVEN, HOLD, LIMIT, SPRING, TURN
+from ...systems.joints.own import OwnJoint, own_joint
+from ...systems.joints.records import ALIGN, DRIVE, FREE, GIVEN, HOLD, LIMIT, SPRING, TURN
 
 WORLD = 0  # in place of a body
 UNLIMITED = -math.inf, math.inf
@@ -131,6 +132,11 @@ class Joint(Component, abstract=True):
         super().__init__(**given)
         self.check_ends()
         self.check()
+
+    @classmethod
+    def of_plugin(cls, plugin: Any) -> OwnJoint:
+        """Called by :meth:`carom.framework.Plugin.joint`."""
+        return own_joint(plugin, cls)
 
     @classmethod
     def many(cls, *args: Any, **values: Any) -> Any:

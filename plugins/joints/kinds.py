@@ -10,7 +10,7 @@ import numpy as np
 
 from ...framework.data.columns import special_column
 from ...framework.typing import Vector
-from ...systems.contacts.solving.joints.records import (
+from ...systems.joints.records import (
     CONE,
     DRIVE,
     HOLD,

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...systems.contacts.solving.joints.rows import FOLDED, FULL_TURN
+from ...systems.joints.rows import FOLDED, FULL_TURN
 from .joint import Joint
 from .kinds import Cone, Distance, Hinge, Motor, Slider, Weld, Wheel
 

@@ -11,9 +11,9 @@ import numpy as np
 from ...framework import PluginError
 from ...framework.jit.lazy import errors
 from ...framework.jit.records.schema import Column
-from ...framework.plugins.joints import numbers_of
-from ...systems.contacts.solving.joints.linked import linked_joint
-from ...systems.contacts.solving.joints.records import GIVEN, JOINTS
+from ...systems.joints.linked import linked_joint
+from ...systems.joints.own import numbers_of
+from ...systems.joints.records import GIVEN, JOINTS
 from .joint import WORLD, Joint, Row
 
 # What rows are known by, what they are made of, and what they keep from step to step, those of plugins more.

@@ -8,7 +8,7 @@ from ...framework.schedule.phases import Phase
 from ...framework.schedule.plan import PlannedKernel
 from ...framework.schedule.stages import Program, Stage
 from ..compounds.stages import leave_out_parts
-from ..contacts.solving.joints.bodies import leave_out_joined
+from ..joints.bodies import leave_out_joined
 from ..sleeping.stages import leave_out_still
 from ..staged import StagedSystem
 from .boxes import box_motions, box_statics, fixed_count

@@ -11,10 +11,10 @@ from ..compounds.rows import has_parts, next_row, owner_of, place_of
 from ..compounds.stages import share_places
 from ..integration.trajectory import along, path_of
 from ..integration.turning import size_of_turn
+from ..joints.bodies import lay_joints
 from .constants import FREQUENCY, SAG, TIPPING_FREQUENCY, TIPPING_SAG
 from .points import points_of
 from .solving.islands import order_rows
-from .solving.joints.bodies import lay_joints
 from .solving.prediction import drop_support
 from .solving.rows import turn_body
 

@@ -13,13 +13,13 @@ from ...framework.settings import Settings
 from ...framework.world.contacts import Contacts
 from ..compounds.stages import carry_parts
 from ..impacts.stages import begin_impacts, resolve_impacts
+from ..joints.bodies import count_turns
 from ..staged import StagedSystem
 from .bodies import gather, put_back
 from .event_stages import publish_contacts
 from .events import disabled_pairs
 from .response_stages import begin_response
 from .resting import find_resting, find_touching, linearise
-from .solving.joints.bodies import count_turns
 from .solving.prediction import predict_rest
 from .solving.solver import solve_contacts, solve_joined_contacts, solve_turning_contacts
 from .solving.warm_start import match_warm_start, store_warm_start

@@ -17,7 +17,7 @@ from ...framework.plugins.registry import PluginStage, Registry
 from ...framework.schedule.stages import Program
 from .. import records
 from ..compounds.records import PARTS
-from ..contacts.solving.joints.records import JOINTS
+from ..joints.records import JOINTS
 from ..record_buffers import with_spare
 from ..scene import Scene
 from ..stage_list import MADE_AGAIN

@@ -17,8 +17,8 @@ from ...framework.schedule.plan import PlannedKernel, kernels_of
 from ...framework.schedule.stages import Program, PythonPart, Stage
 from ...framework.settings import Settings
 from ..compounds.stages import carry_forces, move_parts
-from ..contacts.solving.joints.bodies import begin_joints
 from ..forces.accumulation import ForceAccumulation
+from ..joints.bodies import begin_joints
 from ..scene import Scene
 from ..sleeping.stages import look_at_sleepers, rest_sleepers
 from ..staged import StagedSystem

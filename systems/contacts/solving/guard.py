@@ -12,6 +12,9 @@ import math
 from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, dot, scale, sub
 from ...integration.turning import cross_spin, momentum_of_spin
+from ...joints.given import rates_of_given
+from ...joints.records import GIVEN, POINT, TURN
+from ...joints.rows import relax_open
 from ..constants import (
     DEEP,
     EXCESS,
@@ -23,9 +26,6 @@ from ..constants import (
     GAIN_WEIGHT,
     SWEEPS,
 )  # fmt: skip
-from .joints.given import rates_of_given
-from .joints.records import GIVEN, POINT, TURN
-from .joints.rows import relax_open
 from .rows import excess_speed, relax_listed, velocity_at
 
 

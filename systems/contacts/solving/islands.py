@@ -19,6 +19,7 @@ from ...bits import lowest_bit
 from ...compounds.rows import owner_of, place_of
 from ...integration.turning import arms_to, velocity_by_spin
 from ...islands import root_of
+from ...joints.records import HOLD, LIMIT, LINE, POINT, TURN
 from ...narrow_phase.manifolds import centre_offset_at_start
 from ...shapes.tolerances import smaller_extent
 from ..constants import (
@@ -39,7 +40,6 @@ from ..constants import (
     SUBSTEP_WORK,
 )  # fmt: skip
 from ..points import points_of
-from .joints.records import HOLD, LIMIT, LINE, POINT, TURN
 
 COLOURS = 62  # bits of a mask; pairs of a body beyond them share the last one
 STREAMS = 4  # of joints: more are no faster

@@ -15,7 +15,7 @@ from ....framework.vectors import add, add_scaled, dot, length, scale, sub
 from ...codes import NEED_COLUMNS, OK
 from ...compounds.rows import owner_of
 from ...compounds.stages import share_prediction
-from .joints.bodies import push_joined
+from ...joints.bodies import push_joined
 from .warm_start import find_rows, scale_to
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ....framework.jit.records.schema import Schema, flag, flags, floats, integer, ints, number, vectors
-from .joints.records import JOINTS
+from ...joints.records import JOINTS
 
 SOLVER = Schema(
     "Solver",

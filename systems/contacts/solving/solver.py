@@ -15,6 +15,7 @@ from ....framework.compilation import packed, part
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add, add_scaled, dot, scale
 from ...codes import OK
+from ...joints.rows import add_joints, keep_joints, measure_joints, solve_joints, start_joints, warm_start_joints
 from ..constants import (
     DAMPING_RATIO,
     DEEP,
@@ -33,7 +34,6 @@ from ..constants import (
 from .chunks import find_chunks
 from .guard import finish_substep, island_of, islands_of, list_driven, open_all
 from .hard import choose_hard, leave_open
-from .joints.rows import add_joints, keep_joints, measure_joints, solve_joints, start_joints, warm_start_joints
 from .overload import lighten, weigh_down
 from .passes import close_in_order, converge, note_impulses, solve_pass
 from .rows import ARMS, JOINTED, NO_ARMS, apply_impulse, ask, turn_body, turn_on, weigh_row

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 
-from .....framework.compilation import inlined, part
-from .....framework.jit.records.record_type import zero_of
-from .....framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
-from ....codes import NEED_COLUMNS, OK
-from ....compounds.rows import next_row, owner_of
-from ....integration.turning import change_of_spin, cross_spin
-from ....narrow_phase.stages import layers_meet
-from ..rows import turn_body
-from ..warm_start import row_of
+from ...framework.compilation import inlined, part
+from ...framework.jit.records.record_type import zero_of
+from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
+from ..codes import NEED_COLUMNS, OK
+from ..compounds.rows import next_row, owner_of
+from ..contacts.solving.rows import turn_body
+from ..contacts.solving.warm_start import row_of
+from ..integration.turning import change_of_spin, cross_spin
+from ..narrow_phase.stages import layers_meet
 from .records import DRIVE, FREE, GIVEN, POINT, SLIDE, TURN, TWIST
 from .rows import turn_about
 from .springs import first_of

@@ -10,13 +10,13 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from .....framework.compilation import inlined, part
-from .....framework.jit.lazy import types
-from .....framework.jit.records.record_type import record_type
-from .....framework.vectors import add, add_scaled, dot, scale
-from ....integration.turning import change_of_spin
-from ....shapes.linking.signatures import call_in_dimension, vector_type
-from ..records import SOLVER
+from ...framework.compilation import inlined, part
+from ...framework.jit.lazy import types
+from ...framework.jit.records.record_type import record_type
+from ...framework.vectors import add, add_scaled, dot, scale
+from ..contacts.solving.records import SOLVER
+from ..integration.turning import change_of_spin
+from ..shapes.linking.signatures import call_in_dimension, vector_type
 
 
 @cache

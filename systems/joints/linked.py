@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
-from .....framework.data.component import Component
-from .....framework.jit.linking import CACHE_SIZE, Linked
-from .....framework.plugins.joints import OwnJoint, Placed, fields_of, seen_columns
-from .....framework.vectors import add, dot
-from ....shapes.linking.source import source_module
-from ....shapes.linking.user_functions import user_function
+from ...framework.data.component import Component
+from ...framework.jit.linking import CACHE_SIZE, Linked
+from ...framework.vectors import add, dot
+from ..shapes.linking.source import source_module
+from ..shapes.linking.user_functions import user_function
 from .given import given_signature
+from .own import OwnJoint, Placed, fields_of, seen_columns
 from .rows import turned_with
 
 

@@ -8,10 +8,10 @@ solved by elimination, the spring last.
 
 from __future__ import annotations
 
-from .....framework.compilation import inlined, part
-from .....framework.jit.stack_arrays import stack_array
-from .....framework.vectors import dot, replace, row, scale, store
-from ....integration.turning import change_of_spin, twist
+from ...framework.compilation import inlined, part
+from ...framework.jit.stack_arrays import stack_array
+from ...framework.vectors import dot, replace, row, scale, store
+from ..integration.turning import change_of_spin, twist
 from .records import GIVEN, HOLD, POINT, TURN
 
 MOST = 6  # rows of a system: five that hold, in space, and the spring

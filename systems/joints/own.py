@@ -1,4 +1,4 @@
-"""Joints of plugins: what their function gets, and what it is checked for when it is registered."""
+"""Joints of plugins: what their function gets, and what it is checked for when it is registered; see linked."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..data.arrays.column import ArrayColumn
-from ..data.columns import REQUIRED
-from ..data.component import Component
-from ..errors import PluginError
+from ...framework.compilation import inlined
+from ...framework.data.arrays.column import ArrayColumn
+from ...framework.data.columns import REQUIRED
+from ...framework.data.component import Component
+from ...framework.errors import PluginError
 
 # What functions do not see of a joint.
 HIDDEN = ("a", "b", "collide_connected", "breaking_force", "attached", "changed")
@@ -110,14 +111,11 @@ def sample_of(component: Any, dimensions: int) -> Any:
     return joint
 
 
-def check_joint(plugin: Any, component: Any) -> tuple[Any, Any]:
-    """``single`` and ``rows`` of :class:`OwnJoint`; PluginError unless the class can be a joint. Tries its function."""
-    where = f"plugin {plugin.name}: joint {getattr(component, '__name__', component)!s}"
-    if not (isinstance(component, type) and issubclass(component, Component) and not component._abstract
-            and {"a", "b", "attached"} <= component.columns.keys()):  # fmt: skip
-        raise PluginError(
-            f"{where} cannot be a joint: derive a class from carom.plugins.joints.Joint, and give it columns a and b"
-        )
+def own_joint(plugin: Any, component: type[Component]) -> OwnJoint:
+    """The joint that a class of a plugin is; PluginError unless it can be one. Tries its function."""
+    where = f"plugin {plugin.name}: joint {component.__name__}"
+    if component._abstract or not {"a", "b"} <= component.columns.keys():
+        raise PluginError(f"{where} cannot be a joint: give the class columns a and b")
     function = inspect.getattr_static(component, "constraint", None)
     function = getattr(function, "__func__", function)
     if not inspect.isfunction(function):
@@ -126,7 +124,8 @@ def check_joint(plugin: Any, component: Any) -> tuple[Any, Any]:
     if len(given) != len(ARGUMENTS):
         raise PluginError(f"{where}: constraint takes ({', '.join(given)}), it must take ({', '.join(ARGUMENTS)})")
     tried = [_try(where, component, dimensions) for dimensions in (2, 3)]
-    return tuple(single for single, _ in tried), tuple(rows for _, rows in tried)
+    single, rows = tuple(single for single, _ in tried), tuple(rows for _, rows in tried)
+    return OwnJoint(component, inlined(function), plugin.name, single, rows)
 
 
 def _try(where: str, component: Any, dimensions: int) -> tuple[bool, tuple[bool, ...]]:

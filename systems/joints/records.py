@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .....framework.jit.records.schema import Schema, flags, floats, integer, ints, number, vectors
+from ...framework.jit.records.schema import Schema, flags, floats, integer, ints, number, vectors
 
 POINT, LINE, SLIDE, TURN, ALIGN, CONE, TWIST, GIVEN = range(8)
 HOLD, LIMIT, DRIVE, SPRING, SERVO, FREE = range(6)

@@ -18,10 +18,10 @@ from __future__ import annotations
 
 import math
 
-from .....framework.compilation import inlined, part
-from .....framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
-from ....integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
-from ...constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY, SPRING_FREQUENCY
+from ...framework.compilation import inlined, part
+from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
+from ..contacts.constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY, SPRING_FREQUENCY
+from ..integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
 from .given import measure_given, push_given, speed_of_given
 from .records import ALIGN, DRIVE, GIVEN, HOLD, LIMIT, POINT, SERVO, SLIDE, SPRING, TURN, TWIST
 from .springs import first_of, left_to
