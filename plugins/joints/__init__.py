@@ -207,7 +207,7 @@ class Joints(Plugin):
                 self._set.add(entity)
         had = by_row(saved)
         now = put_kept(record, slice(0, record.count), had)
-        self._released = {*saved["released"], *(body for key in had.keys() ^ now for body in key[3:5])}
+        self._released = {*saved.get("released", ()), *(body for key in had.keys() ^ now for body in key[3:5])}
         for name in BEFORE_STEP:
             getattr(record, f"old_{name}")[:] = getattr(record, name)
 

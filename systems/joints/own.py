@@ -19,7 +19,7 @@ from ...framework.data.component import Component
 from ...framework.errors import PluginError
 
 # What functions do not see of a joint.
-HIDDEN = ("a", "b", "collide_connected", "breaking_force", "attached", "changed")
+HIDDEN = ("a", "b", "collide_connected", "breaking_force", "breaking_torque", "attached", "changed")
 ARGUMENTS = ("joint", "a", "b")
 ROW = "(value, along_a, turn_a, along_b, turn_b)"
 
