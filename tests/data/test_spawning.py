@@ -5,8 +5,14 @@ import pytest
 from worlds import both_dimensions
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.components.spin import Spin
 from carom.framework import World
+from carom.framework.data.column_copies import ColumnCopies
 from carom.plugins import Physics
+from carom.plugins.rotation import BoxCollider, Rotation
+from carom.systems import scene
+from carom.systems.extensions.extensions import Extensions
+from carom.systems.quarantine.quarantine import Checked
 
 STATICS = 400  # enough for a grid of their own
 ROOM = 12.0  # m
@@ -61,3 +67,79 @@ def test_what_is_kept_of_those_that_stay_is_what_would_be_made_again(d, size):
         again.world.step()
         assert kept.seen() == again.seen()
     assert kept.world.contacts
+
+
+class Turning:
+    """Boxes and spheres that turn, in the air, of which some come and go."""
+
+    def __init__(self, dimensions, n):
+        self.world, self.ids = World(Physics(dimensions=dimensions), Rotation()), []
+        for _ in range(n):
+            self.spawn()
+        self.world.step()
+        self.world.delete_entity(self.spawn())  # if they are just as many as there is room for
+        self.world.step()
+
+    def spawn(self, box=False, height=0.0):
+        d, k = self.world.dimensions, len(self.ids)
+        rotation, spin = (0.3 * k, 1.0) if d == 2 else ((1.0, 0.1 * k, 0.2, 0.3), (1.0, 0.2, 0.3))
+        shape = BoxCollider(0.4) if box else SphereCollider(0.4)
+        place = Transform((1.5 * k, height, 0.0)[:d], rotation)
+        self.ids.append(self.world.create_entity(place, RigidBody(), shape, Spin(spin)))
+        return self.ids[-1]
+
+
+@both_dimensions
+@pytest.mark.parametrize("n", [10, 50])
+def test_of_bodies_that_turn_only_those_that_come_are_looked_at(d, n, monkeypatch):
+    work = dict.fromkeys(("axes", "stages bound", "columns checked", "copies bound"), 0)
+
+    def count(owner, name, what, amount=lambda *args: 1):
+        function = getattr(owner, name)
+
+        def counted(*args):
+            work[what] += amount(*args)
+            return function(*args)
+
+        monkeypatch.setattr(owner, name, counted)
+
+    turning = Turning(d, n)
+    count(scene, "axes_of", "axes", lambda rotation, dimensions: len(rotation))
+    count(Extensions, "_bind", "stages bound")
+    count(Checked, "bad", "columns checked")
+    count(ColumnCopies, "_bind_columns", "copies bound")
+    turning.spawn()
+    turning.world.step()
+    assert work == dict.fromkeys(work, 0) | {"axes": 1}
+    for entity in turning.ids[2], turning.ids[-1]:
+        turning.world.delete_entity(entity)
+        turning.world.step()
+    assert work["axes"] == 1
+    turning.world.component_for_entity(turning.ids[3], Transform).rotation = 1.0 if d == 2 else (1.0, 1.0, 0.0, 0.0)
+    turning.world.step()
+    assert work == dict.fromkeys(work, 0) | {"axes": 2}
+
+
+@both_dimensions
+def test_what_is_kept_of_bodies_that_turn_is_what_would_be_made_again(d):
+    kept, again = Turning(d, 6), Turning(d, 6)
+    for step in range(24):
+        for each in (kept, again):
+            if step % 3 == 0:
+                each.spawn(box=step % 2 == 0, height=1.0)
+            if step % 4 == 3:
+                each.world.delete_entity(each.ids.pop(step % len(each.ids)))
+            body = each.ids[step % len(each.ids)]
+            if step == 9:
+                each.world.component_for_entity(body, Transform).rotation = 0.5 if d == 2 else (1.0, 0.5, 0.0, 0.0)
+            if step == 12:
+                each.world.bodies.dynamic.linear_velocity[2] = np.nan  # it is taken out, and mended later
+            if step == 18:
+                each.world.bodies.dynamic.linear_velocity[2] = 0.0
+        physics = again.world.physics
+        physics.scene.forget()
+        physics.extensions._bound = None
+        kept.world.step()
+        again.world.step()
+        assert kept.world.state_hash() == again.world.state_hash()
+        assert len(kept.world.faults) == len(again.world.faults) == int(step >= 12)
