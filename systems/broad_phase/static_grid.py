@@ -16,6 +16,7 @@ from .records import HIGHEST, LARGEST, LOWEST
 from .uniform_grid import OUTSIDE_MAX, build_grid, reserve_grid
 
 NEVER_BUILT = -1  # in place of a version
+ALIKE = 1.25  # boxes that are longer than most by no more than this factor are inside: cells grow by as much
 
 
 @part
@@ -31,7 +32,7 @@ def longest_edge(low, high):
 
 @part
 def longest_inside(state, grid):
-    """The longest edge that a box in the grid may have: OUTSIDE_MAX boxes at most are longer."""
+    """The longest edge that a box in the grid may have: OUTSIDE_MAX boxes at most are longer, and none that is alike."""
     bodies, longest = state.bodies, grid.longest
     for k in range(OUTSIDE_MAX + 1):
         longest[k] = -math.inf
@@ -44,7 +45,11 @@ def longest_inside(state, grid):
                 longest[k] = longest[k + 1]
                 k += 1
             longest[k] = edge
-    return longest[0]
+    limit = longest[0]
+    for k in range(1, OUTSIDE_MAX + 1):
+        if longest[k] <= ALIKE * longest[0]:
+            limit = longest[k]
+    return limit
 
 
 @part

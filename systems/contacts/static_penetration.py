@@ -162,7 +162,9 @@ def keep_out_of_all(state, dt, i):
 def measure_turned(state, i):
     """The extents of body i as it stands now, if contacts have turned it."""
     bodies = state.bodies
-    if state.spinning and (bodies.held[owner_of(state, i)] or bodies.impact_count[i] > 0):
+    if not state.spinning or bodies.rolling_radius[i] > 0.0:  # what is round looks the same
+        return
+    if bodies.held[owner_of(state, i)] or bodies.impact_count[i] > 0:
         for level in range(state.level_count):
             find_extents(state, level, i, i + 1)
 
