@@ -1,5 +1,8 @@
 """Errors of the framework; plain wrong values are ValueError, wrong names KeyError or AttributeError."""
 
+import sys
+import warnings
+
 
 class CaromError(Exception):
     """Base of carom's own errors."""
@@ -23,6 +26,14 @@ class FaultError(CaromError):
 
 class PhysicsWarning(UserWarning):
     """A fault, see ``world.faults``: once for each kind and body, if ``Settings.on_fault`` is "warn"."""
+
+
+def warn(text: str) -> None:
+    """A PhysicsWarning at the code that has called carom, or called it through esper."""
+    frame, depth = sys._getframe(0), 1
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in ("carom", "esper"):
+        frame, depth = frame.f_back, depth + 1
+    warnings.warn(text, PhysicsWarning, stacklevel=depth)
 
 
 class UnhandledPairError(CaromError):

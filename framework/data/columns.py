@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from ..units import warn_of_degrees
+
 LARGEST = float(np.finfo(float).max)
 SMALLEST_WITH_INVERSE = 1 / LARGEST  # 5.6e-309, a denormal
 LONGEST = 200  # characters of a value in a message
@@ -91,6 +93,8 @@ class Column:
 
     def checked(self, value: Any, entity: int | None = None) -> Any:
         """``value`` as it is stored; ValueError (or TypeError) names entity, field and value if it cannot be."""
+        if self.item == "rotation" and isinstance(value, (int, float)):
+            warn_of_degrees(f"{self.owner}.{self.name}", (value,))
         if type(value) is float and self.dtype is float:
             low, high = self.limits
             if low <= value <= high:
@@ -152,6 +156,8 @@ class Column:
         if array.ndim == 0 and self.item == "rotation" and dimensions == 3 and array == 0:
             array = self.empty_value(3)
         full = self._full(array, count, shape)
+        if self.item == "rotation" and dimensions == 2:
+            warn_of_degrees(f"{self.owner}.{self.name}", full[:1].tolist())
         if array.ndim <= len(shape):
             self.check_numbers(array, array.tolist(), None)
         else:
@@ -235,12 +241,14 @@ class Column:
         except (ValueError, TypeError, OverflowError):
             wanted = {"i": "an integer", "b": "True or False"}.get(np.dtype(self.dtype).kind, "a number")
             rule = f"must be {wanted}" if self.item == "scalar" else "must be numbers"
+            if hasattr(value, "entity"):  # of a component
+                rule, shown = f"{rule}: give its entity, which create_entity returns", f"a {type(value).__name__}"
             raise self._error(value if shown is None else shown, rule, entity) from None
 
     def _error(self, value: Any, rule: str, entity: int | None) -> ValueError:
         prefix = "" if entity is None else f"entity {entity}: "
         shown = value.tolist() if isinstance(value, np.ndarray) else value
-        text = shown if isinstance(shown, str) and shown.startswith("an array") else repr(shown)
+        text = shown if isinstance(shown, str) and shown.startswith(("a ", "an array")) else repr(shown)
         text = text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
         return ValueError(f"{prefix}{self.owner}.{self.name} {rule}, got {text}")
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import logging
-import sys
-import warnings
 from collections.abc import Callable
 
-from ..errors import FaultError, PhysicsWarning
+from ..errors import FaultError, warn
 from ..settings import Settings
 from .clock import Clock
 
@@ -77,12 +75,4 @@ class Faults:
         if self._settings().on_fault == "raise":
             raise FaultError(f"{where}: {'; '.join(texts)} (the step is complete)")
         for text in texts:
-            warnings.warn(text, PhysicsWarning, stacklevel=_depth_of_caller())
-
-
-def _depth_of_caller() -> int:
-    """The stack level of the code that has called carom, or called it through esper."""
-    frame, depth = sys._getframe(1), 1
-    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in ("carom", "esper"):
-        frame, depth = frame.f_back, depth + 1
-    return depth
+            warn(text)
