@@ -10,6 +10,7 @@ import numpy as np
 
 from ...framework.data.columns import special_column
 from ...framework.typing import Vector
+from ...framework.units import warn_of_degrees
 from ...systems.joints.records import (
     CONE,
     DRIVE,
@@ -136,6 +137,10 @@ class Hinge(Driven):
 
     def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:
         super().__init__(*args, limits=limits, **values)  # stands here for checkers of types
+
+    def check(self) -> None:
+        super().check()
+        warn_of_degrees("Hinge.limits", (self.lower, self.upper))
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, self.anchor)
@@ -301,6 +306,7 @@ class Motor(Joint):
     def check(self) -> None:
         if (self.speed is None) == (self.angle is None):
             raise ValueError(f"Motor takes a speed or an angle, got {'neither' if self.angle is None else 'both'}")
+        warn_of_degrees("Motor.angle", (self.angle,))
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, b.position)
@@ -354,8 +360,9 @@ class Cone(Joint):
 
     def check(self) -> None:
         self.in_order("twist", self.lower, self.upper)
+        warn_of_degrees("Cone.twist", (self.lower, self.upper))
         if self.swing > math.pi:
-            raise ValueError(f"{self._name()}.swing must be at most pi, got {self.swing!r}")
+            raise ValueError(f"{self._name()}.swing must be at most pi rad, got {self.swing!r}")
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, self.anchor)
