@@ -96,7 +96,7 @@ class SphereCollider(Collider):
 
     __slots__ = ()
 
-    radius: float = special_column(minimum=0.0, also=("size",))
+    radius: float = special_column(minimum=0.0, also=("size", "diameter"))
 
     @staticmethod
     def bounds(shape, dimensions):

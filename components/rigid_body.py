@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -15,7 +15,12 @@ from ..framework.typing import Vector, VectorField
 FASTEST = 1e307  # m/s along each axis: differences of two such velocities, and their lengths, are finite
 OF_A_SPIN = (
     "angular_velocity", "inertia", "moment", "angular_damping", "max_angular_speed", "rolling_friction", "torque",
+    "constant_torque", "apply_torque", "apply_angular_impulse", "velocity_at", "moments",
 )  # fmt: skip
+AT_A_POINT = (
+    "RigidBody.{0} acts at the centre and turns nothing: world.component_for_entity(entity, Spin).{0}(..., at=point) "
+    "turns the body too, from carom import Spin"
+)
 Kind = Literal["dynamic", "kinematic", "static"]
 # Arguments, checked like fields.
 FORCE = Column(item="vector", owner="RigidBody", name="apply_force")
@@ -97,7 +102,22 @@ class RigidBody(Component, flat=True):
     def _unknown(cls, name: str) -> TypeError:
         if name not in OF_A_SPIN:
             return super()._unknown(name)
-        return TypeError(f"RigidBody has no field {name!r}: that of a Spin turns bodies, from carom.plugins.rotation")
+        return TypeError(f"RigidBody has no field {name!r}: that of a Spin turns bodies, from carom import Spin")
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            if name not in OF_A_SPIN:
+                return super().__getattr__(name)
+            raise AttributeError(
+                f"RigidBody has no attribute {name!r}: world.component_for_entity(entity, Spin) turns bodies, "
+                f"from carom import Spin"
+            )
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            if name in OF_A_SPIN:
+                getattr(self, name)
+            super().__setattr__(name, value)
 
     @property
     def asleep(self) -> bool:
@@ -108,19 +128,24 @@ class RigidBody(Component, flat=True):
         row = store.find(self._entity)
         return bool(store.asleep(slice(row, row + 1))[0])
 
-    def apply_impulse(self, impulse: Vector | float) -> None:
-        """Change the velocity at once by impulse / mass; (d,) N s. Kinematic and static bodies do not react."""
+    def apply_impulse(self, impulse: Vector | float, *, at: None = None) -> None:
+        """Change the velocity at once by impulse / mass; (d,) N s. Kinematic and static bodies do not react. TypeError
+        if it is to act elsewhere than at the centre: see ``Spin.apply_impulse``."""
+        if at is not None:
+            raise TypeError(AT_A_POINT.format("apply_impulse"))
         if self.kind == "dynamic":
             self.linear_velocity = self.linear_velocity + self._vector(IMPULSE, impulse) / self.mass
 
-    def apply_force(self, force: Vector | float) -> None:
-        """Push with ``force``, (d,) N.
+    def apply_force(self, force: Vector | float, *, at: None = None) -> None:
+        """Push with ``force``, (d,) N; TypeError as of :meth:`apply_impulse`.
 
         Inside a system: for that step, or for the next one if this step has moved the bodies already. Outside: in
         every step of the next ``step()`` or ``advance()`` that takes one. Forces of one frame add up; those of a frame
         that took no step give way to the next frame's, so a push held down is the same at any frame rate. Kinematic
         and static bodies do not react.
         """
+        if at is not None:
+            raise TypeError(AT_A_POINT.format("apply_force"))
         push = self._vector(FORCE, force)
         store: Any = self._store
         if self.kind != "dynamic":

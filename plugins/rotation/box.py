@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ...components import Collider
-from ...framework import Plugin, column
+from ...framework import Plugin
+from ...framework.data.columns import special_column
 from ...framework.typing import VectorField
 from ...framework.vectors import add_scaled, dot, item, replace, scale
 
@@ -21,7 +22,7 @@ class BoxCollider(Collider):
     __slots__ = ()
 
     rotates = True
-    half_extents: VectorField = column(item="vector", minimum=0.0)
+    half_extents: VectorField = special_column(item="vector", minimum=0.0, also=("size", "extents", "half_size"))
 
     @staticmethod
     def bounds(shape, dimensions):
