@@ -1,7 +1,7 @@
 """A uniform grid of what does not move: built once, and whatever moves looks into it (see :mod:`.uniform_grid`).
 
-Static boxes are seldom of one size: a level has walls around it. So the few longest boxes stay outside the grid, whose
-cells need not be as large as they are.
+Static boxes are seldom of one size: a level has walls around it. So the few that are much longer than the others stay
+outside the grid, whose cells need not be as large as they are: all that moves is tested with each of them.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def longest_edge(low, high):
 
 @part
 def longest_inside(state, grid):
-    """The longest edge that a box in the grid may have: OUTSIDE_MAX boxes at most are longer, and none that is alike."""
+    """The longest edge that a box in the grid may have: OUTSIDE_MAX boxes at most are longer, none of them ALIKE."""
     bodies, longest = state.bodies, grid.longest
     for k in range(OUTSIDE_MAX + 1):
         longest[k] = -math.inf

@@ -164,6 +164,21 @@ def test_boxes_that_move_look_into_a_lattice(d, data):
 
 
 @both_dimensions
+@pytest.mark.parametrize("seed", range(3))
+def test_boxes_of_about_one_size_are_all_in_the_grid(d, seed):
+    """Only what is much longer stays outside, such as the walls around a level: all that moves looks at that."""
+    rng = np.random.default_rng(seed)
+    walls, count = int(rng.integers(0, OUTSIDE_MAX // 2)), 400
+    centre = rng.random((count, d)) * 3.0 * count ** (1 / d)
+    half = rng.uniform(0.5, 0.6, (count, 1))
+    half[:walls] *= rng.uniform(2.0, 20.0, (walls, 1))
+    boxes = grid_of(centre - half, centre + half, 0)
+    boxes.find()
+    assert boxes.state.static_grid.suits
+    assert sorted(outside(boxes)) == list(range(walls))
+
+
+@both_dimensions
 def test_what_does_not_suit(d):
     """More large ones than may stay outside, all in one place, points, no shapes, no boxes, too few of them."""
     rng = np.random.default_rng(2)
