@@ -2,8 +2,8 @@
 
 ``State`` is what a stage gets; it holds the numbers of the step and the addresses of the other records. Units are SI; n
 rows of bodies are ordered asleep, dynamic, kinematic, static. A column that a scene does not need has no rows. Those
-with a default are on demand: kernels read the default while there are no rows, and ask for these (NEED_COLUMNS) to
-write.
+with a default are on demand: kernels read the default while there are no rows. What a stage writes has rows before it
+runs, as its ``room`` says.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ..framework.jit.records.schema import Schema, Section, flag, flags, floats,
 from ..framework.schedule.stages import PROGRAM_FIELDS
 from .broad_phase.records import GRID
 from .compounds.records import COMPOUNDS, PARTS
-from .contacts.solving.records import ARMS, SOLVER, TURNS, WARM_START
+from .contacts.solving.records import ARMS, RESTED, SOLVER, TURNS, WARM_START
 from .impacts.records import IMPACTS
 
 
@@ -58,8 +58,7 @@ SLEEP_COLUMNS = Section(
     flown_velocity=vectors(),
 )  # fmt: skip
 
-# Columns of the bodies that are made within a step or when rows have moved. Those that the first stage asks for which
-# needs them have a row for each of the table then, like all others.
+# Columns of the bodies that are made within a step or when rows have moved.
 START = Section(
     "body", "the step", "velocity at the start of the step, for the path",
     start_velocity=vectors(),
@@ -83,7 +82,6 @@ COLLISIONS = Section(
     impact_count=ints("int32"),
     counted_impacts=ints("int32"),  # those that the cap counts
 )  # fmt: skip
-RESTED = "contacts have rested"
 PREDICTED = Section(
     "body", "collisions", RESTED,
     warm_started=flags(default=False),  # the resting prediction has changed its velocity
@@ -139,9 +137,22 @@ SLEEPING = Section(
     keeps_awake=flags(),
 )  # fmt: skip
 
+# Columns of the records alone: no rows, or one for each of the table from when something asks for them.
+BODY_SECTIONS = (
+    START, QUARANTINE, COLLISIONS, PREDICTED, HELD, CURVES, SWEEPS, EVALUATIONS, SPINS, COMPOUNDS, UNDO, UNDO_FORCE,
+    SLEEPING,
+)  # fmt: skip
+
+
+def all_rows(state):
+    """For ``Rows`` of the bodies."""
+    return state.count
+
+
+BODY_COLUMNS = tuple(name for section in BODY_SECTIONS for name in section)
+
 BODIES = Schema(
-    "Bodies", *TABLE_SECTIONS, SLEEP_COLUMNS, START, QUARANTINE, COLLISIONS, PREDICTED, HELD, CURVES, SWEEPS,
-    EVALUATIONS, SPINS, COMPOUNDS, UNDO, UNDO_FORCE, SLEEPING,
+    "Bodies", *TABLE_SECTIONS, SLEEP_COLUMNS, *BODY_SECTIONS,
     Section(
         "body", "rotation", "some body is rotated, or a shape reads its axes",
         axes=floats(),  # rotation matrices (n, d, d), flat,
@@ -260,22 +271,22 @@ PAIR_COLUMNS = Section(
 PAIRS = Schema("Pairs", PAIR_COLUMNS, count=integer())
 
 # Contacts at the end of the step and of the one before: [now, i] and [1 - now, i].
+CONTACT_ROWS = Section(
+    "contact", "contacts", "bodies have touched",
+    entity_a=ints(stacked=True),
+    entity_b=ints(stacked=True),
+    point=vectors(stacked=True),
+    normal=vectors(stacked=True),
+    depth=floats(stacked=True),
+    impulse=floats(stacked=True),
+    enabled=flags(stacked=True),
+    rested=flags(stacked=True),
+    ended=ints("int32"),
+    began=ints("int32"),
+    stayed=ints("int32", stacked=True),
+)  # fmt: skip
 CONTACTS = Schema(
-    "Contacts",
-    Section(
-        "contact", "contacts", "bodies have touched",
-        entity_a=ints(stacked=True),
-        entity_b=ints(stacked=True),
-        point=vectors(stacked=True),
-        normal=vectors(stacked=True),
-        depth=floats(stacked=True),
-        impulse=floats(stacked=True),
-        enabled=flags(stacked=True),
-        rested=flags(stacked=True),
-        ended=ints("int32"),
-        began=ints("int32"),
-        stayed=ints("int32", stacked=True),
-    ),
+    "Contacts", CONTACT_ROWS,
     now=integer(),
     counts=ints(),
     ends=integer(),
@@ -297,7 +308,6 @@ _split = list(_fields).index("bodies")
 SOLVER_CONTACTS = Section("contact", "contacts at rest", RESTED, **dict(list(_fields.items())[:_split]))
 SOLVER_BODIES = Section("body at rest", "contacts at rest", RESTED, **dict(list(_fields.items())[_split:]))
 SOLVER.sections = SOLVER_CONTACTS, SOLVER_ARMS, SOLVER_BODIES, SOLVER_SPINS
-WARM_START.sections = (Section("contact", "contacts at rest", RESTED, **WARM_START.fields),)
 
 STATE = Schema(
     "State",

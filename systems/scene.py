@@ -15,25 +15,18 @@ from ..framework.jit.records.record import Record
 from ..framework.plugins.registry import Registry
 from ..framework.settings import Settings
 from .records import (
+    BODY_COLUMNS,
     COLLIDERS,
     COLLISIONS,
-    COMPOUNDS,
-    HELD,
-    PREDICTED,
-    QUARANTINE,
     SLEEP_COLUMNS,
-    SPINS,
     START,
     TABLE_COLUMNS,
     UNDO,
-    UNDO_FORCE,
 )
 from .shapes.geometry_levels import arrange, in_order
 from .shapes.linking.linked_shapes import LinkedShapes, ParameterRecords, linked_shapes
 from .shapes.rotation import axes_of
 
-# Made when the first stage asks for them; then they have a row for each of the table, like all others.
-ON_DEMAND = (*QUARANTINE, *UNDO_FORCE, *PREDICTED, *HELD, *SPINS, *COMPOUNDS)
 # What is kept of bodies from step to step, and moves with their rows: static bodies are not boxed again for others. The
 # shape comes first: it tells which bodies have arrived.
 KEPT_COLUMNS = ("shape", "collider_slot", "offset", "half_extents", "min_extent", "lower", "upper", "origin")
@@ -135,7 +128,7 @@ class Scene:
         """Make everything that depends on which colliders there are."""
         table, bodies, count, moving = self.table, self.state.bodies, self.table.count, self.table.stops[1]
         self.state.slot_count = len(table.stacked_types(Collider.stack))
-        self.reserve(*START, *UNDO, *(name for name in ON_DEMAND if len(getattr(bodies, name))))
+        self.reserve(*START, *UNDO, *(name for name in BODY_COLUMNS if len(getattr(bodies, name))))
         if present:
             self.reserve(*COLLISIONS)
             if len(bodies.static_position) < count - moving:

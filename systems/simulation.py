@@ -24,9 +24,10 @@ from ..framework.world.contacts import Contacts
 from ..framework.world.world import World
 from .broad_phase.search import CandidateSearch
 from .broad_phase.system import BroadPhase
-from .codes import AFTERWARDS, CHECK_COLUMNS, CHECK_FLIGHT, LOOK, NEED_OWN_ROWS, WAKE, WAKE_TOUCHED
+from .codes import AFTERWARDS, CHECK_COLUMNS, CHECK_FLIGHT, LOOK, WAKE, WAKE_TOUCHED
 from .contacts.events import ContactEvents, RecordedContacts
 from .contacts.response import Response
+from .contacts.solving.records import WARM_START_ROWS
 from .extensions.extensions import Extensions
 from .forces.accumulation import ForceAccumulation
 from .inspection.counters import counters_of, reset, set_counters
@@ -42,7 +43,7 @@ from .opening import KEEPS_WRITTEN
 from .quarantine.quarantine import Quarantine
 from .queries.system import Queries
 from .record_buffers import Room
-from .records import STATE
+from .records import CONTACT_ROWS, STATE
 from .scene import Scene, make_table
 from .settings import check_settings, gravity_vector, write_settings
 from .shapes.attribution import ErrorAttribution
@@ -79,20 +80,19 @@ class Simulation:
             self.state, world.registry, lambda: world.settings, self._box_now,
             lambda name: self.program.run_one(name, 0.0),
         )  # fmt: skip
-        self._room = Room(self.state, self.scene, self.search)
+        room = Room(self.state, self.scene, self.search)
         self.quarantine = Quarantine(self.state, self.table, self.scene, world.report_fault)
         self.table.on_make, self.table.on_lend = self._follow_columns, self._follow_lent
         self.table.on_arrays_changed = self._follow_arrays
         handlers = {
-            **self._room.handlers(self),
+            **room.handlers(self),
             CHECK_COLUMNS: self.quarantine.check_columns, CHECK_FLIGHT: self.quarantine.check_flight,
             LOOK: lambda dt: self.sleepers.look(),
-            NEED_OWN_ROWS: lambda dt: self.extensions.grow(self.program),
             WAKE: lambda dt: self.sleepers.wake_disturbed(),
             WAKE_TOUCHED: lambda dt: self.sleepers.wake_touched(self, dt),
         }  # fmt: skip
         self.program = Program(self.state, STAGES, handlers, AFTERWARDS)
-        self.sleepers = Sleepers(self.state, self.table, self.scene, self.program, self._room)
+        self.sleepers = Sleepers(self.state, self.table, self.scene, self.program)
         self.sleepers.box_now, self.table.on_changed_inside = self._box_now, self.sleepers.follow_change
         source.finish_found = lambda: self.program.run_one("finish_found", world.clock.dt)
         source.stored, source.disturb = self.sleepers.contacts, self.sleepers.disturb
@@ -381,10 +381,8 @@ class Simulation:
         """Go on from that; the table is what it was then. moved: it has had other rows, or other components."""
         state = self.state
         self.set_gravity(saved["gravity"])
-        self._room.reserve_warm_start(saved["warm_start"]["counts"])
-        self._room.reserve_contacts(saved["contacts"]["counts"])
-        put_rows_back(state.warm_start, saved["warm_start"])
-        put_rows_back(state.contacts, saved["contacts"])
+        put_rows_back(state.warm_start, WARM_START_ROWS, saved["warm_start"])
+        put_rows_back(state.contacts, CONTACT_ROWS, saved["contacts"])
         state.warm_start.rows_version[:] = -1
         self.sleepers.take_back(saved.get("sleepers"))
         self._generation, state.ids_changed = self.table.generation, saved["ids_changed"]

@@ -3,11 +3,12 @@ docs/architecture.md read; and the parts of stages that are called by address.""
 
 from __future__ import annotations
 
-from ..framework.schedule.stages import Stage
+from ..framework.schedule.stages import Rows, Stage
 from .broad_phase.boxes import bound_searches, box_rest_of_step, box_standing
 from .broad_phase.system import BroadPhase
-from .ccd.refresh_pairs import merge_pairs
+from .ccd.refresh_pairs import ROOM_TO_MERGE, merge_pairs
 from .ccd.time_of_impact import first_touch
+from .compounds.records import COMPOUNDS
 from .compounds.stages import begin_parts
 from .contacts.events import ContactEvents
 from .contacts.response import Response
@@ -20,7 +21,7 @@ from .narrow_phase.manifolds import finish_found
 from .narrow_phase.system import NarrowPhase
 from .opening import KEEPS_FORCE, KEEPS_START, KEEPS_VELOCITY, close_step, keep_state, read_bodies
 from .quarantine.columns import check_columns
-from .records import BODIES, COLLIDERS, STATE, TABLE_COLUMNS
+from .records import BODIES, COLLIDERS, STATE, TABLE_COLUMNS, all_rows
 from .sleeping.stages import update_sleep
 
 OPENING = (
@@ -32,7 +33,7 @@ OPENING = (
     ),
     Stage(
         begin_parts, "which rows are parts of one body; where the game has moved it they follow", (),
-        ("position", "linear_velocity", "rotation"), "parts",
+        ("position", "linear_velocity", "rotation"), "parts", room=(Rows("bodies", COMPOUNDS, all_rows),),
     ),
     Stage(
         read_bodies, "1 / mass of what moves freely; whether any speed is limited, any body swept or rotated",
@@ -64,6 +65,7 @@ ON_DEMAND = (
         ("pairs", "candidates"),
         ("merged", "impacts"),
         "swept bodies",
+        room=ROOM_TO_MERGE,
     ),
     Stage(
         finish_found, "contacts where free flight leads, for code that reads them", ("pairs",), ("pairs",), "colliders"
@@ -101,6 +103,9 @@ def check_stages(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
         for name in stage.writes:
             if name in TABLE_COLUMNS and name not in (*(kept[1] for kept in KEPT), *MADE_AGAIN):
                 raise ValueError(f"stage {stage.name} writes {name}, which a failed step does not put back")
+        for rows in stage.room:
+            if not {*rows.columns} <= {*STATE.fields[rows.record].fields}:
+                raise ValueError(f"stage {stage.name}: not all of its room is in record {rows.record}")
         if stage.needed not in (*CONDITIONS, stage.name):
             raise ValueError(f"stage {stage.name}: needed must be one of {', '.join(CONDITIONS)}, got {stage.needed!r}")
     return stages

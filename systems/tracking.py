@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..framework.jit.records.record import Record
-from ..framework.jit.records.schema import Column
+from ..framework.jit.records.schema import Column, Section
 
 WARM_START = ("step",)  # numbers of which there are two, beside the counts
 CONTACTS = ("steps", "stays")
@@ -24,9 +24,10 @@ def saved_rows(record: Record, numbers: tuple[str, ...]) -> dict[str, Any]:
     return {**rows, **{name: getattr(record, name)[now].item() for name in ("counts", *numbers)}}
 
 
-def put_rows_back(record: Record, saved: dict[str, Any]) -> None:
-    """Write them into a record that has room for so many rows."""
+def put_rows_back(record: Record, rows: Section, saved: dict[str, Any]) -> None:
+    """Write them into a record."""
     now, count = record.now, saved["counts"]
+    record.reserve(count, *rows)
     for name, value in saved.items():
         if isinstance(value, np.ndarray):
             getattr(record, name)[now, :count] = value

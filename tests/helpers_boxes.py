@@ -7,14 +7,13 @@ import warnings
 import numpy as np
 
 from carom.framework.jit.records.record import make_record
-from carom.framework.schedule.stages import Program, Stage
+from carom.framework.schedule.stages import Program, Rows, Stage
 from carom.framework.settings import Settings
 from carom.systems import codes
 from carom.systems.broad_phase import stages
-from carom.systems.broad_phase.records import FRAME_SIZE, HIGHEST, LARGEST, LOWEST
+from carom.systems.broad_phase.records import FRAME_SIZE, GRID_BOXES, GRID_STATICS, HIGHEST, LARGEST, LOWEST
 from carom.systems.broad_phase.search import CandidateSearch
-from carom.systems.broad_phase.static_grid import reserve_static_grid
-from carom.systems.broad_phase.uniform_grid import reserve_grid
+from carom.systems.record_buffers import make_room
 from carom.systems.records import STATE
 
 SEARCH = (
@@ -26,9 +25,9 @@ SEARCH = (
 def begin_uniform_grid(state, dt):
     """A uniform grid of what moves, however few that is."""
     state.candidates.count = 0
-    code = stages.build_moving_grid(state)
+    stages.build_moving_grid(state)
     state.pair_search = stages.UNIFORM_GRID if state.grid.suits else stages.NO_SEARCH
-    return code
+    return codes.OK
 
 
 def search_uniform_grid(state, dt):
@@ -38,15 +37,23 @@ def search_uniform_grid(state, dt):
 def begin_static_grid(state, dt):
     """Bodies that do not move are put into a grid, however few they are."""
     state.candidates.count = 0
-    code = stages.build_statics(state)
+    stages.build_statics(state)
     state.pair_search = stages.BRUTE_FORCE if state.static_grid.suits else stages.NO_SEARCH
-    return code
+    return codes.OK
 
 
 def search_static_grid(state, dt):
     return stages.look_into_statics(state) if state.pair_search == stages.BRUTE_FORCE else codes.OK
 
 
+# However few bodies there are, both grids have room.
+ROOM = (
+    Rows("grid", GRID_BOXES, lambda s: s.count + stages.LANES),
+    Rows("static_grid", (*GRID_BOXES, *GRID_STATICS), lambda s: s.count + stages.LANES),
+    Rows("grid", ("directory",), lambda s: stages.most_cells(s.count)),
+    Rows("static_grid", ("directory",), lambda s: stages.most_cells(s.count)),
+    *stages.ROOM_FOR_CANDIDATES,
+)  # fmt: skip
 UNIFORM_GRID_ALONE = (begin_uniform_grid, search_uniform_grid)
 STATIC_GRID_ALONE = (begin_static_grid, search_static_grid)
 
@@ -60,14 +67,12 @@ class Boxes:
         self.state.frame = np.zeros(FRAME_SIZE)
         self.search = CandidateSearch(self.state, registry, lambda: settings or Settings(), lambda: None, None)
         self.asked = []
-        room = {
-            codes.NEED_CANDIDATES: self.search.grow_candidates,
-            codes.NEED_CELLS: lambda: reserve_grid(self.state.grid, self.state.needed),
-            codes.NEED_STATIC_CELLS: lambda: reserve_static_grid(self.state.static_grid, self.state.needed),
+        work = {
+            codes.NEED_ROOM: lambda: make_room(self._program.stages[self.state.stage], self.state, None, None),
             codes.FIND_IN_PYTHON: lambda: self.search.find_in_python(0.0),
         }
-        handlers = {code: self._handler(code, grow) for code, grow in room.items()}
-        self._program = Program(self.state, [Stage(f, "") for f in functions], handlers, codes.AFTERWARDS)
+        handlers = {code: self._handler(code, each) for code, each in work.items()}
+        self._program = Program(self.state, [Stage(f, "", room=ROOM) for f in functions], handlers, codes.AFTERWARDS)
         self._program.link(lambda stage: True)
 
     def _handler(self, code, work):

@@ -9,18 +9,19 @@ from __future__ import annotations
 import dis
 import functools
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..compilation import entry_point, log, untimed_kernel
+from ..compilation import entry_point, inlined, log, packed, untimed_kernel
 from ..jit.lazy import types
 from ..jit.linking import Called, Linked, linked_call
 from ..jit.records.record import Record
 from ..jit.records.record_type import record_at, record_type
 from ..jit.records.schema import Schema, integer, ints
+from ..jit.source import source_module
 from ..jit.tick_counter import TICKS_NOW, TickClock, read_ticks
 
 # What every state begins with: addresses of the stages (0: not needed), the time that each has taken in ticks of the
@@ -56,6 +57,35 @@ def run_stages(address, start, stop, dt):
 
 RUN_STAGES = Called(run_stages, int, int, int, float)
 
+NEED_ROOM = 1  # what a stage returns that needs more rows than the columns of its ``room`` have
+
+
+def asked(state):
+    """So many rows as a stage finds out within that it needs: it writes ``needed`` and returns NEED_ROOM."""
+    return state.needed
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Columns of a record of the state, ``"solver"``, that a stage writes, and how many rows they need.
+
+    columns
+        those that grow together, but for columns of the bodies, of which each may have its rows already
+    count
+        of the state, to be compiled: so many rows. The stage runs only with as many; :func:`asked` is for those that
+        find out within
+    """
+
+    record: str
+    columns: Iterable[str]
+    count: Callable[[Any], int]
+
+    @property
+    def telling(self) -> tuple[str, ...]:
+        """The columns that tell whether there are enough rows."""
+        columns = tuple(self.columns)
+        return columns if self.record == "bodies" else columns[:1]
+
 
 @dataclass(frozen=True)
 class Stage:
@@ -69,6 +99,8 @@ class Stage:
         name of the property of the scene that has to be true; empty: always
     when
         what has to happen for it to do something; empty: in every step
+    room
+        what grows with what: it runs only where these columns have so many rows, and else returns NEED_ROOM
     anchor, plugin
         of a plugin's stage: the built-in one next to which it runs, and the name of the plugin
     """
@@ -79,6 +111,7 @@ class Stage:
     writes: tuple[str, ...] = ()
     needed: str = ""
     when: str = ""
+    room: tuple[Rows, ...] = ()
     anchor: str = ""
     plugin: str = ""
 
@@ -245,10 +278,31 @@ _linked: dict[tuple[Any, Any], Linked] = {}
 def linked_stage(stage: Stage, schema: Schema, dimensions: int) -> Linked:
     """The stage's compiled function for states of that kind, one for the process."""
     kind = record_type(schema, dimensions)
-    key = (stage.function, kind)
+    key = (stage.function, stage.room, kind)
     if key not in _linked:
-        _linked[key] = Linked(stage.function, types.int64(kind, types.float64))
+        _linked[key] = Linked(_with_room(stage), types.int64(kind, types.float64))
     return _linked[key]
+
+
+def _with_room(stage: Stage) -> Callable[..., int]:
+    """The stage's function behind a test of its room."""
+    known = [rows for rows in stage.room if rows.count is not asked]
+    if not known:
+        return stage.function
+    from ..jit.hash import is_packed  # loads numba
+
+    counts = (getattr(rows.count, "py_func", rows.count) for rows in known)
+    scope: dict[str, Any] = {f"rows_{k}": inlined(count) for k, count in enumerate(counts)}
+    short = (
+        f"rows_{k}(state) > len(state.{rows.record}.{name})" for k, rows in enumerate(known) for name in rows.telling
+    )
+    lines = (
+        f"def {stage.name}(state, dt):", f"    if {' or '.join(short)}:", "        return NEED_ROOM",
+        "    return function(state, dt)", "",
+    )  # fmt: skip
+    scope |= {"function": inlined(stage.function), "NEED_ROOM": NEED_ROOM}
+    made = getattr(source_module("\n".join(lines), scope), stage.name)
+    return packed(made) if is_packed(stage.function) else made
 
 
 @dataclass(frozen=True)

@@ -103,7 +103,7 @@ class JointRows:
         record, stop = self._record, span.start + size
         count = record.count + stop - span.stop
         if count > len(record.joint):
-            record.reserve(2 * count, *PER_ROW, keep=record.count)
+            record.reserve(2 * count, *PER_ROW)
         if span.stop < record.count:
             for name in MOVED:
                 column = getattr(record, name)
@@ -136,7 +136,7 @@ class JointRows:
             if free is not None:
                 self._free.remove(free)
             self._places[entity] = free or slice(end, end + len(given))
-            record.reserve(2 * (end + len(given)), "numbers", keep=end)
+            record.reserve(2 * (end + len(given)), "numbers")
         record.reserve(self._dimensions * len(record.joint), "axes_a", "axes_b")
         record.numbers[self._places[entity]] = given
         for j, row in enumerate(rows, span.start):
@@ -165,7 +165,7 @@ class JointRows:
         """One pair more in their order, or one less."""
         record, n = self._record, self._record.apart
         if n == len(record.apart_a):
-            record.reserve(2 * n + 8, *APART, keep=n)
+            record.reserve(2 * n + 8, *APART)
         a, b = record.apart_a, record.apart_b
         low, high = np.searchsorted(a[:n], (pair[0], pair[0] + 1)).tolist()
         at = low + int(np.searchsorted(b[low:high], pair[1]))

@@ -9,20 +9,21 @@ LOWEST, HIGHEST, LARGEST = 0, 3, 6
 FRAME_SIZE = 7
 
 # A uniform grid of boxes, see :mod:`.uniform_grid`; one of what moves, one of what does not.
+GRID_BOXES = Section(  # one entry per box
+    "body", "broad phase, grid", "more bodies than are tested pair by pair",
+    keys=ints("int32"),  # its cell
+    order=ints("int32"),  # rows in the order of their cells
+    cells=ints("int32"),  # these cells
+    codes=ints(),  # the boxes in small integers
+)  # fmt: skip
+GRID_STATICS = Section(  # static grid alone: the rows in the grid with copies of their boxes
+    "body", "broad phase, grid", "more bodies than are tested pair by pair",
+    rows=ints("int32"),
+    lower=vectors(),
+    upper=vectors(),
+)  # fmt: skip
 GRID = Schema(
-    "Grid",
-    Section(
-        "body", "broad phase, grid", "more bodies than are tested pair by pair",
-        # one entry per box
-        keys=ints("int32"),  # its cell
-        order=ints("int32"),  # rows in the order of their cells
-        cells=ints("int32"),  # these cells
-        codes=ints(),  # the boxes in small integers
-        # static grid alone: the rows in the grid with copies of their boxes
-        rows=ints("int32"),
-        lower=vectors(),
-        upper=vectors(),
-    ),
+    "Grid", GRID_BOXES, GRID_STATICS,
     suits=flag(),  # the boxes are even enough for a grid, and these are in it
     serves=flag(),  # queries look into it
     version=integer(),  # ``state.version`` when it was built; static grid: ``state.statics_version``, -1: never

@@ -9,6 +9,7 @@ import numpy as np
 from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Registry
 from ...framework.settings import AUTOMATIC, Settings
+from ..records import FOUND
 from .boxes import fixed_count
 from .plan import reason_of
 from .plugin_broad_phase import PluginBroadPhase
@@ -16,7 +17,7 @@ from .records import FRAME_SIZE
 from .stages import BRUTE_FORCE, NO_SEARCH, PLUGIN, UNIFORM_GRID, UNIFORM_GRID_MIN
 from .static_grid import NEVER_BUILT
 from .tree.tree import SpatialTree
-from .uniform_grid import OUTSIDE_MAX
+from .uniform_grid import CHUNK, LONGEST, OUTSIDE_MAX
 
 
 class CandidateSearch:
@@ -38,6 +39,8 @@ class CandidateSearch:
         self._static_version, self._static_first = NEVER_BUILT, 0
         for grid in (state.grid, state.static_grid):
             grid.reserve(FRAME_SIZE, "frame")
+            grid.reserve(1, "scale")
+            grid.reserve(CHUNK + LONGEST, "notes")
             grid.reserve(OUTSIDE_MAX + 1, "longest", "outside")
         state.static_grid.version = NEVER_BUILT
         state.pair_search = NO_SEARCH
@@ -52,11 +55,6 @@ class CandidateSearch:
         return self._state.count >= UNIFORM_GRID_MIN
 
     # -- what stages ask for ----------------------------------------------------------------------
-
-    def grow_candidates(self) -> None:
-        """Make the room that a stage asks for with NEED_CANDIDATES, and keep the pairs."""
-        candidates = self._state.candidates
-        candidates.reserve(self._state.needed, "first", "second", keep=candidates.count)
 
     def find_in_python(self, dt: float) -> None:
         """Candidates from the broad phase of a plugin, or from trees: no grid suits the boxes of this step."""
@@ -75,7 +73,7 @@ class CandidateSearch:
     def _store(self, first: np.ndarray, second: np.ndarray, after: int = 0) -> None:
         candidates, stop = self._state.candidates, after + len(first)
         if stop > len(candidates.first):
-            candidates.reserve(max(stop, 2 * len(candidates.first)), "first", "second", keep=after)
+            candidates.reserve(max(stop, 2 * len(candidates.first)), *FOUND)
         candidates.first[after:stop], candidates.second[after:stop] = first, second
         candidates.count = stop
 

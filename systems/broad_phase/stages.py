@@ -18,13 +18,25 @@ Where boxes differ too much in size for a grid, or crowd in one place, trees are
 
 from __future__ import annotations
 
-from ...framework.compilation import packed, part
-from ..codes import FIND_IN_PYTHON, NEED_CANDIDATES, NEED_CELLS, NEED_STATIC_CELLS, OK
+from ...framework.compilation import inlined, packed, part
+from ...framework.schedule.stages import Rows, asked
+from ..codes import FIND_IN_PYTHON, NEED_ROOM, OK
+from ..records import FOUND
 from .boxes import fixed_count, fixed_row, grid_stop
 from .brute_force import BRUTE_FORCE_MAX, boxes_overlap
-from .records import FRAME_SIZE
+from .records import FRAME_SIZE, GRID_BOXES, GRID_STATICS
 from .static_grid import build_static_grid, follow_rows
-from .uniform_grid import FULL, build_grid, look_around, look_inside, look_near, test_notes
+from .uniform_grid import (
+    CELLS_PER_BOX,
+    FULL,
+    LANES,
+    SPARE_CELLS,
+    build_grid,
+    look_around,
+    look_inside,
+    look_near,
+    test_notes,
+)
 
 # 8 million candidates: with everything that is kept of a pair about 4 gigabytes. A game has 1 to 50 per body.
 CANDIDATE_LIMIT = 1 << 23
@@ -73,7 +85,7 @@ def need_more_room(state):
     if room >= CANDIDATE_LIMIT:
         return leave_to_trees(state)
     state.needed = min(2 * max(room, BRUTE_FORCE_MAX), CANDIDATE_LIMIT)
-    return NEED_CANDIDATES
+    return NEED_ROOM
 
 
 @part
@@ -84,34 +96,68 @@ def forget_queries(state, grid):
 
 
 @part
+def places_statics(state):
+    """Whether there is to be a grid of what does not move."""
+    return not state.all_still and not state.uses_plugin_broad_phase and has_static_grid(state)
+
+
+@part
+def places_moving(state):
+    """Whether there is to be a grid of what moves."""
+    enough = state.moving - state.first >= UNIFORM_GRID_MIN
+    return enough and not state.all_still and not state.uses_plugin_broad_phase
+
+
+@part
+def static_boxes(state):
+    """As many as there may be in that grid, and as many as may be read past the last one."""
+    return fixed_count(state) + LANES if places_statics(state) else 0
+
+
+@part
+def moving_boxes(state):
+    """The same of what moves."""
+    return state.moving - state.first + LANES if places_moving(state) else 0
+
+
+@inlined
+def most_cells(boxes):
+    """Of a grid, with those that are counted in."""
+    return int(CELLS_PER_BOX * boxes) + SPARE_CELLS + 4
+
+
+ROOM_FOR_STATICS = (
+    Rows("static_grid", (*GRID_BOXES, *GRID_STATICS), static_boxes),
+    Rows("static_grid", ("directory",), lambda s: most_cells(static_boxes(s))),
+)  # fmt: skip
+ROOM_FOR_MOVING = (
+    Rows("grid", GRID_BOXES, moving_boxes), Rows("grid", ("directory",), lambda s: most_cells(moving_boxes(s))),
+)  # fmt: skip
+ROOM_FOR_CANDIDATES = (Rows("candidates", FOUND, asked),)
+
+
+@part
 def build_statics(state):
-    """The grid of what does not move, when that has changed; returns a code."""
-    grid, fixed = state.static_grid, fixed_count(state)
+    """The grid of what does not move, when that has changed."""
+    grid = state.static_grid
     if grid.version != state.statics_version:
-        if len(grid.keys) < fixed:
-            state.needed = fixed
-            return NEED_STATIC_CELLS
         build_static_grid(state)
         forget_queries(state, grid)
     elif grid.first != state.moving:
         follow_rows(state)
-    return OK
 
 
 def place_statics(state, dt):
     """Where more bodies are static than move: their grid."""
-    if state.all_still or state.uses_plugin_broad_phase:
-        return OK
-    return build_statics(state) if has_static_grid(state) else OK
+    if places_statics(state):
+        build_statics(state)
+    return OK
 
 
 @part
 def build_moving_grid(state):
-    """A uniform grid of what moves, if that is even enough for it; returns a code."""
-    grid, bodies, moving = state.grid, state.bodies, state.moving - state.first
-    if len(grid.keys) < moving:
-        state.needed = moving
-        return NEED_CELLS
+    """A uniform grid of what moves, if that is even enough for it."""
+    grid, bodies = state.grid, state.bodies
     for k in range(FRAME_SIZE):
         grid.frame[k] = state.frame[k]
     stop = grid_stop(state)
@@ -120,15 +166,14 @@ def build_moving_grid(state):
     for k in range(grid.outside_count):
         grid.outside[k] = stop + k
     forget_queries(state, grid)
-    return OK
 
 
 @packed
 def place_moving(state, dt):
     """Where many bodies move: their grid."""
-    if state.all_still or state.uses_plugin_broad_phase:
-        return OK
-    return build_moving_grid(state) if state.moving - state.first >= UNIFORM_GRID_MIN else OK
+    if places_moving(state):
+        build_moving_grid(state)
+    return OK
 
 
 def choose_search(state, dt):

@@ -13,7 +13,7 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import item
 from .boxes import fixed_count, fixed_row
 from .records import HIGHEST, LARGEST, LOWEST
-from .uniform_grid import OUTSIDE_MAX, build_grid, reserve_grid
+from .uniform_grid import OUTSIDE_MAX, build_grid
 
 NEVER_BUILT = -1  # in place of a version
 ALIKE = 1.25  # boxes that are longer than most by no more than this factor are inside: cells grow by as much
@@ -101,10 +101,3 @@ def follow_rows(state):
     for k in range(grid.outside_count):
         grid.outside[k] += by if grid.outside[k] >= grid.first else 0
     grid.first = state.moving
-
-
-def reserve_static_grid(grid, count):
-    """Room for so many static bodies. Called from Python, by the owner of the record."""
-    if reserve_grid(grid, count):
-        grid.reserve(len(grid.keys), "rows", "lower", "upper")
-        grid.version = NEVER_BUILT

@@ -16,6 +16,9 @@ from .brute_force import BRUTE_FORCE_MAX
 from .plan import planned_passes
 from .search import CandidateSearch
 from .stages import (
+    ROOM_FOR_CANDIDATES,
+    ROOM_FOR_MOVING,
+    ROOM_FOR_STATICS,
     TREE,
     UNIFORM_GRID_MIN,
     choose_search,
@@ -50,24 +53,24 @@ class BroadPhase(StagedSystem):
         ),
         Stage(
             place_statics, "uniform grid of what does not move", BOXES, ("static_grid",), MANY,
-            "more bodies are static than move, and these change",
+            "more bodies are static than move, and these change", ROOM_FOR_STATICS,
         ),
         Stage(
             place_moving, "uniform grid of what moves", BOXES, ("grid",), MANY,
-            f"at least {UNIFORM_GRID_MIN} bodies move",
+            f"at least {UNIFORM_GRID_MIN} bodies move", ROOM_FOR_MOVING,
         ),
         Stage(choose_search, "how to find which boxes overlap", (), ("candidates",), "colliders"),
         Stage(
             search_uniform_grid, "what is in that grid with each other, and with what is in none", (*BOXES, "grid"),
-            ("candidates",), MANY, f"at least {UNIFORM_GRID_MIN} bodies move",
+            ("candidates",), MANY, f"at least {UNIFORM_GRID_MIN} bodies move", ROOM_FOR_CANDIDATES,
         ),
         Stage(
             test_few, f"every pair of at most {BRUTE_FORCE_MAX} that move, and with what is in no grid", BOXES,
-            ("candidates",), "colliders", f"less than {UNIFORM_GRID_MIN} bodies move",
+            ("candidates",), "colliders", f"less than {UNIFORM_GRID_MIN} bodies move", ROOM_FOR_CANDIDATES,
         ),
         Stage(
             search_static_grid, "what moves looks into the grid of what does not", (*BOXES, "static_grid"),
-            ("candidates",), MANY, "more bodies are static than move",
+            ("candidates",), MANY, "more bodies are static than move", ROOM_FOR_CANDIDATES,
         ),
         Stage(
             leave_out_still, "pairs of two bodies that are still", ("candidates", "still"), ("candidates",), "sleeping",

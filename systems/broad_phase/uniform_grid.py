@@ -395,16 +395,3 @@ def look_inside(state, grid, i, low, high, found):
                 second[found] = i
                 found += boxes_overlap(low, high, lower[there], upper[there])
     return found
-
-
-def reserve_grid(grid, count):
-    """Room for so many boxes; True if there was not enough. Called from Python, by the owner of the record."""
-    if len(grid.keys) >= count:
-        return False
-    count = max(count, len(grid.keys) * 3 // 2)  # worlds that grow body by body allocate seldom
-    grid.reserve(CHUNK + LONGEST, "notes")
-    grid.reserve(count, "keys", "order", "cells")
-    grid.reserve(1, "scale")
-    grid.codes = np.zeros(count + LANES, np.int64)
-    grid.reserve(int(CELLS_PER_BOX * count) + SPARE_CELLS + 4, "directory")
-    return True

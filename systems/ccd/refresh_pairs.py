@@ -11,11 +11,14 @@ from __future__ import annotations
 
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
-from ..codes import NEED_EVENTS, NEED_MERGED, OK
+from ...framework.schedule.stages import Rows
+from ..codes import OK
 from ..impacts.heap import heap_push, holds
-from ..impacts.worklist import lacks_room, list_pair
+from ..impacts.records import EVENTS
+from ..impacts.worklist import list_pair, most_listed
 from ..narrow_phase.manifolds import forget_manifold
 from ..narrow_phase.stages import is_solid_pair, layers_meet, rank_rows
+from ..records import PAIR_COLUMNS
 
 SURVIVED, GONE = -1, -2  # in ``pairs.place``; from 0 on it is the place in the other list
 
@@ -82,15 +85,16 @@ def keep_events(state):
             heap_push(impacts, k)
 
 
+ROOM_TO_MERGE = (
+    Rows("merged", PAIR_COLUMNS, lambda s: s.pairs.count + s.candidates.count),
+    Rows("impacts", EVENTS, lambda s: most_listed(s.pairs.count + s.candidates.count)),
+)  # fmt: skip
+
+
 def merge_pairs(state, dt):
     """Join two lists in canonical order: candidates whose layers meet, and the pairs that something has come of. New
     candidates are searched for impacts."""
     candidates, old, new, rank = state.candidates, state.pairs, state.merged, state.bodies.rank
-    if old.count + candidates.count > len(new.a):
-        state.needed = old.count + candidates.count
-        return NEED_MERGED
-    if lacks_room(state, old.count + candidates.count):
-        return NEED_EVENTS
     mark_kept(state)
     if state.ranks_version != state.version:
         rank_rows(state)

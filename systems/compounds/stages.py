@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add
-from ..codes import NEED_COLUMNS, OK
+from ..codes import OK
 from ..contacts.solving.warm_start import row_of
 from ..shapes.quaternions import product, rotation_in_space, set_rotation, write_axes
 from .rows import owner_of
@@ -49,9 +49,7 @@ def place_part(state, k):
 
 def begin_parts(state, dt):
     """Which rows belong together; the game may have moved the bodies."""
-    bodies, parts = state.bodies, state.parts
-    if len(bodies.owner) < state.count:
-        return NEED_COLUMNS
+    parts = state.parts
     if parts.rows_version != state.version:
         find_rows(state)
     state.compound = True

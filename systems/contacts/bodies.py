@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
+from ...framework.schedule.stages import Rows
 from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..ccd.turning_touch import turn_of_path
-from ..codes import NEED_COLUMNS, NEED_SOLVER, OK
+from ..codes import OK
 from ..compounds.rows import has_parts, next_row, owner_of, place_of
 from ..compounds.stages import share_places
 from ..integration.trajectory import along, path_of
 from ..integration.turning import size_of_turn
 from ..joints.bodies import lay_joints
+from ..records import HELD, SOLVER_ARMS, SOLVER_BODIES, SOLVER_CONTACTS, SOLVER_SPINS
 from .constants import FREQUENCY, SAG, TIPPING_FREQUENCY, TIPPING_SAG
 from .points import points_of
 from .solving.islands import order_rows
@@ -62,6 +64,27 @@ def list_rows(state):
     solver.frequency, solver.sag = (TIPPING_FREQUENCY, TIPPING_SAG) if solver.tips else (FREQUENCY, SAG)
 
 
+@part
+def rows_at_rest(state):
+    """Contacts at rest, and rows of joints."""
+    return state.solver.contacts + state.solver.joints.active
+
+
+@part
+def bodies_at_rest(state):
+    """So many bodies they have at most, and the world, which joints hold on to."""
+    return min(2 * rows_at_rest(state), state.count) + 1
+
+
+ROOM_AT_REST = (
+    Rows("bodies", HELD, lambda s: s.count if rows_at_rest(s) > 0 else 0),
+    Rows("solver", SOLVER_CONTACTS, rows_at_rest),
+    Rows("solver", SOLVER_BODIES, bodies_at_rest),
+    Rows("solver", SOLVER_ARMS, lambda s: rows_at_rest(s) if s.spinning else 0),
+    Rows("solver", SOLVER_SPINS, lambda s: bodies_at_rest(s) if s.spinning else 0),
+)  # fmt: skip
+
+
 def gather(state, dt):
     """The bodies of the contacts at rest, where the step starts; the contacts sorted by colour.
 
@@ -70,15 +93,8 @@ def gather(state, dt):
     solver, pairs, bodies = state.solver, state.pairs, state.bodies
     for i in range(state.first, state.moving if len(bodies.held) > 0 else 0):
         bodies.held[i] = False
-    rows = solver.contacts + solver.joints.active
-    if rows == 0:
+    if rows_at_rest(state) == 0:
         return OK
-    if len(bodies.held) == 0:
-        return NEED_COLUMNS
-    too_few = rows > len(solver.first) or min(2 * rows, state.count) >= len(solver.body_row)
-    if too_few or (state.spinning and (len(solver.arm_a) == 0 or len(solver.turn) < len(solver.body_row))):
-        state.needed = rows
-        return NEED_SOLVER
     list_rows(state)
     order_rows(state, dt)
     inverse_mass = bodies.inverse_mass

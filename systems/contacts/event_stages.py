@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from ...framework.compilation import part
+from ...framework.schedule.stages import Rows
 from ...framework.vectors import add
-from ..codes import NEED_CONTACTS, OK
+from ..codes import OK
 from ..narrow_phase.manifolds import move_to_end
+from ..records import CONTACT_ROWS
+
+ROOM_FOR_CONTACTS = (Rows("contacts", CONTACT_ROWS, lambda s: s.pairs.touching_count),)
+# Where no response has looked at the end of the step.
+ROOM_FOR_FOUND = (Rows("contacts", CONTACT_ROWS, lambda s: s.pairs.found if s.found_current else 0),)
 
 
 @part
 def write_contacts(state):
     """The touching pairs as the contacts of the step, in canonical order; disabled pairs count as not touching."""
     pairs, contacts, bodies, entity = state.pairs, state.contacts, state.bodies, state.bodies.entity
-    if pairs.touching_count > len(contacts.began):
-        state.needed = pairs.touching_count
-        return NEED_CONTACTS
     new, count, next_disabled = 1 - contacts.now, 0, 0
     for r in range(pairs.touching_count):
         c = pairs.touching[r]
@@ -32,12 +35,12 @@ def write_contacts(state):
     state.found_current = False
     state.contacts_version += 1
     state.motion_version += 1
-    return OK
 
 
 def publish_contacts(state, dt):
     """The contacts at the end of the step."""
-    return write_contacts(state)
+    write_contacts(state)
+    return OK
 
 
 @part
@@ -51,18 +54,14 @@ def publish_found(state, dt):
             pairs.impulse[c], pairs.rests[c], pairs.touching[count] = 0.0, False, c
             count += 1
     pairs.touching_count = count
-    code = write_contacts(state)
-    if code == OK:
-        state.contacts_counted += count
-    return code
+    write_contacts(state)
+    state.contacts_counted += count
 
 
 def compare_contacts(state, dt):
     """Rows of the contacts that ceased, began and stayed; both lists are in canonical order."""
     if state.found_current:
-        code = publish_found(state, dt)
-        if code != OK:
-            return code
+        publish_found(state, dt)
     contacts = state.contacts
     now = contacts.now
     old, i, j, ends, begins, stays = 1 - now, 0, 0, 0, 0, 0

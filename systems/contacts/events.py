@@ -16,7 +16,7 @@ from ...framework.world.contacts import ContactRows, Contacts
 from ...framework.world.events import CONTACT_EVENTS
 from ..sleeping.stored import merged
 from ..staged import StagedSystem
-from .event_stages import compare_contacts
+from .event_stages import ROOM_FOR_FOUND, compare_contacts
 
 Columns = dict[str, np.ndarray]
 
@@ -197,7 +197,6 @@ def disabled_pairs(state: Record, contacts: Contacts) -> np.ndarray:
     if not state.found_current or enabled is None or enabled.all():
         return np.empty(0, np.int64)
     disabled = pairs.hits[: pairs.found][~enabled]
-    pairs.reserve(len(disabled), "disabled")
     pairs.disabled[: len(disabled)] = disabled
     pairs.disabled_count = len(disabled)
     return disabled
@@ -216,7 +215,7 @@ class ContactEvents(StagedSystem):
     STAGES = (
         Stage(
             compare_contacts, "contacts of this step and the last", ("contacts",), ("contacts",), "contacts",
-            "bodies touch, or did",
+            "bodies touch, or did", ROOM_FOR_FOUND,
         ),
     )  # fmt: skip
 

@@ -12,17 +12,17 @@ from ...framework.schedule.stages import Program, PythonPart, Stage
 from ...framework.settings import Settings
 from ...framework.world.contacts import Contacts
 from ..compounds.stages import carry_parts
-from ..impacts.stages import begin_impacts, resolve_impacts
+from ..impacts.stages import ROOM_FOR_IMPACTS, begin_impacts, resolve_impacts
 from ..joints.bodies import count_turns
 from ..staged import StagedSystem
-from .bodies import gather, put_back
-from .event_stages import publish_contacts
+from .bodies import ROOM_AT_REST, gather, put_back
+from .event_stages import ROOM_FOR_CONTACTS, publish_contacts
 from .events import disabled_pairs
 from .response_stages import begin_response
 from .resting import find_resting, find_touching, linearise
-from .solving.prediction import predict_rest
+from .solving.prediction import ROOM_FOR_SUPPORT, predict_rest
 from .solving.solver import solve_contacts, solve_joined_contacts, solve_turning_contacts
-from .solving.warm_start import match_warm_start, store_warm_start
+from .solving.warm_start import ROOM_TO_STORE, match_warm_start, store_warm_start
 from .static_penetration import resolve_static_penetration
 
 MOTION = ("position", "linear_velocity", "path_velocity")
@@ -43,19 +43,19 @@ class Response(StagedSystem):
         Stage(begin_response, "where the paths begin", ("pairs",), ("path_velocity",), EITHER),
         Stage(
             predict_rest, "the impulses of the last step act on the prediction, as far as there is something to hold",
-            ("warm_start",), MOTION, EITHER, RESTED,
+            ("warm_start",), MOTION, EITHER, RESTED, ROOM_FOR_SUPPORT,
         ),
         Stage(begin_impacts, "no impact yet", ("pairs", "restitution"), ("impacts",), "colliders"),
         Stage(
             resolve_impacts, "impacts at their time on the path, in order", ("pairs", "restitution", "friction"),
-            (*MOTION, "impacts"), "colliders", NEAR,
+            (*MOTION, "impacts"), "colliders", NEAR, ROOM_FOR_IMPACTS,
         ),
         Stage(
             find_resting, "which pairs neither bounce nor are apart", ("pairs", *MOTION), ("pairs",), "colliders", NEAR
         ),
         Stage(
             gather, "the resting bodies and their contacts, by island and colour; substeps of each island", MOTION,
-            ("solver",), EITHER, REST,
+            ("solver",), EITHER, REST, ROOM_AT_REST,
         ),
         Stage(linearise, "normal and gap of each contact at rest", MOTION, ("solver", "pairs"), "colliders", REST),
         Stage(
@@ -84,9 +84,15 @@ class Response(StagedSystem):
             resolve_static_penetration, "what is in what cannot be moved, or through it, as that turns or the solver "
             "has pushed, is put back", ("pairs",), MOTION, "colliders", NEAR,
         ),
-        Stage(store_warm_start, "the impulses, for the next step", ("solver",), ("warm_start",), "colliders", REST),
+        Stage(
+            store_warm_start, "the impulses, for the next step", ("solver",), ("warm_start",), "colliders", REST,
+            ROOM_TO_STORE,
+        ),
         Stage(find_touching, "which pairs touch in the end", MOTION, ("pairs",), "colliders", NEAR),
-        Stage(publish_contacts, "the contacts of the step", ("pairs",), ("contacts",), "contacts"),
+        Stage(
+            publish_contacts, "the contacts of the step", ("pairs",), ("contacts",), "contacts",
+            room=ROOM_FOR_CONTACTS,
+        ),
     )  # fmt: skip
 
     def __init__(self, program: Program, contacts: Contacts, settings: Callable[[], Settings]) -> None:

@@ -14,11 +14,11 @@ from ...framework.jit.linking import CACHE_SIZE
 from ...framework.jit.records import schema
 from ...framework.jit.records.record_type import record_at
 from ...framework.jit.records.schema import Schema
+from ...framework.jit.source import source_module
 from ...framework.plugins.checks import is_column, plain_function
 from ...framework.plugins.registry import PluginStage
 from ...framework.schedule.stages import answers
-from ..codes import NEED_OWN_ROWS, OK
-from ..shapes.linking.source import source_module
+from ..codes import NEED_ROOM, OK
 from ..shapes.linking.user_functions import user_function
 
 PRESENT = "present"  # the column that says which rows have the component
@@ -71,8 +71,8 @@ def compiled_stage(stage: PluginStage, dimensions: int) -> Any:
     call = f"function({', '.join(('state', 'dt', *names))})"
     if True in answers(plain_function(stage.function)):
         short = " or ".join(f"state.needed > len(own.{record}.{name})" for record, name in own_columns(stage))
-        scope["NEED_OWN_ROWS"] = NEED_OWN_ROWS
-        lines += [f"    state.needed = {call}", f"    if {short}:", "        return NEED_OWN_ROWS"]
+        scope["NEED_ROOM"] = NEED_ROOM
+        lines += [f"    state.needed = {call}", f"    if {short}:", "        return NEED_ROOM"]
     else:
         lines.append(f"    {call}")
     lines += ["    return OK", ""]

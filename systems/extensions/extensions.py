@@ -14,26 +14,16 @@ from ...framework.data.interpolation import restart
 from ...framework.jit.records.record import Record, make_record
 from ...framework.jit.records.schema import Schema
 from ...framework.plugins.registry import PluginStage, Registry
-from ...framework.schedule.stages import Program
-from .. import records
+from ...framework.schedule.stages import Program, Stage
 from ..compounds.records import PARTS
 from ..joints.records import JOINTS
-from ..record_buffers import with_spare
+from ..records import BODY_COLUMNS
 from ..scene import Scene
 from ..stage_list import MADE_AGAIN
-from .compiled import PRESENT, own_columns, own_schema, visible_columns
+from .compiled import PRESENT, own_schema, visible_columns
 from .placement import OF_TABLE, check_stages, placed
 
 NEEDED = "stages of plugins"  # the condition of what all of them need
-# Columns of the records alone, which have a row for each of the table where something asks for them.
-RESERVED = {
-    name
-    for section in (
-        records.START, records.QUARANTINE, records.COLLISIONS, records.PREDICTED, records.HELD, records.CURVES,
-        records.SWEEPS, records.EVALUATIONS, records.SPINS, records.SLEEPING,
-    )
-    for name in section
-}  # fmt: skip
 
 
 class Extensions:
@@ -101,7 +91,7 @@ class Extensions:
         for name in sorted({name for stage in self.stages for name in (*stage.reads, *stage.writes)}):
             if name in OF_TABLE:
                 table.make(name)
-            elif name in RESERVED:
+            elif name in BODY_COLUMNS:
                 self._scene.reserve(name)
         for stage, own in self._own.items():
             addresses[program.index[stage.name]] = own.address
@@ -126,13 +116,9 @@ class Extensions:
             self._records[schema] = make_record(schema, self._state.dimensions)
         return self._records[schema]
 
-    def grow(self, program: Program) -> None:
-        """A stage asks for rows of the plugin's own records."""
-        name, needed = program.stages[self._state.stage].name, self._state.needed
-        stage = next(stage for stage in self.stages if stage.name == name)
-        for record, column in own_columns(stage):
-            found = getattr(self._own[stage], record)
-            found.reserve(with_spare(needed), column, keep=len(getattr(found, column)))
+    def own(self, stage: Stage) -> Record | None:
+        """What a stage of a plugin gets beside the state; None for others."""
+        return next((own for each, own in self._own.items() if each.name == stage.name), None)
 
     def present(self) -> tuple[bool, ...]:
         """Of each stage, whether some body has all components that it is about."""

@@ -10,13 +10,13 @@ from ...framework.errors import PluginError
 from ...framework.jit.records.schema import Schema
 from ...framework.names import did_you_mean
 from ...framework.plugins.registry import PluginStage
-from ...framework.schedule.stages import Stage
+from ...framework.schedule.stages import Rows, Stage, asked
 from ..broad_phase.system import BroadPhase
 from ..integration.system import ON_WAY, Integration
 from ..narrow_phase.system import NarrowPhase
 from ..records import BODIES, COLLIDERS, QUARANTINE, SLEEP_COLUMNS, STATE, TABLE_COLUMNS, UNDO, UNDO_FORCE
 from ..stage_list import CONDITIONS, ON_DEMAND, STAGES, SYSTEM_OF_STAGE
-from .compiled import compiled_stage, visible_columns
+from .compiled import compiled_stage, own_columns, visible_columns
 
 INTEGRATORS = {stage.name for stage in Integration.STAGES if stage.needed in ("standard", stage.name)}
 REPEATED = (BroadPhase.__name__, NarrowPhase.__name__)  # their stages may run several times in a step
@@ -43,7 +43,10 @@ def made(stage: PluginStage, dimensions: int) -> Stage:
     """The stage as programs have it; the one condition that it is needed for goes by its own name."""
     why = f"plugin {stage.plugin}" + (f": {stage.why}" if stage.why else "")
     function = compiled_stage(stage, dimensions)
-    return Stage(function, why, stage.reads, stage.writes, stage.name, anchor=stage.anchor, plugin=stage.plugin)
+    room = tuple(Rows(record, (name,), asked) for record, name in own_columns(stage))
+    return Stage(
+        function, why, stage.reads, stage.writes, stage.name, room=room, anchor=stage.anchor, plugin=stage.plugin
+    )
 
 
 def check_stages(stages: Iterable[PluginStage]) -> None:

@@ -14,7 +14,7 @@ from ...framework.errors import CaromError
 from ...framework.jit.records.record import Record
 from ...framework.schedule.phases import ForceSystem, Phase
 from ...framework.schedule.plan import PlannedKernel
-from ...framework.schedule.stages import Program, PythonPart, Stage
+from ...framework.schedule.stages import Program, PythonPart, Rows, Stage, asked
 from ..compounds.stages import carry_forces
 from ..sleeping.stages import AWAKE
 from ..staged import StagedSystem
@@ -40,6 +40,7 @@ class ForceAccumulation(StagedSystem):
         Stage(
             sum_forces, "m g, constant_force and what was applied; nothing where nothing acts",
             ("mass", "gravity_scale", "constant_force", "applied_force", "step_force"), ("force",), "dynamic bodies",
+            room=(Rows("bodies", ("force",), asked),),
         ),
     )  # fmt: skip
 

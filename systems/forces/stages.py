@@ -7,7 +7,7 @@ import math
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, item, replace, scale
-from ..codes import NEED_COLUMNS
+from ..codes import NEED_ROOM
 
 
 @part
@@ -75,7 +75,8 @@ def sum_forces(state, dt):
         state.unforced, state.pushed = True, False
         return 0
     if len(force) == 0:
-        return NEED_COLUMNS
+        state.needed = state.count
+        return NEED_ROOM
     state.force_evaluations += 1
     mass, gravity_scale, constant = bodies.mass, bodies.gravity_scale, bodies.constant_force
     for i in range(state.force_first, dynamic):

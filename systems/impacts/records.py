@@ -17,16 +17,17 @@ EVENTS = Section(
     event_normal=vectors(),
     event_point=vectors(),
     event_pull=vectors(),  # change of velocity along the surface
-    heap=ints("int32"),
+    heap=ints("int32", numbered=True),  # a permutation
     worklist=ints("int32"),  # pairs to search for their next impact,
     listed_since=floats(),  # each from this time on
     links=ints("int32"),  # to a body's next pair
 )  # fmt: skip
 HEADS = Section("impact", "impacts", BOUNCED, heads=ints("int32"))  # the first pair of each body
 # Impacts at the same time: the events, by member; lists of the members of each body.
-MEMBER_LISTS = Section("impact", "impacts", BOUNCED, member=ints("int32"), next_member=ints("int32"))
+MEMBER_LISTS = Section("impact", "impacts", BOUNCED, next_member=ints("int32"))
 MEMBERS = Section(
     "impact", "impacts", BOUNCED,
+    member=ints("int32"),
     group=ints("int32"),
     is_left=flags(),
     share=floats(),  # impulses along the normals, N s

@@ -6,21 +6,25 @@ import math
 
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import request
+from ...framework.schedule.stages import Rows
 from ..ccd.search_bounds import FAST
-from ..codes import NEED_EVENTS, NEED_IMPACTS, OK, REFRESH_PAIRS
+from ..codes import NEED_IMPACTS, NEED_ROOM, OK, REFRESH_PAIRS
 from ..linking.parts import FIRST_TOUCH, TAKE_TOGETHER, call_take_together
 from ..narrow_phase.stages import find_hasty
 from .find import queue_next_impact
 from .heap import heap_pop, holds
 from .impulses import CROSSING, IMPACT, STOPPED, bounce, hand_over, stop
+from .records import BODIES_OF_MEMBERS, EVENTS, HEADS, LOG, MEMBERS
 from .together import EQUAL, put_back
-from .worklist import lacks_room, list_contacts, list_landings, list_neighbours, list_pairs_of
+from .worklist import list_contacts, list_landings, list_neighbours, list_pairs_of, most_listed
 
 BLOCK = 256  # bodies that are looked at before one that bounces is enough
 FAR = 1 << 15  # bodies from which their columns do not fit into the second-level cache
 AHEAD = 4  # looks between the request of a body's rows and their use
 
 MOST_ROUNDS = 1000  # of pairs for the rest of a step
+
+UNLISTED = -1  # in place of a number of pairs: those of the contacts are still to be listed
 
 
 @part
@@ -48,7 +52,7 @@ def begin_impacts(state, dt):
     """No impact has happened yet; the first search is among what may have met."""
     impacts, bodies, pairs = state.impacts, state.bodies, state.pairs
     impacts.logged = impacts.capped = impacts.group_visits = 0
-    impacts.rounds = impacts.halted = impacts.looked = 0
+    impacts.rounds = impacts.halted = impacts.looked = impacts.together = 0
     impacts.active = False
     if state.response_idle:
         return OK
@@ -63,17 +67,10 @@ def begin_impacts(state, dt):
     impacts.may_sink = impacts.sweeps and may_sink(state, dt)
     if impacts.sweeps:
         begin_sweeps(state)
-    impacts.waiting = impacts.listed = 0
-    impacts.pending = -1
+    impacts.waiting, impacts.listed, impacts.pending = 0, UNLISTED, -1
     impacts.linked, impacts.touchdown_pair, impacts.touchdown_time = False, -1, 0.0
     impacts.until = state.neighbours_known_until if impacts.sweeps else math.inf
-    if impacts.active:
-        if state.links[FIRST_TOUCH] == 0:
-            return NEED_IMPACTS
-        if lacks_room(state, state.pairs.count):
-            return NEED_EVENTS
-        list_contacts(state)
-    return OK
+    return NEED_IMPACTS if impacts.active and state.links[FIRST_TOUCH] == 0 else OK
 
 
 @part
@@ -196,15 +193,33 @@ def search_worklist(state, dt, far):
     impacts.listed = 0
 
 
+@part
+def events(state):
+    """The queue, with all that may be added before it is looked at again."""
+    return max(state.impacts.waiting + state.impacts.listed, most_listed(state.pairs.count))
+
+
+ROOM_FOR_IMPACTS = (
+    Rows("impacts", EVENTS, lambda s: events(s) if s.impacts.active else 0),
+    Rows("impacts", HEADS, lambda s: s.count if s.impacts.active else 0),
+    Rows("impacts", LOG, lambda s: s.impacts.logged + max(s.impacts.together, 1) if s.impacts.active else 0),
+    Rows("impacts", MEMBERS, lambda s: s.impacts.together),
+    Rows("impacts", ("next_member",), lambda s: 2 * s.impacts.together),  # one for each of two bodies
+    Rows("impacts", BODIES_OF_MEMBERS, lambda s: s.count if s.impacts.together > 0 else 0),
+)  # fmt: skip
+
+
 def resolve_impacts(state, dt):
     """Bounce every pair that touches in its motion and approaches faster than the threshold."""
     impacts, far = state.impacts, state.count >= FAR
     if not impacts.active:
         return OK
+    if impacts.listed == UNLISTED:
+        impacts.listed = 0
+        list_contacts(state)
     while True:
-        if impacts.waiting + impacts.listed > len(impacts.heap) or impacts.logged == len(impacts.log_pair):
-            state.needed = impacts.waiting + impacts.listed
-            return NEED_EVENTS
+        if events(state) > len(impacts.heap) or impacts.logged == len(impacts.log_pair):
+            return NEED_ROOM
         search_worklist(state, dt, far)
         event = impacts.pending if impacts.pending >= 0 else next_event(state)
         impacts.pending = -1

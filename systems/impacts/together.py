@@ -12,7 +12,7 @@ from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import dot
 from ..ccd.time_of_impact import clear_of_rounding
-from ..codes import NEED_EVENTS, OK
+from ..codes import NEED_ROOM, OK
 from ..compounds.rows import owner_of
 from ..integration.trajectory import rate_along, relative_path
 from .group import WORK, is_affordable, push_group, shoots, solve_group, turns
@@ -73,7 +73,7 @@ def put_back(impacts, event):
 def resolve_simultaneous(state, event, dt):
     """Carry out all impacts at the time of ``event``, which has been taken off the queue, if there are others.
 
-    Returns OK; NEED_EVENTS if there is no room, and nothing has changed then; -1 if there is none besides it, or no
+    Returns OK; NEED_ROOM if there is no room, and nothing has changed then; -1 if there is none besides it, or no
     work left for groups.
     """
     impacts, now = state.impacts, state.impacts.event_time[event]
@@ -84,8 +84,8 @@ def resolve_simultaneous(state, event, dt):
         most += impacts.event_time[impacts.heap[k]] - now <= EQUAL * dt
     room = min(len(impacts.member), len(impacts.log_pair) - impacts.logged)
     if most > room or state.count > len(impacts.first_member):
-        impacts.together, state.needed = most, 0
-        return NEED_EVENTS
+        impacts.together = most
+        return NEED_ROOM
     members, following = 0, event
     while following >= 0:
         impacts.member[members] = following

@@ -13,11 +13,10 @@ from .find import bounce_threshold
 from .impulses import STOPPED
 
 
-@part
-def lacks_room(state, pairs):
-    """Whether so many pairs may be too many: each is listed at most twice, and one once more, before it is searched."""
-    impacts, state.needed = state.impacts, 2 * pairs + 1
-    return len(impacts.worklist) < state.needed or len(impacts.heads) < state.count
+@inlined
+def most_listed(pairs):
+    """Of so many pairs each is listed at most twice, and one once more, before it is searched."""
+    return 2 * pairs + 1
 
 
 @inlined

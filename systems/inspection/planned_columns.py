@@ -50,8 +50,7 @@ def _sections(record: Record, sections: Sequence[Section], least: int = 1) -> It
     """The columns of a record that have rows."""
     for section in sections:
         for name in section if section.why else ():
-            array = getattr(record, name)
-            rows = array.shape[1] if record.schema.fields[name].stacked else len(array)
+            array, rows = getattr(record, name), record.rows_of(name)
             if name == "axes":
                 rows //= record.dimensions**2
             elif name == "axes_rotation" and record.dimensions == 3:

@@ -12,11 +12,13 @@ import math
 from ...components.rigid_body import FASTEST
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
+from ...framework.schedule.stages import Rows
 from ...framework.vectors import add, add_scaled, divided, dot, item, scale, sub
-from ..codes import CHECK_FLIGHT, NEED_COLUMNS, OK
+from ..codes import CHECK_FLIGHT, OK
 from ..forces.stages import within
 from ..opening import KEEPS_FORCE, KEEPS_START, LARGEST
 from ..quarantine.columns import are_columns_sound
+from ..records import CURVES, UNDO_FORCE
 
 LINE, PARABOLA, CUBIC = 1, 2, 3  # degree of the path within the step
 
@@ -287,14 +289,21 @@ def second_half_kick(state, h):
     return 0
 
 
+@part
+def has_pushes(state):
+    """Whether forces of this step are to be cleared, of which no other copy is kept."""
+    return state.pushed and not state.others_write and len(state.bodies.step_force) > 0
+
+
+ROOM_FOR_PUSHES = (Rows("bodies", UNDO_FORCE, lambda s: s.count if has_pushes(s) else 0),)
+ROOM_FOR_PATHS = (Rows("bodies", CURVES, lambda s: s.count if s.path_degree > LINE else 0),)
+
+
 def end_flight(state, dt):
     """Limits of speed, kinematic bodies, and the forces of this step, which have done their work."""
     bodies, dynamic = state.bodies, state.dynamic
     position, velocity = bodies.position, bodies.linear_velocity
     pushed = (state.pushed or state.others_write) and len(bodies.step_force) > 0
-    keeps = pushed and not state.others_write  # else every column is kept
-    if keeps and len(bodies.kept_step_force) == 0:
-        return NEED_COLUMNS
     if state.limits_speed:
         state.flight_usual, state.flight_seen = True, 0
         for i in range(state.first, dynamic):
@@ -303,7 +312,7 @@ def end_flight(state, dt):
             position[i] = within(position[i], bodies.previous_position[i], limit * dt)
     for i in range(dynamic, state.moving):
         position[i] = add_scaled(position[i], velocity[i], dt)
-    if keeps:
+    if has_pushes(state):
         state.kept |= KEEPS_FORCE
         for i in range(state.force_first, dynamic):
             bodies.kept_step_force[i] = bodies.step_force[i]

@@ -14,18 +14,20 @@ from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Registry
 from ...framework.schedule.phases import Phase
 from ...framework.schedule.plan import PlannedKernel, kernels_of
-from ...framework.schedule.stages import Program, PythonPart, Stage
+from ...framework.schedule.stages import Program, PythonPart, Rows, Stage
 from ...framework.settings import Settings
 from ..compounds.stages import carry_forces, move_parts
 from ..forces.accumulation import ForceAccumulation
 from ..joints.bodies import begin_joints
+from ..records import COLLISIONS, SPINS, all_rows
 from ..scene import Scene
 from ..sleeping.stages import look_at_sleepers, rest_sleepers
 from ..staged import StagedSystem
 from .integrators import STANDARD_INTEGRATORS, Flight, Integrator
 from .motion import Motion
 from .stages import (
-    LINE,
+    ROOM_FOR_PATHS,
+    ROOM_FOR_PUSHES,
     check_flight,
     drift,
     end_flight,
@@ -79,7 +81,7 @@ class Integration(StagedSystem):
         Stage(second_half_kick, "damping of the second half step", FORCED, ("linear_velocity",), "second_half_kick"),
         Stage(
             end_flight, "limits of speed, kinematic bodies, forces for one step", MOTION,
-            (*MOTION, "step_force"),
+            (*MOTION, "step_force"), room=ROOM_FOR_PUSHES,
         ),
         Stage(
             check_flight, "puts back and takes out bodies whose place or speed cannot be", MOTION,
@@ -88,13 +90,16 @@ class Integration(StagedSystem):
         Stage(
             begin_joints, "which joints hold a body that may move; how far motors may turn these",
             ("inverse_mass", "still", "spin"), ("solver", "driven", "driven_turn"), "joints",
+            room=(Rows("bodies", SPINS, all_rows), Rows("bodies", COLLISIONS, all_rows)),
         ),
         Stage(
             note_path, "the path within the step, on which impacts are found", MOTION, ("path_velocity",), "colliders",
+            room=ROOM_FOR_PATHS,
         ),
         Stage(
             move_parts, "parts fly and turn with their bodies", (*MOTION, "rotation"),
             (*MOTION, "rotation", "axes", "path_velocity"), "parts",
+            room=(Rows("bodies", COLLISIONS, all_rows), *ROOM_FOR_PATHS),
         ),
         Stage(
             rest_sleepers, "puts sleepers back that have flown with the others, as some were disturbed", MOTION,
@@ -171,8 +176,6 @@ class Integration(StagedSystem):
         if type(integrator) in STANDARD and (state.flies or state.force_changes):
             self._scene.reserve(*integrator.COLUMNS)
         self.turns.within, self.turns.torque = False, np.empty(0)
-        if integrator.path > LINE and state.collides:
-            self._scene.reserve("path_second", "path_third")
 
     # -- a step -----------------------------------------------------------------------------------
 

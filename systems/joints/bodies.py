@@ -7,7 +7,7 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
-from ..codes import NEED_COLUMNS, OK
+from ..codes import OK
 from ..compounds.rows import next_row, owner_of
 from ..contacts.solving.rows import turn_body
 from ..contacts.solving.warm_start import row_of
@@ -65,8 +65,6 @@ def find_active(state):
 def begin_joints(state, dt):
     """Which joints take part; all bodies have the columns of those that spin, also where none does."""
     bodies, zero = state.bodies, zero_of(state)
-    if len(bodies.joined) < state.count or len(bodies.origin) < state.count:
-        return NEED_COLUMNS
     if not state.spinning:
         state.spinning = True
         for i in range(state.count):
@@ -76,8 +74,6 @@ def begin_joints(state, dt):
         state.solver.contacts = state.pairs.count = state.pairs.resting_count = 0
     find_active(state)
     if state.collides:
-        if len(bodies.driven) < state.count:
-            return NEED_COLUMNS
         find_driven(state, dt)
     return OK
 

@@ -7,8 +7,8 @@ from functools import lru_cache
 
 from ...framework.data.component import Component
 from ...framework.jit.linking import CACHE_SIZE, Linked
+from ...framework.jit.source import source_module
 from ...framework.vectors import add, dot
-from ..shapes.linking.source import source_module
 from ..shapes.linking.user_functions import user_function
 from .given import given_signature
 from .own import OwnJoint, Placed, fields_of, seen_columns

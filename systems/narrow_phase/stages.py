@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from ...framework.compilation import inlined, part
+from ...framework.schedule.stages import Rows
 from ...framework.vectors import dot, length, sub
-from ..codes import NEED_ORDER, NEED_PAIRS, OK, RUN_BROAD
+from ..codes import OK, RUN_BROAD
 from ..integration.turning import size_of_turn
+from ..records import HALVES, PAIR_COLUMNS, SORTED
 from ..shapes.dispatch import evaluate_batch
 from .manifolds import is_near, mark_early
 
@@ -42,15 +44,20 @@ def block_stops(state):
     return state.sleepers, state.dynamic, state.moving, state.count
 
 
+ROOM_FOR_ORDER = (
+    Rows("candidates", HALVES, lambda s: s.candidates.count),
+    Rows("candidates", SORTED, lambda s: s.candidates.count),
+    Rows("candidates", ("starts",), lambda s: s.count + 1),
+    Rows("candidates", ("bucket_starts",), lambda s: s.shapes.count * s.shapes.count + 2),
+)  # fmt: skip
+ROOM_FOR_PAIRS = (Rows("pairs", PAIR_COLUMNS, lambda s: s.candidates.count),)
+
+
 def order_candidates(state, dt):
     """Candidates by the smaller entity id, then by the larger, the row of the smaller id first."""
-    candidates, count, kinds = state.candidates, state.candidates.count, state.shapes.count * state.shapes.count
+    count = state.candidates.count
     if not state.candidates_ready:
         return RUN_BROAD
-    too_small = count > len(candidates.sorted_a) or state.count + 1 > len(candidates.starts)
-    if too_small or kinds + 2 > len(candidates.bucket_starts):
-        state.needed = count
-        return NEED_ORDER
     state.candidates_counted += count
     if BODIES_PER_CANDIDATE * count < state.count:
         sort_few(state)
@@ -181,9 +188,6 @@ def find_fast_turns(state):
 def select_pairs(state, dt):
     """The candidates whose layers and groups let them meet become pairs, counted by the shapes of the two bodies."""
     candidates, pairs, bodies, shapes = state.candidates, state.pairs, state.bodies, state.shapes
-    if candidates.count > len(pairs.a):
-        state.needed = candidates.count
-        return NEED_PAIRS
     velocity, start = bodies.linear_velocity, bodies.start_velocity
     changed = state.moved and (state.limits_speed or not state.drifted)
     for i in range(state.first, state.moving):  # that of static bodies is always 0

@@ -14,7 +14,14 @@ from ..sleeping.stages import find_touched, weigh_sleepers
 from ..staged import StagedSystem
 from .filters import filtered
 from .level_stages import evaluate_levels
-from .stages import collect_contacts, evaluate_pairs, order_candidates, select_pairs
+from .stages import (
+    ROOM_FOR_ORDER,
+    ROOM_FOR_PAIRS,
+    collect_contacts,
+    evaluate_pairs,
+    order_candidates,
+    select_pairs,
+)
 
 
 class NarrowPhase(StagedSystem):
@@ -28,10 +35,11 @@ class NarrowPhase(StagedSystem):
     STAGES = (
         Stage(
             order_candidates, "canonical order of the candidates, by entity id", ("candidates",), ("candidates",),
-            "colliders",
+            "colliders", room=ROOM_FOR_ORDER,
         ),
         Stage(
             select_pairs, "layers, masks and groups", ("candidates", "layer", "mask", "group"), ("pairs",), "colliders",
+            room=ROOM_FOR_PAIRS,
         ),
         Stage(
             weigh_sleepers, "what forces would do to sleepers", ("still", "flown_velocity"), ("force_speed_change",),

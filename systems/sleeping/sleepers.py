@@ -11,8 +11,8 @@ from ...framework.data.arrays.column import ArrayColumn
 from ...framework.data.table import Table
 from ...framework.jit.records.record import Record
 from ...framework.schedule.stages import Program
-from ..record_buffers import Room
-from ..records import SLEEP_COLUMNS, SLEEPING
+from ..contacts.solving.records import WARM_START_ROWS
+from ..records import CONTACT_ROWS, SLEEP_COLUMNS, SLEEPING
 from ..scene import ZERO_WHERE_STATIC, Scene
 from ..tracking import CONTACTS as CONTACT_NUMBERS
 from ..tracking import WARM_START, put_rows_back, saved_rows
@@ -36,15 +36,15 @@ class Sleepers:
         (k, 2) islands and how many bodies they have
     """
 
-    def __init__(self, state: Record, table: Table, scene: Scene, program: Program, room: Room) -> None:
+    def __init__(self, state: Record, table: Table, scene: Scene, program: Program) -> None:
         self._state, self._table, self._scene, self._program = state, table, scene, program
         self._lent = LentColumns(table, scene)
         self._disturbed = False  # some are marked, or may be
         self._pushed = False
         self._still_count = -1  # with what cannot move, when the contacts were kept
         self._placed: Any = None  # rows and arrays in which sleepers are as what does not move
-        self.contacts = Stored(state.contacts, CONTACTS, room.reserve_contacts)
-        self.impulses = Stored(state.warm_start, IMPULSES, room.reserve_warm_start)
+        self.contacts = Stored(state.contacts, CONTACTS, CONTACT_ROWS)
+        self.impulses = Stored(state.warm_start, IMPULSES, WARM_START_ROWS)
         self._dt = 1.0  # s, of the step that the impulses are of
         self.links = self.sizes = np.empty((0, 2), np.int64)
         self._followed: Any = None  # the structure that all this is of
@@ -395,8 +395,8 @@ class Sleepers:
         for name, column in columns.items():
             getattr(bodies, name)[: len(column)] = column
         self._take_parts(parts)
-        put_rows_back(state.warm_start, impulses)
-        put_rows_back(state.contacts, contacts)
+        put_rows_back(state.warm_start, WARM_START_ROWS, impulses)
+        put_rows_back(state.contacts, CONTACT_ROWS, contacts)
         state.warm_start.rows_version[:] = -1
 
     def _saved_parts(self) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...framework.jit.records.record import Record
+from ...framework.jit.records.schema import Section
 
 Columns = dict[str, np.ndarray]
 
@@ -44,8 +45,8 @@ class Stored:
         copies that are never written to, so that a reference to them is a copy
     """
 
-    def __init__(self, record: Record, names: tuple[str, ...], reserve: Callable[[int], None]) -> None:
-        self._record, self._names, self._reserve = record, names, reserve
+    def __init__(self, record: Record, names: tuple[str, ...], rows: Section) -> None:
+        self._record, self._names, self._rows = record, names, rows
         self._lists_stays = "stayed" in record.schema.fields  # the rows that were there in the step before, too
         self.columns: Columns = {}
         self.clear()
@@ -83,7 +84,7 @@ class Stored:
 
     def _write(self, columns: Columns) -> None:
         record, count = self._record, len(columns["entity_a"])
-        self._reserve(count)
+        record.reserve(count, *self._rows)
         now = record.now
         for name, column in columns.items():
             getattr(record, name)[now, :count] = column

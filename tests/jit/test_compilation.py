@@ -12,8 +12,8 @@ from numba.core.errors import TypingError
 
 from carom.framework.compilation import inlined, kernel, packed, part
 from carom.framework.jit import cache as kernel_cache
+from carom.framework.jit import source
 from carom.framework.jit.hash import deep_hash
-from carom.systems.shapes.linking import source
 
 
 def test_a_disk_that_fills_up_costs_speed_and_not_the_run(monkeypatch, tmp_path, caplog):

@@ -14,7 +14,6 @@ from carom.framework.jit.records.schema import Scalar
 from carom.framework.schedule.plan import PlannedKernel
 from carom.plugins import Physics, capsule
 from carom.systems.broad_phase.brute_force import BRUTE_FORCE_MAX
-from carom.systems.broad_phase.uniform_grid import LANES
 
 STEPS = 40
 COUNT = 150  # bodies created at once, more than the capacity of a new table: exactly that many rows
@@ -240,8 +239,8 @@ def test_drifting_gives_the_bits_of_the_integrator(integrator, damping):
 
 
 def arrays_per_body(world):
-    """Sizes in bytes of all arrays with as many rows as the body capacity, reached from the world's physics."""
-    capacity, found, seen = world.physics.table.capacity, {}, set()
+    """Of all arrays with a row for each body, reached from the world's physics; those of grids have some to spare."""
+    rows, found, seen = {world.physics.table.capacity, world.physics.state.grid.rows_of("keys")}, {}, set()
     todo = [world.physics, world.physics.table, *world.systems]
     while todo:
         thing = todo.pop()
@@ -251,7 +250,7 @@ def arrays_per_body(world):
         if isinstance(thing, np.ndarray):
             while thing.base is not None and isinstance(thing.base, np.ndarray):
                 thing = thing.base
-            if {capacity, capacity + LANES} & set(thing.shape):  # the codes of a grid are looked at by so many
+            if (rows - {0}) & set(thing.shape):
                 found[id(thing)] = thing
         elif isinstance(thing, Record):
             fields = thing.schema.fields.items()
@@ -262,7 +261,7 @@ def arrays_per_body(world):
             todo += thing
         elif type(thing).__module__.startswith("carom") and not isinstance(thing, (type, World)):
             todo += vars(thing).values() if hasattr(thing, "__dict__") else ()
-    return sum(array.nbytes // max(array.shape) * capacity for array in found.values())
+    return sum(array.nbytes // max(array.shape) * world.physics.table.capacity for array in found.values())
 
 
 def many(world, *components, touching=False):

@@ -45,13 +45,18 @@ class Record:
     def __getattr__(self, name: str) -> Any:  # for type checkers: fields are properties of the classes made below
         raise AttributeError(f"record {self.schema.name} has no field {name!r}")
 
-    def reserve(self, rows: int, *names: str, keep: int = 0) -> None:
-        """Give these columns room for at least ``rows`` rows; the first ``keep`` rows stay."""
+    def rows_of(self, name: str) -> int:
+        """How many rows a column has; each of them, if it is stacked."""
+        return getattr(self, name).shape[self.schema.fields[name].stacked]
+
+    def reserve(self, rows: int, *names: str) -> None:
+        """Give these columns room for at least ``rows`` rows; what they hold stays."""
         for name in names:
-            before = getattr(self, name)
-            if len(before) < rows:
-                after = self.schema.fields[name].empty(rows, self.dimensions)  # type: ignore[union-attr]
-                after[:keep] = before[:keep]
+            before, field, length = getattr(self, name), self.schema.fields[name], self.rows_of(name)
+            if length < rows:
+                stacks = before.shape[: field.stacked]
+                after = field.fresh((*stacks, rows), self.dimensions)
+                after[(*map(slice, stacks), slice(length))] = before
                 setattr(self, name, after)
 
     def show(self, name: str, array: np.ndarray) -> None:

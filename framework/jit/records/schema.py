@@ -44,6 +44,8 @@ class Column:
     default
         of a column on demand: what kernels read in every row, each number of it, while the column has no rows; None:
         it has to have rows
+    numbered
+        fresh rows hold their own numbers
     """
 
     dtype: str = "float64"
@@ -52,6 +54,7 @@ class Column:
     per_dimension: bool = False
     stacked: bool = False
     default: float | None = None
+    numbered: bool = False
     words = 2
 
     def item_shape(self, dimensions: int) -> tuple[int, ...]:
@@ -64,9 +67,11 @@ class Column:
             return (self.width * dimensions if self.per_dimension else self.width,)
         return ()
 
-    def empty(self, rows: int, dimensions: int) -> np.ndarray:
-        """An array for that many rows, not cleared."""
-        return np.empty((rows, *self.item_shape(dimensions)), self.dtype)
+    def fresh(self, rows: tuple[int, ...], dimensions: int) -> np.ndarray:
+        """An array for that many rows, of what is stacked (stacks, rows)."""
+        if self.numbered:
+            return np.arange(rows[0], dtype=self.dtype)
+        return np.zeros((*rows, *self.item_shape(dimensions)), self.dtype)
 
     def full(self, rows: int, dimensions: int) -> np.ndarray:
         """An array for that many rows, which hold the default, without one 0."""

@@ -129,7 +129,7 @@ class SpatialTree:
         if record.candidates > limit:
             raise CandidateLimitError(record.candidates, limit)
         while run(f"test_{kind}", record, other.record) != pairs.DONE:
-            record.reserve(2 * len(record.first), "first", "second", keep=record.pair_count)
+            record.reserve(2 * len(record.first), "first", "second")
         return record.first[: record.pair_count], record.second[: record.pair_count]
 
     def _reserve(self, capacity: int) -> None:

@@ -11,11 +11,13 @@ from __future__ import annotations
 
 from ....framework.compilation import packed, part
 from ....framework.jit.records.record_type import zero_of
+from ....framework.schedule.stages import Rows
 from ....framework.vectors import add, add_scaled, dot, length, scale, sub
-from ...codes import NEED_COLUMNS, OK
+from ...codes import OK
 from ...compounds.rows import owner_of
 from ...compounds.stages import share_prediction
 from ...joints.bodies import push_joined
+from ...records import CURVES, PREDICTED
 from .warm_start import find_rows, scale_to
 
 
@@ -86,6 +88,19 @@ def forget_support(state):
         state.support_version = state.version
 
 
+@part
+def may_support(state):
+    """Whether something was held in the last step, or is held by joints."""
+    memory = state.warm_start
+    return not state.response_idle and (memory.counts[memory.now] > 0 or state.solver.joints.active > 0)
+
+
+ROOM_FOR_SUPPORT = (
+    Rows("bodies", PREDICTED, lambda s: s.count if may_support(s) else 0),
+    Rows("bodies", CURVES, lambda s: s.count if may_support(s) and s.path_degree > 1 else 0),
+)  # fmt: skip
+
+
 @packed
 def predict_rest(state, dt):
     """Correct velocity, position and path of the bodies that were held in the last step.
@@ -93,13 +108,11 @@ def predict_rest(state, dt):
     The impulses act like a force throughout the step, which displaces by ``force_travels`` times dt times the change of
     velocity: what the integrator makes of a force.
     """
-    bodies, memory = state.bodies, state.warm_start
+    bodies = state.bodies
     state.any_warm_started = False
     forget_support(state)
-    if state.response_idle or (memory.counts[memory.now] == 0 and state.solver.joints.active == 0):
+    if not may_support(state):
         return OK
-    if len(bodies.warm_start_velocity) == 0:
-        return NEED_COLUMNS
     scale_to(state, dt)
     find_rows(state)
     state.any_warm_started = True

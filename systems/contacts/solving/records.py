@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ....framework.jit.records.schema import Schema, flag, flags, floats, integer, ints, number, vectors
+from ....framework.jit.records.schema import Schema, Section, flag, flags, floats, integer, ints, number, vectors
 from ...joints.records import JOINTS
 
 SOLVER = Schema(
@@ -162,11 +162,9 @@ ARMS = (
 TURNS = ("spin", "spin_before", "turn", "sine", "versine", "inverse_inertia", "inverse_products", "reach")
 
 # Impulses of the contacts at rest, for the next step: [now, i] is the memory, [1 - now, i] is written.
-WARM_START = Schema(
-    "WarmStart",
-    now=integer(),
-    before=integer(),  # ``now`` at the start of the step
-    counts=ints(),
+RESTED = "contacts have rested"
+WARM_START_ROWS = Section(
+    "contact", "contacts at rest", RESTED,
     entity_a=ints(stacked=True),
     entity_b=ints(stacked=True),
     place=vectors(stacked=True),  # of the point, where bodies spin
@@ -177,7 +175,13 @@ WARM_START = Schema(
     closing=floats(stacked=True),  # m/s at which the two closed along that in the end
     first=ints("int32", stacked=True),  # rows of the pairs, for ``rows_version``
     second=ints("int32", stacked=True),
+    off=flags(),  # of no use in this step
+)  # fmt: skip
+WARM_START = Schema(
+    "WarmStart", WARM_START_ROWS,
+    now=integer(),
+    before=integer(),  # ``now`` at the start of the step
+    counts=ints(),
     rows_version=ints(),
     step=floats(),  # s that the impulses are for
-    off=flags(),  # of no use in this step
-)
+)  # fmt: skip

@@ -9,10 +9,12 @@ from __future__ import annotations
 from ....framework.compilation import part
 from ....framework.data.row_moves import place_of
 from ....framework.jit.records.record_type import zero_of
+from ....framework.schedule.stages import Rows
 from ....framework.vectors import add_scaled, dot, length, scale, sub
-from ...codes import NEED_WARM_START, OK
+from ...codes import OK
 from ..constants import MOST_LOAD, NEAR_PLACE, OPEN, TURNED
 from .guard import island_of
+from .records import WARM_START_ROWS
 
 
 @part
@@ -109,15 +111,15 @@ def match_warm_start(state, dt):
     return OK
 
 
+ROOM_TO_STORE = (Rows("warm_start", WARM_START_ROWS, lambda s: 0 if s.response_idle else s.solver.contacts),)
+
+
 def store_warm_start(state, dt):
     """Keep the contacts that pushed, for the next step; the memory until now stays, for a step that is undone."""
     solver, memory, pairs, entity = state.solver, state.warm_start, state.pairs, state.bodies.entity
     velocity = state.bodies.linear_velocity
     if state.response_idle or (solver.contacts == 0 and memory.counts[memory.now] == 0):
         return OK
-    if solver.contacts > len(memory.off):
-        state.needed = solver.contacts
-        return NEED_WARM_START
     new, count = 1 - memory.now, 0
     for r in range(solver.contacts):
         k, c = solver.slot[r], solver.pair[r]

@@ -14,6 +14,7 @@ from typing import Any
 from ....framework.compilation import inlined
 from ....framework.jit.linking import CACHE_SIZE, Linked
 from ....framework.jit.records.record_type import record_at
+from ....framework.jit.source import source_module
 from ....framework.plugins.registry import Convex, Pair, Shape
 from .batches import batch_by_address, checked, in_given_order, in_order_of_shapes, make_batch
 from .convex_by_address import convex_at, rounding_argument, support_argument
@@ -26,7 +27,6 @@ from .signatures import (
     named,
     sweep_signature,
 )
-from .source import source_module
 from .user_functions import as_argument, is_long, user_function
 
 

@@ -14,6 +14,7 @@ from ....framework.jit.linking import CACHE_SIZE, Called, Linked
 from ....framework.jit.records.record import make_record
 from ....framework.jit.records.record_type import record_at, rows_of
 from ....framework.jit.records.schema import Schema, vectors
+from ....framework.jit.source import source_module
 from ....framework.plugins.registry import Shape
 from ...records import STATE
 from .parameters import (
@@ -34,7 +35,6 @@ from .signatures import (
     rounding_signature,
     support_signature,
 )
-from .source import source_module
 from .user_functions import user_function
 
 

@@ -15,7 +15,7 @@ _made: dict[str, None] = {}
 
 def source_module(source: str, scope: dict[str, Any]) -> types.ModuleType:
     """A module of that source over the names in ``scope``; its name tells both."""
-    from ....framework.jit.hash import deep_hash  # loads numba
+    from .hash import deep_hash  # loads numba
 
     parts = [source, *(f"{name} {deep_hash(value)}" for name, value in sorted(scope.items()))]
     name = f"carom_shapes_{hashlib.sha256(' '.join(parts).encode()).hexdigest()[:24]}"
