@@ -19,12 +19,29 @@ from .rigid_body import RigidBody, add_push, force_applied
 
 UNKNOWN = "Spin.inertia is None, and it has no collider that tells it, or several: give a number"
 FASTEST_TURN = 1e150  # rad/s: squares of it are finite
+MOST_TORQUE = 1e150  # N m
+ROUNDING = 1e-9  # by which sums of moments may be too small
 Angular = float | np.ndarray
 # Arguments, checked like fields.
-TORQUE = Column(item="angular", owner="Spin", name="apply_torque")
+TORQUE = Column(item="angular", owner="Spin", name="apply_torque", largest=MOST_TORQUE)
 FORCE = Column(item="vector", owner="Spin", name="apply_force")
 IMPULSE = Column(item="vector", owner="Spin", name="apply_impulse")
 POINT = Column(item="vector", owner="Spin", name="at")
+FORCE_AT = Column(item="angular", owner="Spin", name="apply_force: its torque", largest=MOST_TORQUE)
+
+
+class InertiaColumn(Column):
+    """Principal moments: no body has one that is larger than the sum of the two others."""
+
+    def check_numbers(self, array: np.ndarray, shown: Any, entity: int | None) -> None:
+        super().check_numbers(array, shown, entity)
+        if array.ndim and array.shape[-1] == 3:
+            wrong = np.atleast_1d(2.0 * array.max(axis=-1) > (1.0 + ROUNDING) * array.sum(axis=-1))
+            if wrong.any():
+                where = "" if array.ndim < 2 else f" (row {int(np.argmax(wrong))})"
+                value = array[int(np.argmax(wrong))] if where else array
+                rule = f"must be of a body, no moment exceeds the sum of the two others{where}"
+                raise self._error(value, rule, entity)
 
 
 class Spin(Component):
@@ -62,7 +79,7 @@ class Spin(Component):
     angular_velocity: Angular = special_column(
         default=0.0, item="angular", largest=FASTEST_TURN, also=("velocity", "speed", "omega")
     )
-    inertia: Angular | None = special_column(
+    inertia: Angular | None = InertiaColumn(  # type: ignore[assignment]
         default=None, item="angular", optional=True, positive=True, also=("moment",)
     )
     angular_damping: float = special_column(default=0.0, minimum=0.0, kw_only=True, also=("damping",))
@@ -70,7 +87,9 @@ class Spin(Component):
         default=None, optional=True, minimum=0.0, kw_only=True, also=("max_speed",)
     )
     rolling_friction: float = special_column(default=0.0, minimum=0.0, kw_only=True)
-    constant_torque: Angular = special_column(default=0.0, item="angular", kw_only=True, also=("torque",))
+    constant_torque: Angular = special_column(
+        default=0.0, item="angular", largest=MOST_TORQUE, kw_only=True, also=("torque",)
+    )
     # Not for the constructor, as in RigidBody.
     applied_torque: Angular = special_column(default=0.0, item="angular", init=False)
     applied_frame: int = special_column(default=-1, dtype=int, init=False, on_write=force_applied)
@@ -87,7 +106,7 @@ class Spin(Component):
     def apply_force(self, force: Vector, at: Vector) -> None:
         """Push with ``force``, (d,) N, at a point of the world, (d,) m."""
         push, arm = self._checked(FORCE, force), self._arm(at)
-        self._turn(_cross(arm, push))  # first: this may be refused
+        self._turn(self._checked(FORCE_AT, _cross(arm, push)))  # first: this may be refused
         self._handle(RigidBody).apply_force(push)
 
     def apply_impulse(self, impulse: Vector, at: Vector) -> None:

@@ -14,6 +14,7 @@ from ..framework import Plugin, array_column
 from ..framework.typing import ArrayField
 from ..framework.vectors import add_scaled, dot, item, replace, scale
 
+NARROWEST = 1e-150  # m: squares of it are not 0, which its inertia needs
 MOST_POINTS = 64
 FLAT = 1e-6  # of the size: points so near to a plane lie in it
 NARROW = 1e-5  # of the size: three points within such a strip span no plane
@@ -58,6 +59,8 @@ def _hull_of(data: bytes) -> np.ndarray | str:
         return f"must have at most {MOST_POINTS} points"
     size = np.abs(points).max() or 1.0  # divided by it nothing overflows, at any size
     size *= np.abs((points - points[0]) / size).max() or 1.0
+    if size < NARROWEST:
+        return f"must be at least {NARROWEST:g} m across"
     shape, index = np.unique((points - points[0]) / size, axis=0, return_index=True)
     faces = faces_of(shape)
     if not faces or any(on.all() for on, _ in faces):

@@ -7,7 +7,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from ...components import Transform
-from ...components.colliders import MaterialFields
+from ...components.colliders import LONGEST, MaterialFields
 from ...framework import Column, World
 from ...framework.typing import Vector
 from .segment import ChainSegmentCollider
@@ -59,6 +59,11 @@ def create_chain(
     )
 
 
+def bound(numbers: Any) -> str:
+    """What one that is refused, of these, should be."""
+    return f"at most {LONGEST:g} m" if np.isfinite(numbers).all() else "finite"
+
+
 def _checked(points: Any, loop: bool) -> np.ndarray:
     """As an array; ValueError if they are no polyline."""
     try:
@@ -69,10 +74,10 @@ def _checked(points: Any, loop: bool) -> np.ndarray:
     if array.ndim != 2 or array.shape[1:] != (2,) or len(array) < least:
         got = f"an array of shape {array.shape}" if isinstance(points, np.ndarray) else repr(points)
         raise ValueError(f"create_chain: points must be {least} or more pairs of numbers, got {got}")
-    bad = ~np.isfinite(array).all(axis=1)
+    bad = ~(abs(array) <= LONGEST).all(axis=1)
     if bad.any():
         i = int(np.argmax(bad))
-        raise ValueError(f"create_chain: points must be finite, point {i} is {tuple(array[i].tolist())}")
+        raise ValueError(f"create_chain: points must be {bound(array[i])}, point {i} is {tuple(array[i].tolist())}")
     same = (array == np.roll(array, -1, axis=0)).all(axis=1)
     if not loop:
         same[-1] = False

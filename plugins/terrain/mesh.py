@@ -7,9 +7,10 @@ from typing import Any, Unpack
 import numpy as np
 
 from ...components import Transform
-from ...components.colliders import MaterialFields
+from ...components.colliders import LONGEST, MaterialFields
 from ...framework import Column, World
 from ...framework.typing import Vector
+from .chain import bound
 from .triangle import TerrainTriangleCollider
 
 MESH_POSITION = Column(item="vector", owner="create_triangle_mesh", name="position")
@@ -77,10 +78,11 @@ def create_height_field(
     if levels.ndim != 2 or min(levels.shape) < 2:
         got = f"an array of shape {levels.shape}" if isinstance(heights, np.ndarray) else repr(heights)
         raise ValueError(f"create_height_field: heights must be rows and columns of numbers, at least 2 x 2, got {got}")
-    bad = np.argwhere(~np.isfinite(levels))
+    bad = np.argwhere(~(abs(levels) <= LONGEST))
     if len(bad):
         i, j = bad[0].tolist()
-        raise ValueError(f"create_height_field: heights must be finite, heights[{i}, {j}] is {levels[i, j]}")
+        value = levels[i, j]
+        raise ValueError(f"create_height_field: heights must be {bound(value)}, heights[{i}, {j}] is {value}")
     rows, columns = levels.shape
     x, z = np.meshgrid(size * np.arange(rows), size * np.arange(columns), indexing="ij")
     first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
@@ -104,10 +106,11 @@ def _points(vertices: Any) -> np.ndarray:
     if array.ndim != 2 or array.shape[1:] != (3,) or len(array) < 3:
         got = f"an array of shape {array.shape}" if isinstance(vertices, np.ndarray) else repr(vertices)
         raise ValueError(f"create_triangle_mesh: vertices must be 3 or more of 3 numbers each, got {got}")
-    bad = ~np.isfinite(array).all(axis=1)
+    bad = ~(abs(array) <= LONGEST).all(axis=1)
     if bad.any():
         i = int(np.argmax(bad))
-        raise ValueError(f"create_triangle_mesh: vertices must be finite, vertex {i} is {tuple(array[i].tolist())}")
+        value = tuple(array[i].tolist())
+        raise ValueError(f"create_triangle_mesh: vertices must be {bound(value)}, vertex {i} is {value}")
     return array
 
 

@@ -484,7 +484,8 @@ def test_wrong_values_of_spin_are_refused_where_they_are_given():
             column[0] = before
             world.step()
             world.faults.clear()
-        world.component_for_entity(entity, Spin).apply_torque(1.7e308)
+        world.component_for_entity(entity, Spin).inertia = 1e-9
+        world.component_for_entity(entity, Spin).apply_torque(9e149)
         with pytest.raises(StepError, match=rf"entity {entity}: ValueError: a torque is so large"):
             world.step()
 
@@ -521,11 +522,10 @@ def test_a_push_that_is_refused_changes_nothing(d):
         spin, at = world.component_for_entity(entity, Spin), world.state_hash()
         with pytest.raises(ValueError, match=rf"entity {entity}: Spin.angular_velocity must be at most 1e\+150"):
             spin.apply_impulse((0, 1e10, 0)[:d], at=(1e200, 0, 0)[:d])
-        spin.apply_torque(1.7e308 if d == 2 else (0, 0, 1.7e308))
+        spin.apply_torque(9e149 if d == 2 else (0, 0, 9e149))
         pushed = world.state_hash()
-        finite = rf"entity {entity}: Spin.applied_torque must be finite"
-        with np.errstate(over="ignore"), pytest.raises(ValueError, match=finite):
-            spin.apply_force((0, 1e304, 0)[:d], at=(1e4, 0, 0)[:d])
+        with pytest.raises(ValueError, match=rf"entity {entity}: Spin.apply_force: its torque must be at most 1e\+150"):
+            spin.apply_force((0, 1e148, 0)[:d], at=(1e4, 0, 0)[:d])
         assert world.state_hash() == pushed != at
 
 
