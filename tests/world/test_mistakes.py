@@ -1,0 +1,175 @@
+"""What somebody new is told: mistakes with bodies that turn, joints, units and sizes, at the call that makes them."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+
+from carom import (
+    BoxCollider,
+    Cone,
+    ConvexHullCollider,
+    Hinge,
+    Joints,
+    Motor,
+    PartOf,
+    Parts,
+    Phase,
+    Physics,
+    PhysicsWarning,
+    RigidBody,
+    Rotation,
+    Settings,
+    SphereCollider,
+    Spin,
+    System,
+    Transform,
+    World,
+    create_chain,
+    create_height_field,
+    create_triangle_mesh,
+)
+from carom.framework import units
+from carom.plugins import terrain
+
+SMALL = 1e-160 * np.array(((0.5, 0.0, -0.3), (-0.5, 0.1, -0.4), (0.0, 0.6, -0.3), (0.1, -0.5, -0.2), (0.1, 0.0, 0.5)))
+HIGH = np.array(((0.0, 1.0), (2.0, 1e200)))
+REFUSED = [  # dimensions, what is done with a world, a body of it and its Spin, what the error says
+    (2, lambda w, e, s: Hinge(None, RigidBody(), anchor=(0, 0)),
+     r"Hinge.b must be an integer: give its entity, .* got a RigidBody"),
+    (2, lambda w, e, s: PartOf(Transform((0, 0)), (1, 0)),
+     r"PartOf.body must be an integer: give its entity, .* got a Transform"),
+    (2, lambda w, e, s: body_of(w, e).apply_torque(3.0),
+     r"RigidBody has no attribute 'apply_torque': .*from carom import Spin"),
+    (2, lambda w, e, s: body_of(w, e).angular_velocity,
+     r"RigidBody has no attribute 'angular_velocity': .*from carom import Spin"),
+    (2, lambda w, e, s: setattr(body_of(w, e), "torque", 1.0),
+     r"RigidBody has no attribute 'torque': .*from carom import Spin"),
+    (2, lambda w, e, s: RigidBody(inertia=2.0), r"RigidBody has no field 'inertia': .*from carom import Spin"),
+    (2, lambda w, e, s: body_of(w, e).apply_force((1, 0), at=(0, 1)),
+     r"apply_force acts at the centre.*Spin\)\.apply_force\(\.\.\., at="),
+    (2, lambda w, e, s: body_of(w, e).apply_impulse((1, 0), at=(0, 1)),
+     r"apply_impulse acts at the centre.*\(\.\.\., at="),
+    (2, lambda w, e, s: BoxCollider(size=(1, 1)), r"no field 'size' \(did you mean 'half_extents'\?\)"),
+    (2, lambda w, e, s: SphereCollider(diameter=2), r"no field 'diameter' \(did you mean 'radius'\?\)"),
+    (3, lambda w, e, s: Spin(inertia=(1, 1, 5)),
+     r"Spin.inertia must be of a body, no moment exceeds .*, got \[1.0, 1.0, 5.0\]"),
+    (3, lambda w, e, s: setattr(s, "inertia", (3, 1, 1)),
+     r"entity 1: Spin.inertia must be of a body.*got \[3.0, 1.0, 1.0\]"),
+    (3, lambda w, e, s: w.create_entities(2, Spin.many(inertia=[(1, 1, 2), (1, 9, 1)])),
+     r"Spin.inertia must be .* \(row 1\), got \[1.0, 9.0"),
+    (2, lambda w, e, s: s.apply_torque(1e200), r"entity 1: Spin.apply_torque must be at most 1e\+150 .*got 1e\+200"),
+    (2, lambda w, e, s: s.apply_force((1e200, 0), at=(0, 3)),
+     r"entity 1: Spin.apply_force: its torque must be at most 1e\+150"),
+    (3, lambda w, e, s: setattr(s, "constant_torque", (0, 0, 1e200)),
+     r"entity 1: Spin.constant_torque must be at most 1e\+150"),
+    (3, lambda w, e, s: ConvexHullCollider(SMALL), r"ConvexHullCollider.hull must be at least 1e-150 m across"),
+    (3, lambda w, e, s: create_height_field(w, HIGH, 1.0),
+     r"heights must be at most 1e\+150 m, heights\[1, 1\] is 1e\+200"),
+    (3, lambda w, e, s: create_triangle_mesh(w, [(0, 0, 0), (0, 0, 1), (1e200, 0, 0)], [(0, 1, 2)]),
+     r"vertices must be at most 1e\+150 m, vertex 2"),
+    (2, lambda w, e, s: create_chain(w, [(0, 0), (1, 1e200)]),
+     r"points must be at most 1e\+150 m, point 1 is \(1.0, 1e\+200\)"),
+]  # fmt: skip
+UNITS = [  # what is made, and the cure
+    (lambda: Settings(dt=60), r"Settings.dt = 60 is in seconds: 60 steps a second are 1 / 60"),
+    (lambda: Transform((0, 0), rotation=45), r"Transform.rotation = 45 is in radians, 7.2 turns: .*math.radians\(45\)"),
+    (lambda: Transform.many(np.zeros((2, 2)), 90.0).arrays(2, 2), r"Transform.rotation = 90 is in radians"),
+    (lambda: PartOf(1, (0, 0), rotation=-90.0), r"PartOf.rotation = -90 is in radians"),
+    (lambda: Hinge(None, 1, anchor=(0, 0), limits=(-0.5, 45)), r"Hinge.limits = 45 is in radians"),
+    (lambda: Cone(None, 1, anchor=(0, 0, 0), axis=(1, 0, 0), twist=(-30, 30)), r"Cone.twist = -30 is in radians"),
+    (lambda: Motor(1, angle=180), r"Motor.angle = 180 is in radians"),
+]
+
+
+def world_of(d, **settings):
+    plugins = Physics(d, gravity=(0, -10, 0)[:d]), Rotation(), Joints(), Parts(), terrain.plugin
+    return World(*plugins, settings=Settings(**settings))
+
+
+def body_of(world, entity):
+    return world.component_for_entity(entity, RigidBody)
+
+
+@pytest.mark.parametrize("case", range(len(REFUSED)))
+def test_what_cannot_be_is_refused_where_it_is_given_with_the_cure(case):
+    d, act, message = REFUSED[case]
+    with world_of(d) as world:
+        box = BoxCollider((0.5,) * d)
+        entity = world.create_entity(Transform((0, 2, 0)[:d]), RigidBody(), Spin(), box)
+        assert len(world.bodies) == 1
+        before = world.state_hash()
+        with pytest.raises((ValueError, TypeError, AttributeError), match=message):
+            act(world, entity, world.component_for_entity(entity, Spin))
+        assert world.state_hash() == before
+
+
+@pytest.mark.parametrize("case", range(len(UNITS)))
+def test_numbers_of_another_unit_are_told_once(case, monkeypatch):
+    monkeypatch.setattr(units, "_told", set())
+    make, message = UNITS[case]
+    with pytest.warns(PhysicsWarning, match=message) as told:  # noqa: PT031
+        make()
+        make()
+    assert len(told) == 1
+    assert told[0].filename == __file__
+
+
+def test_usual_angles_and_steps_are_not_told(monkeypatch):
+    monkeypatch.setattr(units, "_told", set())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for angle in (0, 1, -29, 12.5, math.radians(90), 100.0 * math.pi, 45.5):
+            Transform((0, 0), rotation=angle)
+            Hinge(None, 1, anchor=(0, 0), limits=(-abs(angle), None))
+        for dt in (1 / 60, 1, 10, 24.5, 3600, 86400.0):
+            Settings(dt=dt)
+
+
+def test_bodies_that_never_turn_are_told_once_in_a_world():
+    """A Spin on a static body, and a box that somebody may expect to tip; a part, or a Spin, is what it should be."""
+    with world_of(2, on_fault="ignore") as world:
+        good = world.create_entity(Transform((0, 0)), RigidBody(), Spin(), BoxCollider((1, 1)))
+        world.create_entity(PartOf(good, (2, 0)), BoxCollider((0.5, 0.5)))
+        world.create_entity(Transform((0, -5)), BoxCollider((9, 1)))
+        world.create_entity(Transform((0, -9)), RigidBody(kind="static"), Spin(), BoxCollider((9, 1)))
+        world.step()
+        assert world.faults == []
+        plain = [world.create_entity(Transform((9 + 3 * k, 0)), RigidBody(), BoxCollider((1, 1))) for k in range(2)]
+        still = world.create_entity(Transform((0, 9)), RigidBody(kind="static"), Spin(3.0), BoxCollider((1, 1)))
+        world.step()
+        world.create_entity(Transform((30, 0)), RigidBody(), BoxCollider((1, 1)))
+        for _ in range(3):
+            world.step()
+        boxes, spin = sorted(world.faults, key=lambda text: "static" in text)
+        assert boxes.startswith(f"entity {plain[0]}: a dynamic body with a BoxCollider and no Spin never turns: give")
+        assert spin.startswith(f"entity {still}: a static body does not turn by its Spin: RigidBody(kind=")
+
+
+@pytest.mark.parametrize("at_once", [False, True])
+def test_contacts_of_leave_out_what_has_been_deleted_as_pairs_do(at_once):
+    """A platform that crumbles: at once, and seen by a system before the next step has found the contacts anew."""
+    seen = []
+
+    class Looks(System):
+        phase = Phase.START
+
+        def process(self, dt):
+            seen.append([contact.entity_b for contact in self.world.contacts.of(player)])
+
+    with world_of(2) as world:
+        world.add_system(Looks())
+        left, right = (world.create_entity(Transform((x, 0)), BoxCollider((0.5, 0.5))) for x in (-0.5, 0.5))
+        player = world.create_entity(Transform((0, 1)), RigidBody(), SphereCollider(0.5), Spin())
+        for _ in range(30):
+            world.step()
+        assert {contact.entity_b for contact in world.contacts.of(player)} == {left, right}
+        world.delete_entity(left, immediate=at_once)
+        assert [contact.entity_b for contact in world.contacts.of(player)] == [right]
+        world.step()
+        assert seen[-1] == [right]
+        world.delete_entity(player)
+        assert world.contacts.of(player) == []
