@@ -9,13 +9,12 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from .names import did_you_mean
+from .units import warn_of_rate
 
 MIXING_RULES = ("average", "geometric_mean", "max", "min", "multiply")
 COLLISION_MODES = ("discrete", "continuous", "event_driven")
 GEOMETRY_MODES = ("precise", "bounds")
 FAULT_MODES = ("warn", "raise", "ignore")
-DISCRETE_CAP = 8  # impacts of a body in a step: where many overlap at its end, more cost much and change little
-SWEPT_CAP = 64  # a fast body may well cross a narrow gap so often
 # What other engines call a field: only for messages about a wrong name.
 OTHER_WORDS = {
     "iterations": "substeps", "velocity_iterations": "substeps", "solver_iterations": "substeps", "timestep": "dt",
@@ -49,8 +48,7 @@ class Settings:
         what one ``advance`` takes at most; the time beyond it is dropped and counted
     max_impacts_per_step
         of one body in one step, of those that gain or lose energy if all is driven by events; beyond it the solver for
-        contacts at rest takes over, or a fast body stops until the step ends, and it is counted; None: 8 in discrete
-        worlds, 64 in others
+        contacts at rest takes over, or a fast body stops until the step ends, and it is counted
     restitution_mixing, friction_mixing
         how the values of the two bodies become the contact's: average, geometric_mean, max, min, multiply, or one that
         a plugin brings
@@ -74,7 +72,7 @@ class Settings:
     restitution_threshold: float | None = None
     slop: float | None = None
     max_steps_per_advance: int = 8
-    max_impacts_per_step: int | None = None
+    max_impacts_per_step: int = 64  # blows run to and fro between bodies that touch, and a gap is crossed as often
     restitution_mixing: str = "max"
     friction_mixing: str = "geometric_mean"
     broad_phase: str = "automatic"
@@ -84,13 +82,12 @@ class Settings:
 
     def __post_init__(self) -> None:
         self._number("dt", above=0.0)
+        warn_of_rate("Settings.dt", self.dt)
         for name in ("restitution_threshold", "slop"):
             if getattr(self, name) is not None:
                 self._number(name, least=0.0)
         for name in ("substeps", "max_steps_per_advance", "max_impacts_per_step"):
             value = getattr(self, name)
-            if value is None and name == "max_impacts_per_step":
-                continue
             if isinstance(value, bool) or not isinstance(value, int) or value < 1:
                 raise ValueError(f"Settings.{name} must be a whole number from 1, got {value!r}")
         for name in ("integrator", "restitution_mixing", "friction_mixing", "broad_phase"):  # a plugin may bring it
@@ -106,12 +103,6 @@ class Settings:
         ):
             if getattr(self, name) not in known:
                 raise ValueError(f"Settings.{name} must be one of {', '.join(known)}, got {getattr(self, name)!r}")
-
-    @property
-    def impact_cap(self) -> int:
-        """``max_impacts_per_step`` as it counts."""
-        cap = DISCRETE_CAP if self.collision == "discrete" else SWEPT_CAP
-        return cap if self.max_impacts_per_step is None else self.max_impacts_per_step
 
     def _number(self, name: str, above: float | None = None, least: float | None = None) -> None:
         value: Any = getattr(self, name)

@@ -36,7 +36,7 @@ def write_settings(state: Record, settings: Settings, registry: Registry) -> Non
     state.slop = -1.0 if settings.slop is None else float(settings.slop)
     threshold = settings.restitution_threshold
     state.restitution_threshold = -1.0 if threshold is None else float(threshold)
-    state.max_impacts = settings.impact_cap
+    state.max_impacts = settings.max_impacts_per_step
     state.restitution_rule = rule_number(registry, settings.restitution_mixing)
     state.friction_rule = rule_number(registry, settings.friction_mixing)
 

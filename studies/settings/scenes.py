@@ -131,7 +131,7 @@ def lost(make: Make, seconds: float) -> Errors:
     for exact in (False, True):
         with make() as world:
             if exact:
-                world.settings = world.settings.replace(dt=1 / 60, collision="event_driven", max_impacts_per_step=None)
+                world.settings = world.settings.replace(dt=1 / 60, collision="event_driven", max_impacts_per_step=64)
             enclosure, counter = Enclosure.around(world), galperin.ImpactCounter()
             world.add_system(counter)
             _run(world, seconds)

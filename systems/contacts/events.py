@@ -301,7 +301,7 @@ class ContactEvents(StagedSystem):
             )
         if impacts.capped:
             self.world.report_fault(
-                f"{impacts.capped} impacts beyond {self._settings().impact_cap} "
+                f"{impacts.capped} impacts beyond {self._settings().max_impacts_per_step} "
                 f"of a body in one step, the first of entity {entity[impacts.capped_row]}: raise "
                 f"Settings.max_impacts_per_step or use smaller steps; the rest was solved as contact at rest",
                 kind="impacts",

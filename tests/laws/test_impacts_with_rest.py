@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from helpers_pairwise import pairwise
 from helpers_rest import SLOP, G, energy, heights, overlaps, rows_of, speed, tower
+from laws.helpers_laws import MODES, seeds
 from worlds import EPS, ball, both_dimensions, box, floor, make_world, position, run, velocity
 
 DT = 1 / 60
@@ -200,3 +201,24 @@ def test_a_cooling_gas_does_not_stall(e):
     assert most > 5
     assert now < 0.2 * start
     assert (np.abs(world.bodies.dynamic.position) < side).all()
+
+
+# -- crowds ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("mode", "d", "e"), pairwise(MODES, (2, 3), (0.3, 0.8)))
+@pytest.mark.parametrize("seed", seeds(1, 2))
+def test_balls_thrown_into_crates_have_no_more_impacts_than_a_step_may_have(seed, mode, d, e):
+    """A blow runs to and fro between crates and balls that touch, ten times and more at one moment: all of these are
+    solved as impacts, and none tells the player of a cap."""
+    random = np.random.default_rng(seed)
+    world = make_world(d, gravity=G, collision=mode)
+    floor(world)
+    for i in range(36):
+        box(world, at(d, i % 6, 0.5 + i // 6), restitution=0.0 if i < 18 else e)
+    for k in range(6):
+        velocity = at(d, random.uniform(8, 12), random.uniform(0, 4))
+        ball(world, at(d, -3 - 1.2 * k, 1 + 0.8 * k), velocity, radius=0.3, mass=2.0, restitution=e)
+    run(world, 120)
+    assert world.stats().totals.counters["impacts"] > 50
+    assert world.stats().totals.counters["capped_impacts"] == 0
