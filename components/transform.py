@@ -91,7 +91,7 @@ class Transform(Component, flat=True):
         return found if found.ndim else float(found)
 
     def _interpolated(self, name: str) -> np.ndarray:
-        store = self._store
+        store: Any = self._store
         if not hasattr(store, "clock"):  # of no world
             return np.array(getattr(self, name))
         row = self._row if self._version == store.version else self._locate()

@@ -362,7 +362,7 @@ class Cone(Joint):
         self.in_order("twist", self.lower, self.upper)
         warn_of_degrees("Cone.twist", (self.lower, self.upper))
         if self.swing > math.pi:
-            raise ValueError(f"{self._name()}.swing must be at most pi rad, got {self.swing!r}")
+            raise ValueError(f"{self._name()}.swing must be at most pi, got {self.swing!r}")
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, self.anchor)
