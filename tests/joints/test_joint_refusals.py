@@ -183,7 +183,7 @@ def test_fields_that_do_not_fit_leave_the_joint_as_it_is():
         with pytest.raises(ValueError, match=r"Distance\.length must be numbers, got"):
             rope.length = wrong
     assert rope.length == 2.0
-    with pytest.raises(ValueError, match=r"Cone\.swing must be at most pi rad, got 4"):
+    with pytest.raises(ValueError, match=r"Cone\.swing must be at most pi, got 4"):
         Cone(1, 2, anchor=(0, 0, 0), axis=(0, 0, 1), swing=4.0)
 
 
