@@ -199,7 +199,8 @@ class Scene:
             if linked:
                 bodies.collider_slot[arrived] = slots[shapes[arrived]]
         state.collides = collides or bool(moving and shapes[:moving].max() >= 0)
-        if linked and (self.rotated or linked.needs_axes or self.spins()):
+        spins = self.spins()  # then each step sees which axes are old
+        if linked and (self.rotated != spins or (linked.needs_axes and not spins)):
             state.rotation_stale = True
         return True
 

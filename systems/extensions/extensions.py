@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -125,7 +126,7 @@ class Extensions:
         table, found = self._table, {}
         for components in dict.fromkeys(self._about):
             masks = [table.has_mask(each)[: table.count] for each in components]
-            found[components] = not masks or bool(np.logical_and.reduce(masks).any())
+            found[components] = not masks or bool(reduce(np.logical_and, masks).any())
         return tuple(found[components] for components in self._about)
 
     def conditions(self, met: dict[str, bool]) -> dict[str, bool]:
