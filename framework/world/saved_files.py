@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import hashlib
 import io
 import json
 import os
@@ -28,7 +29,7 @@ from ..errors import CaromError
 from ..settings import Settings
 from .snapshots import Snapshot
 
-FORMAT = 4  # of the files; a reader refuses others
+FORMAT = 5  # of the files; a reader refuses others
 PARTS = ("dimensions", "plugins", "dead", "next_id", "contacts", "physics", "clock", "steps")  # of a snapshot, as it is
 ARRAY = "#array"
 PART = ".carom-part-"  # and a random number: a file that is being written
@@ -56,6 +57,7 @@ def write(path: str | os.PathLike[str], snapshot: Snapshot, settings: Settings, 
     }
     plain = _plain(contents, arrays)
     plain["kept"] = {name: _kept_by(name, kept, arrays) for name, kept in snapshot.kept.items()}
+    plain["sum"] = _sum_of(arrays)
     arrays["carom"] = np.frombuffer(json.dumps(plain).encode(), np.uint8)
     with whole_file(path) as file:
         np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
@@ -186,6 +188,8 @@ class SavedFile:
                 f"{self.path} was saved by {other} carom, in format {contents['format']}; this one reads format "
                 f"{FORMAT}"
             )
+        if contents.get("sum") != _sum_of(arrays):
+            raise self._damaged(ValueError("arrays are not those that world.save has written"))
         self._contents = self.whole(lambda: _with_arrays(contents, arrays))
         self.dimensions: int = self.whole(lambda: self._contents["dimensions"])
         self.plugins: dict[str, str] = self.whole(lambda: dict(self._contents["plugins"]))
@@ -279,6 +283,15 @@ def _arrays_in(file: BinaryIO) -> dict[str, np.ndarray]:
     with zipfile.ZipFile(file) as archive:
         whole = {name.removesuffix(".npy"): io.BytesIO(archive.read(name)) for name in archive.namelist()}
     return {name: np.lib.format.read_array(data, allow_pickle=False) for name, data in whole.items()}
+
+
+def _sum_of(arrays: dict[str, np.ndarray]) -> str:
+    """Of all arrays and their names: numbers that do not fit each other would fail, or be wrong, in some later step."""
+    digest = hashlib.sha256()
+    for name, array in sorted(arrays.items()):
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
 
 
 def _with_arrays(value: Any, arrays: dict[str, np.ndarray]) -> Any:
