@@ -380,10 +380,13 @@ class Scene:
         return rotation
 
     def refresh_statics(self) -> None:
-        """Static bodies are read, and their boxes made, again if any of them may have changed."""
-        if self.table.static_version != self.static_version:
-            self.static_version = self.table.static_version
+        """Static bodies are read, and their boxes made, again if any of them may have changed; they stay without a
+        velocity, whatever the game has written."""
+        table = self.table
+        if table.static_version != self.static_version:
+            self.static_version = table.static_version
             self.state.statics_version += 1
+            table.arrays["linear_velocity"][table.stops[1] : table.count] = 0.0
 
 
 def any_rotated(rotation: np.ndarray) -> bool:

@@ -309,7 +309,7 @@ class Parts(Plugin):
                 _set(handle, "offset", place.pose.local(np.zeros(d)) * -1.0)
 
     def _place_moved(self) -> None:
-        """Parts are where the game has put their bodies since the last step."""
+        """Parts are where the game has put their bodies since the last step, and as fast."""
         arrays, record, count = self._table.arrays, self._record, self._record.count
         if not count:
             return
@@ -317,6 +317,8 @@ class Parts(Plugin):
         if (arrays["position"][rows] != arrays["position"][bodies]).any():
             arrays["position"][rows] = arrays["position"][bodies]
             arrays["previous_position"][rows] = arrays["previous_position"][bodies]
+        if (arrays["linear_velocity"][rows] != arrays["linear_velocity"][bodies]).any():
+            arrays["linear_velocity"][rows] = arrays["linear_velocity"][bodies]
         rotation = arrays.get("rotation")
         if rotation is not None:
             turned = turned_by(rotation[bodies], record.turn[:count])

@@ -409,6 +409,25 @@ def test_snapshots_rollback_and_files_go_on_to_the_bit(tmp_path):
     assert loaded.state_hash() == world.state_hash()
 
 
+@pytest.mark.parametrize("kind", ["dynamic", "static"])
+def test_worlds_are_the_same_after_restore_where_the_velocity_of_what_moves_otherwise_was_written(kind):
+    """That of a body with parts, of a part, and of a static body, which has none."""
+    world, parts = parts_world((0, -G))
+    body, part, *_ = piece(world, parts, (0, 2), U)
+    world.component_for_entity(body, RigidBody).kind = kind
+    run(world, 2)
+    for entity, velocity in ((body, (3.0, 1.0)), (part, (-2.0, 0.0))):
+        world.component_for_entity(entity, RigidBody).linear_velocity = velocity
+        before = world.state_hash()
+        snapshot = world.snapshot()
+        run(world, 1)
+        after = world.state_hash()
+        world.restore(snapshot)
+        assert world.state_hash() == before
+        run(world, 1)
+        assert world.state_hash() == after
+
+
 @pytest.mark.compiled
 def test_pieces_sleep_as_one_and_wake_to_the_bit():
     world, parts = parts_world((0, -G), sleeping=True)
