@@ -65,7 +65,7 @@ def asked(state):
     return state.needed
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rows:
     """Columns of a record of the state, ``"solver"``, that a stage writes, and how many rows they need.
 
@@ -122,6 +122,11 @@ class Stage:
     @property
     def name(self) -> str:
         return self.function.__name__
+
+    @functools.cached_property
+    def tested(self) -> tuple[Rows, ...]:
+        """What of its room is tested before it runs."""
+        return tuple(rows for rows in self.room if rows.count is not asked)
 
 
 def answers(function: Callable[..., Any]) -> set[bool]:
@@ -278,7 +283,7 @@ _linked: dict[tuple[Any, Any], Linked] = {}
 def linked_stage(stage: Stage, schema: Schema, dimensions: int) -> Linked:
     """The stage's compiled function for states of that kind, one for the process."""
     kind = record_type(schema, dimensions)
-    key = (stage.function, stage.room, kind)
+    key = (stage.function, stage.tested, kind)
     if key not in _linked:
         _linked[key] = Linked(_with_room(stage), types.int64(kind, types.float64))
     return _linked[key]
@@ -286,16 +291,16 @@ def linked_stage(stage: Stage, schema: Schema, dimensions: int) -> Linked:
 
 def _with_room(stage: Stage) -> Callable[..., int]:
     """The stage's function behind a test of its room."""
-    known = [rows for rows in stage.room if rows.count is not asked]
-    if not known:
+    if not stage.tested:
         return stage.function
     from ..jit.hash import is_packed  # loads numba
 
-    counts = (getattr(rows.count, "py_func", rows.count) for rows in known)
+    counts = (getattr(rows.count, "py_func", rows.count) for rows in stage.tested)
     scope: dict[str, Any] = {f"rows_{k}": inlined(count) for k, count in enumerate(counts)}
     short = (
-        f"rows_{k}(state) > len(state.{rows.record}.{name})" for k, rows in enumerate(known) for name in rows.telling
-    )
+        f"rows_{k}(state) > len(state.{rows.record}.{name})"
+        for k, rows in enumerate(stage.tested) for name in rows.telling
+    )  # fmt: skip
     lines = (
         f"def {stage.name}(state, dt):", f"    if {' or '.join(short)}:", "        return NEED_ROOM",
         "    return function(state, dt)", "",

@@ -416,7 +416,7 @@ def main(first: int, stop: int) -> int:
     """Play the programs of these seeds; how many have failed."""
     failed, began, refused = 0, time.process_time(), Counter[str]()
     for seed in range(first, stop):
-        faulthandler.dump_traceback_later(600, exit=True)
+        faulthandler.dump_traceback_later(3600, exit=True)
         try:
             refused += run(seed).refused
         except Exception as error:
