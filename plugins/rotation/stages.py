@@ -212,7 +212,7 @@ def turn_with_contacts(state, spin, i, angle):
 @spinning.stage(
     after="put_back",
     records=(Spin,),
-    reads=("spin", "turn", "quarantined", "spin.max_angular_speed"),
+    reads=("spin", "turn", "solver", "quarantined", "spin.max_angular_speed"),
     writes=("spin.angular_velocity", "rotation", "axes"),
     needed="colliders or joints",
 )
@@ -230,9 +230,13 @@ def take_spins(state, dt, spin):
             spin.angular_velocity[i, k] = new
         if not changed:
             continue
-        if state.impacts.logged > 0 and bodies.impact_count[i] > 0 and tumbles(state, i):
+        struck = state.impacts.logged > 0 and bodies.impact_count[i] > 0
+        if struck and tumbles(state, i):
             read_axes(state, i)  # as impacts have turned it
-        turn_with_contacts(state, spin, i, further)
+        if state.solver.joints.active > 0 and not struck:  # its spin is that of its inertia as it is turned now
+            turn_about(state, i, further)
+        else:
+            turn_with_contacts(state, spin, i, further)
         write_axes(state, i)
         size, most = length(spin_of(state, spin, i)), spin.max_angular_speed[i]
         for k in range(parts if size > most else 0):

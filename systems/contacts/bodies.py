@@ -19,6 +19,7 @@ from .points import points_of
 from .solving.islands import order_rows
 from .solving.prediction import drop_support
 from .solving.rows import turn_body
+from .solving.turning import NOT_TUMBLING, note_frame, turn_joined
 
 
 @part
@@ -132,6 +133,12 @@ def gather(state, dt):
         solver.reach[q] = reach_from_centre(state, i) if state.collides else 0.0
         solver.inverse_inertia[q] = bodies.inverse_inertia[i]
         solver.inverse_products[q] = bodies.inverse_products[i]
+        if solver.joints.active > 0 and len(nothing) == 3:
+            note_frame(state, q)
+            solver.spin_before[q] = nothing
+            if solver.frame[q, 0] != NOT_TUMBLING:
+                turn_body(solver, q, nothing)
+                turn_joined(solver, q, q + 1, -dt)
     if solver.joints.active > 0:
         lay_joints(state)
     return OK

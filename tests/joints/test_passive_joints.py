@@ -44,10 +44,11 @@ def random_chain(seed: int, d: int, gravity: float) -> tuple[World, bool]:
         place = place + random.normal(size=d)
         mass = 10.0 ** random.uniform(-3, 3)
         inertia = mass * random.uniform(0.05, 0.5)
+        inertia *= random.uniform(0.7, 1.3, 3) if d == 3 else 1.0
         body = world.create_entity(
             Transform(place),
             RigidBody(mass=mass, linear_velocity=random.normal(0, 2, d)),
-            Spin(random.normal(0, 2, None if d == 2 else 3), inertia=inertia if d == 2 else np.full(3, inertia)),
+            Spin(random.normal(0, 2, None if d == 2 else 3), inertia),
         )
         ends.append((body, place))
     first = 1 + int(random.integers(0, 2))  # the first body hangs on the world, or on nothing
@@ -131,8 +132,8 @@ def test_sliders_of_a_light_body_between_heavy_ones_give_no_energy(substeps):
 
 
 @pytest.mark.parametrize("seed", [0, 7])
-def test_bodies_of_three_moments_that_tumble_about_a_joint_gain_little(seed):
-    """In 20 s; they turn on after the joints are solved. The first two steps make their velocities fit together."""
+def test_bodies_of_three_moments_that_tumble_about_a_joint_gain_nothing(seed):
+    """In 20 s. The first two steps make their velocities fit together."""
     random = np.random.default_rng(seed)
     with World(Physics(3, gravity=0), Rotation(), Joints()) as world:
         ends = [
@@ -148,4 +149,4 @@ def test_bodies_of_three_moments_that_tumble_about_a_joint_gain_little(seed):
         start = world.kinetic_energy()
         for _ in range(1200):
             world.step()
-            assert 0.9 * start < world.kinetic_energy() < 1.04 * start
+            assert 0.95 * start < world.kinetic_energy() < (1.0 + 1e-9) * start

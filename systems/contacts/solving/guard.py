@@ -283,6 +283,8 @@ def settle(solver, islands):
         s = solver.share[t]
         if solver.jointed[t] and not solver.driven[t]:
             solver.credit[t] = max(0.0, solver.credit[t] - s * (solver.slope[t] + 0.5 * s * solver.curvature[t]))
+        else:
+            solver.credit[t] = 0.0
 
 
 @part

@@ -29,6 +29,7 @@ def lighten(solver, t, dt, span):
             if len(span[4]) > 0:
                 solver.inverse_inertia[q] = scale(solver.inverse_inertia[q], 1.0 / by)
                 solver.inverse_products[q] = scale(solver.inverse_products[q], 1.0 / by)
+                solver.inverse_moments[q] = scale(solver.inverse_moments[q], 1.0 / by)
             solver.inverse_mass[q], solver.heft[q] = least, 1.0 / least
         solver.mass_of[t] += solver.heft[q]
         solver.force_of[t] += solver.heft[q] * length(solver.acceleration[q]) * dt

@@ -2,7 +2,18 @@
 
 from __future__ import annotations
 
-from ....framework.jit.records.schema import Schema, Section, flag, flags, floats, integer, ints, number, vectors
+from ....framework.jit.records.schema import (
+    Schema,
+    Section,
+    flag,
+    flags,
+    floats,
+    integer,
+    ints,
+    number,
+    table,
+    vectors,
+)  # fmt: skip
 from ...joints.records import JOINTS
 
 SOLVER = Schema(
@@ -90,6 +101,8 @@ SOLVER = Schema(
     versine=floats(),
     inverse_inertia=vectors(),
     inverse_products=vectors(),
+    frame=table("float64", 4),  # where there are joints in space: its principal axes, a quaternion, see turning
+    inverse_moments=vectors(),  # about these
     reach=floats(),  # m, of its shape from its centre of mass
     open_body=ints("int32"),  # those of islands that further passes go over: so many
     opened=integer(),
@@ -159,7 +172,10 @@ ARMS = (
     "inertia_b", "products_a", "products_b", "velocity_a", "velocity_b", "spin_a", "spin_b", "ends",
     "points",
 )  # fmt: skip
-TURNS = ("spin", "spin_before", "turn", "sine", "versine", "inverse_inertia", "inverse_products", "reach")
+TURNS = (
+    "spin", "spin_before", "turn", "sine", "versine", "inverse_inertia", "inverse_products", "frame", "inverse_moments",
+    "reach",
+)  # fmt: skip
 
 # Impulses of the contacts at rest, for the next step: [now, i] is the memory, [1 - now, i] is written.
 RESTED = "contacts have rested"

@@ -37,6 +37,7 @@ from .hard import choose_hard, leave_open
 from .overload import lighten, weigh_down
 from .passes import close_in_order, converge, note_impulses, solve_pass
 from .rows import ARMS, JOINTED, NO_ARMS, apply_impulse, ask, turn_body, turn_on, weigh_row
+from .turning import turn_joined
 
 ORDINARY, REFINED, HARD = range(3)  # ranges: with the usual substeps, with more, with contacts that do not sag
 
@@ -101,7 +102,15 @@ def move(solver, h, span):
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], h)
         if len(span[4]) > 0:
             turn_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], h))
-    if len(span[4]) > 0:
+    turn_bodies(solver, h, span)
+
+
+@part
+def turn_bodies(solver, h, span):
+    """Bodies go on turning for a time."""
+    if len(span[4]) > 1 and len(solver.velocity[solver.bodies]) == 3:  # of the world, where there are joints
+        turn_joined(solver, span[2], span[3], h)
+    elif len(span[4]) > 0:
         turn_on(solver, span[2], span[3], h)
 
 
@@ -182,8 +191,7 @@ def repeat_substep(solver, left, h, span):
         solver.total[k] += left * solver.impulse[k]
     for q in range(span[2], span[3]):
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], left * h)
-    if len(span[4]) > 0:
-        turn_on(solver, span[2], span[3], left * h)
+    turn_bodies(solver, left * h, span)
 
 
 @part
