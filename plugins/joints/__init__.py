@@ -113,7 +113,7 @@ class Joints(Plugin):
         joint = self._present().get(entity)
         if joint is None:
             raise KeyError(f"entity {entity!r} has no joint that a step has taken")
-        columns = self._columns({entity: joint}, holds([joint]))
+        columns = self._columns({entity: joint}, holds([joint]), self._rows.span(entity))
         values = (columns[name][0] for name in JointState._fields)
         return JointState(*(value if value.ndim else float(value) for value in values))
 
@@ -121,11 +121,10 @@ class Joints(Plugin):
         """Of all joints what :meth:`state` has: ``entity (n,)``, ``impulse (n, d)``, ``torque (n,)``, in 3D (n, 3),
         ``value (n,)``, ``speed (n,)`` and ``load (n,)``."""
         present = self._present()
-        if present is not self._joints:
-            return self._columns(present, holds(present.values()))
-        if self._holds is None:
+        if present is self._joints and self._holds is None:
             self._holds = holds(present.values())
-        return self._columns(present, self._holds)
+        found = self._holds if present is self._joints else holds(present.values())
+        return self._columns(present, found, slice(0, self._record.count))
 
     def anchors(self) -> tuple[np.ndarray, np.ndarray]:
         """(n, d) where the anchors of all joints are, on each a and on each b: to draw ropes and hinges."""
@@ -140,30 +139,31 @@ class Joints(Plugin):
                 if e in dead or self._joint_of(e) is not self._joints[e]]  # fmt: skip
         return {e: joint for e, joint in self._joints.items() if e not in gone} if gone else self._joints
 
-    def _columns(self, joints: dict[int, Joint], found: list[Holds]) -> dict[str, np.ndarray]:
-        """What :meth:`columns` has, of some of the joints in their order."""
-        bears, entities = self._bears(), list(joints)
-        own = np.searchsorted(bears["entity"], entities)
+    def _columns(self, joints: dict[int, Joint], found: Any, rows: slice) -> dict[str, np.ndarray]:
+        """What :meth:`columns` has, of some of the joints in their order, whose rows are among these."""
+        bears = self._bears(rows)
+        own = np.searchsorted(bears["entity"], list(joints))
         value, speed = self._measure(joints, found)
         return {name: column[own] for name, column in bears.items()} | {"value": value, "speed": speed}
 
-    def _bears(self) -> dict[str, np.ndarray]:
-        """What all joints have done in the last step."""
-        record, starts, dt = self._record, self._rows.starts(), self.world.settings.dt if self.world else 1.0
-        impulses, torques = self._given(0, record.count)
+    def _bears(self, rows: slice) -> dict[str, np.ndarray]:
+        """What the joints of these rows have done in the last step."""
+        record, dt = self._record, self.world.settings.dt if self.world else 1.0
+        starts = np.flatnonzero(np.diff(record.joint[rows], prepend=WORLD))  # the first row of each
+        impulses, torques = self._given(rows)
         if len(starts):
             impulses, torques = np.add.reduceat(impulses, starts), np.add.reduceat(torques, starts)
         force, turn = (np.linalg.norm(done, axis=1) / dt for done in (impulses, torques))
-        load = np.maximum(force / record.breaking_force[starts], turn / record.breaking_torque[starts])
+        load = np.maximum(force / record.breaking_force[rows][starts], turn / record.breaking_torque[rows][starts])
         torque = torques[:, 0] if self._physics.dimensions == 2 else torques
-        return {"entity": record.joint[starts], "impulse": impulses, "torque": torque, "load": load}
+        return {"entity": record.joint[rows][starts], "impulse": impulses, "torque": torque, "load": load}
 
-    def _given(self, start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
+    def _given(self, rows: slice) -> tuple[np.ndarray, np.ndarray]:
         """The impulses and the torques of some rows, (k, d) each."""
-        record, kind = self._record, self._record.kind[start:stop, None]
-        along, given = record.total[start:stop, None] * record.normal[start:stop], kind == GIVEN
-        impulse = np.where(kind == POINT, record.thrust[start:stop], np.where((kind < TURN) | given, along, 0.0))
-        turned = np.where(given, record.total[start:stop, None] * record.turn_b[start:stop], along)
+        record, kind, total = self._record, self._record.kind[rows, None], self._record.total[rows, None]
+        along, given = total * record.normal[rows], kind == GIVEN
+        impulse = np.where(kind == POINT, record.thrust[rows], np.where((kind < TURN) | given, along, 0.0))
+        turned = np.where(given, total * record.turn_b[rows], along)
         return impulse, np.where(kind >= TURN, turned, 0.0)
 
     def _measure(self, joints: dict[int, Joint], found: list[Holds]) -> tuple[np.ndarray, np.ndarray]:
@@ -408,9 +408,9 @@ class Joints(Plugin):
             return
         limits = np.minimum(*(getattr(self._record, name)[: self._record.count] for name in BREAKING))
         self._breaking = bool((limits < np.inf).any())
-        bears = self._bears()
+        bears, present = self._bears(slice(0, self._record.count)), self._present()
         broken = bears["entity"][bears["load"] > 1.0].tolist()
-        self._end([(entity, self._joints[entity]) for entity in broken], "joint_broken")
+        self._end([(entity, present[entity]) for entity in broken if entity in present], "joint_broken")
 
     def _end(self, joints: list[tuple[int, Joint]], event: str) -> None:
         """Tell of these joints, and delete them: last, for if a handler raises the step is taken again."""

@@ -44,11 +44,6 @@ class JointRows:
         start = bisect.bisect_left(joints, entity, 0, count)
         return slice(start, bisect.bisect_right(joints, entity, start, count))
 
-    def starts(self) -> np.ndarray:
-        """(joints,) the first row of each."""
-        record = self._record
-        return np.flatnonzero(np.diff(record.joint[: record.count], prepend=WORLD))
-
     def clear(self) -> None:
         self._record.count = self._record.apart = 0
         self._pairs, self._places, self._free = {}, {}, []
