@@ -219,6 +219,10 @@ class Membership:
         self.types_of: Callable[[int], Collection[type[Any]]] = contents.entities.types_of
         self.dead: set[int] = contents.dead
 
+    def lives(self, entity: int) -> bool:
+        """Whether it exists and is not marked for deletion."""
+        return entity in self.entities and entity not in self.dead
+
     def mask(self, entities: np.ndarray, component: type[Any]) -> np.ndarray:
         """(n,) which of these ids (n,) are living entities that have the component."""
         mask = self.entities.mask(entities, component)

@@ -212,11 +212,15 @@ class ContactRows:
         return make_contacts(len(rows), found.a.tolist(), found.b.tolist(), c["point"][rows], normals, *scalars, times)
 
     def of(self, entity: int) -> list[Contact]:
-        """The enabled contacts of one entity, each seen from it (the normal points away from it)."""
+        """The enabled contacts of one entity, each seen from it (the normal points away from it); as in :meth:`pairs`
+        none of what has been deleted."""
         c = self._columns
         rows = np.flatnonzero((c["entity_a"] == entity) | (c["entity_b"] == entity)).tolist()
-        found = (self.row(index) for index in rows if self._counts(index))
-        return [contact if contact.entity_a == entity else contact.flipped() for contact in found]
+        if not rows:
+            return []
+        here, found = self._membership(), (self.row(index) for index in rows if self._counts(index))
+        living = (contact for contact in found if here.lives(contact.entity_a) and here.lives(contact.entity_b))
+        return [contact if contact.entity_a == entity else contact.flipped() for contact in living]
 
     def _counts(self, index: int) -> bool:
         """Whether that row is a contact for queries pair by pair: a disabled one counts as not touching."""
