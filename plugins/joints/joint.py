@@ -175,8 +175,9 @@ class Joint(Component, abstract=True):
         self._version = version if whole else self._version
         if ends or not values.keys().isdisjoint(self.fixed):
             self.let_go(values.keys())
-        elif whole and all(np.isscalar(before[name]) and before[name] == held[name] for name in values):
-            return  # a game may set its motors in each step
+        elif all(_same(before[name], held[name]) for name in values):  # a game may set its motors in each step
+            held.update(before)
+            return
         held["changed"] = True
         if taken is not None:
             taken.note(self, values)
@@ -302,6 +303,10 @@ class Joint(Component, abstract=True):
     def keep(self, **values: Any) -> None:
         """Set what is hidden."""
         self._values.update(values)  # type: ignore[union-attr]
+
+
+def _same(one: Any, other: Any) -> bool:
+    return one == other if np.isscalar(one) and np.isscalar(other) else np.array_equal(one, other)
 
 
 def whole_body(contents: Any, body: Any) -> int:

@@ -45,9 +45,17 @@ def hanging(world):
 def test_a_new_joint_wakes_its_bodies():
     world, _ = joint_world(sleeping=True)
     body, _ = hanging(world)
-    world.create_entity(MousePull(body, grip=(0.0, 0.0), target=(0.0, 1.0)))
-    run(world, 120)
+    pull = world.component_for_entity(
+        world.create_entity(MousePull(body, grip=(0.0, 0.0), target=(0.0, 1.0))), MousePull
+    )
+    run(world, 300)
     assert at(world, body).y == pytest.approx(1.0, abs=0.05)
+    pull.target = (0.0, 1.0)  # as before
+    run(world, 1)
+    assert world.component_for_entity(body, RigidBody).asleep
+    pull.target[1] = 0.5
+    run(world, 1)
+    assert not world.component_for_entity(body, RigidBody).asleep
 
 
 def asleep_after_going_back(world, body):
