@@ -96,28 +96,17 @@ def forget_queries(state, grid):
 
 
 @part
-def places_statics(state):
-    """Whether there is to be a grid of what does not move."""
-    return not state.all_still and not state.uses_plugin_broad_phase and has_static_grid(state)
-
-
-@part
-def places_moving(state):
-    """Whether there is to be a grid of what moves."""
-    enough = state.moving - state.first >= UNIFORM_GRID_MIN
-    return enough and not state.all_still and not state.uses_plugin_broad_phase
-
-
-@part
 def static_boxes(state):
-    """As many as there may be in that grid, and as many as may be read past the last one."""
-    return fixed_count(state) + LANES if places_statics(state) else 0
+    """How many boxes may be in the grid of what does not move, or be read past the last; 0: there is none."""
+    some = not state.all_still and not state.uses_plugin_broad_phase and has_static_grid(state)
+    return fixed_count(state) + LANES if some else 0
 
 
 @part
 def moving_boxes(state):
     """The same of what moves."""
-    return state.moving - state.first + LANES if places_moving(state) else 0
+    some = not state.all_still and not state.uses_plugin_broad_phase
+    return state.moving - state.first + LANES if some and state.moving - state.first >= UNIFORM_GRID_MIN else 0
 
 
 @inlined
@@ -131,7 +120,8 @@ ROOM_FOR_STATICS = (
     Rows("static_grid", ("directory",), lambda s: most_cells(static_boxes(s))),
 )  # fmt: skip
 ROOM_FOR_MOVING = (
-    Rows("grid", GRID_BOXES, moving_boxes), Rows("grid", ("directory",), lambda s: most_cells(moving_boxes(s))),
+    Rows("grid", GRID_BOXES, moving_boxes),
+    Rows("grid", ("directory",), lambda s: most_cells(moving_boxes(s))),
 )  # fmt: skip
 ROOM_FOR_CANDIDATES = (Rows("candidates", FOUND, asked),)
 
@@ -149,7 +139,7 @@ def build_statics(state):
 
 def place_statics(state, dt):
     """Where more bodies are static than move: their grid."""
-    if places_statics(state):
+    if static_boxes(state) > 0:
         build_statics(state)
     return OK
 
@@ -171,7 +161,7 @@ def build_moving_grid(state):
 @packed
 def place_moving(state, dt):
     """Where many bodies move: their grid."""
-    if places_moving(state):
+    if moving_boxes(state) > 0:
         build_moving_grid(state)
     return OK
 
