@@ -82,7 +82,7 @@ def resolve_simultaneous(state, event, dt):
     most = 1
     for k in range(impacts.waiting):
         most += impacts.event_time[impacts.heap[k]] - now <= EQUAL * dt
-    room = min(len(impacts.member), len(impacts.log_pair) - impacts.logged)
+    room = min(len(impacts.member), len(impacts.next_member) // 2, len(impacts.log_pair) - impacts.logged)
     if most > room or state.count > len(impacts.first_member):
         impacts.together = most
         return NEED_ROOM
