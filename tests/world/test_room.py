@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from worlds import ball, make_world
 
 from carom import AABBCollider, Physics, RigidBody, Settings, SphereCollider, Transform, World
 from carom.plugins.joints import Distance, Joints
@@ -51,3 +52,17 @@ def test_joints_and_parts_without_colliders_have_room_for_curved_paths(integrato
         for name in ("path_velocity", "path_second", "path_third"):
             assert bodies.rows_of(name) == world.physics.table.capacity
         assert np.isclose(np.hypot(*world.bodies.position[0]), 1.0, atol=1e-3)
+
+
+def test_impacts_at_once_have_room_in_all_their_lists():
+    """Two pairs strike at once, then sixteen: the lists of two entries for each of these grow, too."""
+    with make_world(2, collision="event_driven") as world:
+        for k in range(18):
+            gap = 0.5 if k < 2 else 1.0
+            ball(world, (3.0 * k, 0.0), (1.0, 0.0), radius=0.25, restitution=1.0)
+            ball(world, (3.0 * k + 0.5 + gap, 0.0), (-1.0, 0.0), radius=0.25, restitution=1.0)
+        for _ in range(60):
+            world.step()
+        impacts = world.physics.state.impacts
+        assert len(impacts.next_member) >= 2 * 16
+        assert sorted(world.bodies.linear_velocity[:, 0].tolist()) == [-1.0] * 18 + [1.0] * 18
