@@ -127,8 +127,6 @@ class Joint(Component, abstract=True):
         for name in ("a", "b"):
             if given.get(name, WORLD) is None:
                 given[name] = WORLD
-            elif isinstance(given.get(name), Component):
-                raise TypeError(f"{type(self).__name__}.{name} must be an entity, got its {given[name]}")
         super().__init__(**given)
         self.check_ends()
         self.check()

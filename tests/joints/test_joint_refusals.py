@@ -116,7 +116,7 @@ def test_bodies_that_do_not_exist_are_refused_at_the_call_and_what_comes_to_be_w
         with pytest.raises(ValueError, match=f"Ball.*{why}"):
             joint.set_together(**ends)
         assert (joint.a, joint.b) == (a, b)
-    with pytest.raises(TypeError, match=r"Ball\.a must be an entity, got its Transform"):
+    with pytest.raises(ValueError, match=r"Ball\.a must be an integer: give its entity"):
         Ball(at(world, a), b, anchor=(0.5, 0))
     kinds = [world.component_for_entity(body, RigidBody) for body in (a, b)]
     for kind in ("static", "dynamic"):
