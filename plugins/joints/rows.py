@@ -45,7 +45,8 @@ class JointRows:
         return slice(start, bisect.bisect_right(joints, entity, start, count))
 
     def clear(self) -> None:
-        self._record.count = self._record.apart = 0
+        self._changed(0)
+        self._record.apart = 0
         self._pairs, self._places, self._free = {}, {}, []
 
     def put(self, joint: Joint, rows: list[Row], fresh: bool) -> tuple[set[int], bool]:
