@@ -13,9 +13,9 @@ from ..contacts.solving.rows import turn_body
 from ..contacts.solving.warm_start import row_of
 from ..integration.turning import change_of_spin, cross_spin
 from ..narrow_phase.stages import layers_meet
+from .coupling import first_of
 from .records import DRIVE, FREE, GIVEN, POINT, SLIDE, TURN, TWIST
 from .rows import turn_about
-from .springs import first_of
 
 
 @inlined

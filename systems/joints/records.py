@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...framework.jit.records.schema import Schema, flags, floats, integer, ints, number, vectors
+from ...framework.jit.records.schema import Schema, floats, integer, ints, number, vectors
 
 POINT, LINE, SLIDE, TURN, ALIGN, CONE, TWIST, GIVEN = range(8)
 HOLD, LIMIT, DRIVE, SPRING, SERVO, FREE = range(6)
@@ -66,12 +66,14 @@ JOINTS = Schema(
     between=vectors(),  # m, from a to b where the step starts
     angle=floats(),  # rad, likewise as the step has turned the bodies
     axes_a=vectors(),  # of the bodies of a GIVEN, likewise: as many rows as there are dimensions
+    soft_further=vectors(),
     axes_b=vectors(),
     # in a range
     begin=integer(),  # places in ``order``
     end=integer(),
     step=number(),  # s of a substep
     fastest=number(),  # Hz: springs above it hold
+    stiffness=number(),  # of what holds
     moved_for=number(),  # s since the joints were measured
     asked=integer(),  # the joint whose function runs now; 0: none
     push_rate=floats(),  # 1/s at which error is pushed out,
@@ -88,10 +90,11 @@ JOINTS = Schema(
     inverse_products=vectors(),  # and beside it
     pushing=floats(),  # m/s or rad/s that the passes ask for,
     opening=floats(),  # and those that do not push
-    soft=flags(),  # where a pass pushes
     least=floats(),  # N s or N m s
     greatest=floats(),
     impulse=floats(),
     push=vectors(),  # N s of a POINT
-    answer=vectors(),  # N of a POINT, else first N or N m, for each N or N m of the spring of its joint
+    answer=vectors(),  # N or N m of each row before it in its joint that holds, for each N or N m of it,
+    soft_answer=vectors(),  # the same of those that give way, in the pass that pushes
+    further=vectors(),  # and of those beyond as many as there are dimensions
 )

@@ -8,7 +8,7 @@ within LIMITs, DRIVEs it at a speed, brings it there as a SERVO, or is a SPRING;
 counted, and no more. Whole turns count: in space against the angle that the joint had before. What holds is as soft as
 a spring of a frequency that follows the rate of the substeps, and is solved without that in the passes that do not
 push; limits are not soft, so that no motor is stronger. Springs are solved in the pass that pushes alone. One that
-swings faster than substeps can follow holds its value.
+swings faster than substeps can follow holds its value. Rows of one joint are solved together, see coupling.
 
 Joints come before the contacts of their range, in the pass that pushes and once in those that do not. Their bodies have
 the columns of bodies that spin, as contacts of such bodies have: see solving.rows.JOINTED.
@@ -22,20 +22,14 @@ from ...framework.compilation import inlined, part
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 from ..contacts.constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY, SPRING_FREQUENCY
 from ..integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
+from .coupling import answer_at, couple, first_of, giving_of, holds, is_answered, multiplied, swings
 from .given import measure_given, push_given, speed_of_given
-from .records import ALIGN, DRIVE, GIVEN, HOLD, LIMIT, POINT, SERVO, SLIDE, SPRING, TURN, TWIST
-from .springs import first_of, left_to
+from .records import ALIGN, DRIVE, GIVEN, LIMIT, POINT, SERVO, SLIDE, TURN, TWIST
 
 FULL_TURN = 2.0 * math.pi
 FOLDED = 1e-2  # 1 + cosine of a swing: beyond it a twist is nearly any angle
 LEAST_SHARE = 1e-9  # of its mass that a spring without damping takes part with
 BRAKES = 0.9  # of the speed from which a servo could just stop in time
-
-
-@inlined
-def swings(joints, j):
-    """Whether a row is a spring that its substeps can follow: others gain energy where springs meet at a body."""
-    return joints.rule[j] == SPRING and joints.frequency[j] <= joints.fastest
 
 
 # -- in a range --------------------------------------------------------------------------------------------------------
@@ -94,9 +88,11 @@ def start_joints(solver, h, period, usual):
             continue
         omega = 2.0 * math.pi * JOINT_FREQUENCY / period
         damping = 2.0 * JOINT_DAMPING_RATIO * usual / period + h * omega
-        stiffness = h * omega * damping
+        stiffness = joints.stiffness = h * omega * damping
         joints.push_rate[j] = omega / damping
-        joints.mass_scale[j], joints.impulse_scale[j] = stiffness / (1.0 + stiffness), 1.0 / (1.0 + stiffness)
+        holding = holds(joints, j)
+        joints.mass_scale[j] = stiffness / (1.0 + stiffness) if holding else 1.0
+        joints.impulse_scale[j] = 1.0 / (1.0 + stiffness) if holding else 0.0
 
 
 # -- in a substep ------------------------------------------------------------------------------------------------------
@@ -128,6 +124,7 @@ def weigh_point(solver, j, zero):
         yy = w + item(i_a, 0) * x_a * x_a + item(i_b, 0) * x_b * x_b
         xy = -item(i_a, 0) * x_a * y_a - item(i_b, 0) * x_b * y_b
         size = 1.0 / (xx * yy - xy * xy)
+        joints.mass[j] = 1.0 / max(xx, yy)
         joints.inverse[j] = replace(replace(zero, 0, yy * size), 1, xx * size)
         joints.inverse_products[j] = replace(zero, 0, -xy * size)
         return
@@ -140,17 +137,9 @@ def weigh_point(solver, j, zero):
     aa, bb, cc = yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy
     ab, ac, bc = xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz
     size = xx * aa + xy * ab + xz * ac
+    joints.mass[j] = 1.0 / max(xx, yy, zz)
     joints.inverse[j] = replace(replace(replace(zero, 0, aa / size), 1, bb / size), d - 1, cc / size)
     joints.inverse_products[j] = replace(replace(replace(zero, 0, ab / size), 1, ac / size), d - 1, bc / size)
-
-
-@inlined
-def multiplied(diagonal, others, v):
-    """A symmetric matrix times a vector; others: xy, in space xy, xz, yz."""
-    if len(v) == 2:
-        x = item(diagonal, 0) * item(v, 0) + item(others, 0) * item(v, 1)
-        return replace(replace(v, 0, x), 1, item(others, 0) * item(v, 0) + item(diagonal, 1) * item(v, 1))
-    return symmetric(diagonal, others, v)
 
 
 @inlined
@@ -191,15 +180,13 @@ def angle_of(solver, j):
 def ask(joints, j, value):
     """What a row asks of the speed of its value, m/s or rad/s, and the impulses that it may have."""
     rule, h = joints.rule[j], joints.step
-    joints.soft[j], joints.opening[j], joints.pushing[j] = rule in (HOLD, SPRING), 0.0, 0.0
+    joints.opening[j] = joints.pushing[j] = 0.0
     joints.greatest[j] = joints.most[j] * h
     joints.least[j] = -joints.greatest[j]
     if rule == DRIVE:
         joints.opening[j] = joints.pushing[j] = joints.target[j]
     elif rule == SERVO:
-        away = value - joints.low[j]
-        stops = BRAKES * math.sqrt(2.0 * joints.most[j] * abs(away) / joints.mass[j]) if joints.mass[j] > 0.0 else 0.0
-        joints.opening[j] = joints.pushing[j] = -math.copysign(min(joints.push_rate[j] * abs(away), stops), away)
+        joints.pushing[j] = joints.low[j] - value  # see brake
     elif rule != LIMIT:
         joints.pushing[j] = -joints.push_rate[j] * (value - joints.low[j])
     else:
@@ -214,6 +201,14 @@ def ask(joints, j, value):
             joints.least[j] = 0.0
         else:
             joints.greatest[j] = 0.0
+
+
+@inlined
+def brake(joints, j):
+    """The speed of a servo, which starts to stop in time."""
+    way, mass = joints.pushing[j], joints.mass[j]
+    stops = BRAKES * math.sqrt(2.0 * joints.most[j] * abs(way) / mass) if mass > 0.0 else 0.0
+    joints.opening[j] = joints.pushing[j] = math.copysign(min(joints.push_rate[j] * abs(way), stops), way)
 
 
 @part
@@ -239,6 +234,9 @@ def measure_joints(solver):
         if kind == POINT:
             arms_a[j], arms_b[j], gap[j] = arm_a, arm_b, way
             weigh_point(solver, j, scale(way, 0.0))
+            if holds(joints, j):
+                gives = giving_of(solver, j)
+                joints.mass_scale[j], joints.impulse_scale[j] = 1.0 / (1.0 + gives), gives / (1.0 + gives)
             continue
         normal, value = joints.normal[j], length(way)
         if kind == SLIDE:
@@ -252,9 +250,13 @@ def measure_joints(solver):
         ask(joints, j, value)
     for e in range(joints.begin, joints.end):  # now that all rows are measured: those of a joint may come in any order
         j = order[e]
-        if swings(joints, j) and kinds[j] != GIVEN and first_of(joints, j) < j:
-            left = left_to(solver, j)
-            joints.mass[j] = 1.0 / left if left > 0.0 else 0.0
+        if is_answered(joints, j) and not is_answered(joints, j - 1):
+            gives = giving_of(solver, j - 1)
+            couple(solver, j - 1, 0.0)
+            couple(solver, j - 1, gives)
+    for e in range(joints.begin, joints.end):
+        if joints.rule[order[e]] == SERVO:
+            brake(joints, order[e])
     joints.moved_for = joints.step
 
 
@@ -297,20 +299,23 @@ def give_row(solver, j, impulse):
 
 
 @inlined
-def answer_spring(solver, j, impulse):
-    """What holds in the joint of a spring pushes with it, see springs."""
-    joints = solver.joints
+def answer_row(solver, j, impulse, soft):
+    """What holds in the joint of row j pushes with it, see coupling."""
+    joints, k = solver.joints, 0
     for i in range(first_of(joints, j), j):
-        if joints.rule[i] != HOLD or joints.kind[i] == GIVEN:
+        if not holds(joints, i):
             continue
-        answer = scale(joints.answer[i], impulse)
         if joints.kind[i] == POINT:
+            answer = scale(joints.soft_answer[j] if soft else joints.answer[j], impulse)
             ends, arms = (joints.first[i], joints.second[i]), (joints.arm_a[i], joints.arm_b[i])
             joints.push[i] = add(joints.push[i], answer)
             push_apart(columns_of(solver), ends, arms, answer)
+            k += len(answer)
         else:
-            joints.impulse[i] += item(answer, 0)
-            give_row(solver, i, item(answer, 0))
+            share = answer_at(joints, j, k, soft) * impulse
+            joints.impulse[i] += share
+            give_row(solver, i, share)
+            k += 1
 
 
 @part
@@ -345,16 +350,16 @@ def solve_row(solver, j, pushes):
         speed = dot(joints.normal[j], sub(solver.spin[joints.second[j]], solver.spin[joints.first[j]]))
     else:
         speed = dot(joints.normal[j], speed_between(solver, j))
-    if pushes and joints.soft[j]:
+    if pushes:
         change = joints.mass_scale[j] * joints.mass[j] * (joints.pushing[j] - speed) - joints.impulse_scale[j] * old
     else:
-        change = joints.mass[j] * ((joints.pushing[j] if pushes else joints.opening[j]) - speed)
+        change = joints.mass[j] * (joints.opening[j] - speed)
     new = min(joints.greatest[j], max(joints.least[j], old + change))
     joints.impulse[j] = new
     if new != old:  # most limits are not met
         give_row(solver, j, new - old)
-        if swings(joints, j) and joints.kind[j] != GIVEN:
-            answer_spring(solver, j, new - old)
+        if is_answered(joints, j):
+            answer_row(solver, j, new - old, pushes and not swings(joints, j))
 
 
 @part

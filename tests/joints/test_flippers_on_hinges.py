@@ -22,7 +22,7 @@ HALF, RADIUS, SPEED = 0.1, 0.2, 15.0
 @pytest.mark.parametrize("above", [0.0, 0.3])
 def test_a_flipper_that_a_motor_starts_throws_the_ball_over_it(above, e, mode):
     """Its point at the ball moves by up to .45 m in the step in which the motor starts: it sinks in by less than a
-    sixth of that, is thrown as fast as that point moves, or faster, and is on its face as long as it is beside it."""
+    fifth of that, is thrown as fast as that point moves, or faster, and is on its face as long as it is beside it."""
     c, s, up = math.cos(-0.4), math.sin(-0.4), HALF + RADIUS + 0.01 + above
     for where in (0.4, 1.2, 1.8):
         with World(
@@ -44,7 +44,7 @@ def test_a_flipper_that_a_motor_starts_throws_the_ball_over_it(above, e, mode):
                 x, y = world.component_for_entity(ball, Transform).position
                 fastest = max(fastest, np.linalg.norm(world.component_for_entity(ball, RigidBody).linear_velocity))
                 along, high = math.cos(angle) * x + math.sin(angle) * y, math.cos(angle) * y - math.sin(angle) * x
-                assert high > HALF + RADIUS - 0.075 or not 0 < along < 2
+                assert high > HALF + RADIUS - 0.09 or not 0 < along < 2
             assert fastest > 0.95 * SPEED * where
 
 

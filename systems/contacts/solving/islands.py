@@ -309,8 +309,7 @@ def lay_chunks(state):
 def order_joints(state):
     """The rows of joints by range and island, and the places of their bodies; the world has that behind all bodies.
 
-    What holds points comes before limits and motors, which may push it apart. Each in a few streams that are solved
-    side by side: neighbours in a chain would wait for each other.
+    The rows of a joint stand together, and its neighbours in a chain apart: they would wait for each other.
     """
     solver, joints, ground = state.solver, state.solver.joints, state.solver.bodies
     island, begins, begin = solver.island, solver.number, 0
@@ -320,26 +319,30 @@ def order_joints(state):
             if solver.range_of[t] == s:
                 begins[t], begin = begin, begin + solver.links[t]
         solver.joint_ends[s] = begin
-    for others in range(2):
-        for e in range(joints.active):
-            j = joints.order[e]
-            if (joints.kind[j] != POINT) == (others == 1):
-                a, b = joints.row_a[j], joints.row_b[j]
-                joints.first[j] = place_of(state, a) if a >= 0 else ground
-                joints.second[j] = place_of(state, b) if b >= 0 else ground
-                t = max(island[joints.first[j]], island[joints.second[j]])
-                joints.open_row[begins[t]], joints.stream[begins[t]] = j, 2 * t + others
-                begins[t] += 1
-    start = 0
+    for e in range(joints.active):
+        j = joints.order[e]
+        a, b = joints.row_a[j], joints.row_b[j]
+        joints.first[j] = place_of(state, a) if a >= 0 else ground
+        joints.second[j] = place_of(state, b) if b >= 0 else ground
+        t = max(island[joints.first[j]], island[joints.second[j]])
+        joints.open_row[begins[t]], joints.stream[begins[t]] = j, t
+        begins[t] += 1
+    start = e = 0
     while start < joints.active:
-        stop, e = start + 1, start
-        while stop < joints.active and joints.stream[stop] == joints.stream[start]:
-            stop += 1
-        rows = (stop - start + STREAMS - 1) // STREAMS
+        t, stop, count = joints.stream[start], start, 0
+        while stop < joints.active and joints.stream[stop] == t:
+            one, stop = stop, stop + 1
+            if one == start or joints.joint[joints.open_row[one]] != joints.joint[joints.open_row[one - 1]]:
+                joints.stream[start + count] = one  # where a joint begins
+                count += 1
+        rows = (count + STREAMS - 1) // STREAMS
         for k in range(rows):
-            for one in range(start + k, stop, rows):
-                joints.order[e] = joints.open_row[one]
-                e += 1
+            for c in range(start + k, start + count, rows):
+                one = joints.stream[c]
+                end = joints.stream[c + 1] if c + 1 < start + count else stop
+                while one < end:
+                    joints.order[e] = joints.open_row[one]
+                    one, e = one + 1, e + 1
         start = stop
 
 

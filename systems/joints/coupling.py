@@ -1,0 +1,154 @@
+"""The rows of one joint move each other's values: a door that is stopped at its edge pushes at its hinge.
+
+Solved one after the other such rows creep where an anchor is far from a centre of mass, and where motors, springs and
+limits act with the mass of a body that nothing holds they give energy. So a joint is one small system, which is solved
+by elimination: with each impulse of a row those before it that hold answer, so that their values go on as they did, and
+the row has the mass of the motion that they leave. The rows of a joint are solved one right after the other, so that
+nothing else has moved those that answer: else the answers could give energy.
+
+In the pass that pushes what holds gives way, and so do the answers; springs are exact, and theirs never do.
+"""
+
+from __future__ import annotations
+
+from ...framework.compilation import inlined, part
+from ...framework.jit.stack_arrays import stack_array
+from ...framework.vectors import add, add_scaled, dot, item, replace, row, scale, store
+from ..integration.turning import change_of_spin, cross_spin, symmetric, twist
+from .records import GIVEN, HOLD, POINT, SPRING, TURN
+
+MOST = 6  # rows that hold, in space, and each a number
+MOST_LEVER = 16.0  # times as much as the masses alone: what more is moved at the end of an arm gives way no more
+NOTHING = 1e-9  # of what an impulse moves: less is held by rows before
+
+
+@inlined
+def first_of(joints, j):
+    """The first row of the joint of row j."""
+    first = j
+    while first > 0 and joints.joint[first - 1] == joints.joint[j]:
+        first -= 1
+    return first
+
+
+@inlined
+def end_of(joints, j):
+    """The row behind those of the joint of row j."""
+    end = j + 1
+    while end < joints.count and joints.joint[end] == joints.joint[j]:
+        end += 1
+    return end
+
+
+@inlined
+def swings(joints, j):
+    """Whether a row is a spring that its substeps can follow: others gain energy where springs meet at a body."""
+    return joints.rule[j] == SPRING and joints.frequency[j] <= joints.fastest
+
+
+@inlined
+def holds(joints, j):
+    """Whether a row holds its value, as springs do that are too fast for their substeps."""
+    return joints.rule[j] == HOLD or (joints.rule[j] == SPRING and joints.frequency[j] > joints.fastest)
+
+
+@inlined
+def is_answered(joints, j):
+    """Whether rows before row j may answer it."""
+    return joints.kind[j] != GIVEN and j > 0 and joints.joint[j - 1] == joints.joint[j]
+
+
+@inlined
+def multiplied(diagonal, others, v):
+    """A symmetric matrix times a vector; others: xy, in space xy, xz, yz."""
+    if len(v) == 2:
+        x = item(diagonal, 0) * item(v, 0) + item(others, 0) * item(v, 1)
+        return replace(replace(v, 0, x), 1, item(others, 0) * item(v, 0) + item(diagonal, 1) * item(v, 1))
+    return symmetric(diagonal, others, v)
+
+
+@inlined
+def pushes_of(joints, j, impulse):
+    """(impulse, turn of a, turn of b) that a row which is no POINT gives its second body; the first one gets as much
+    back."""
+    along = scale(joints.normal[j], impulse)
+    if joints.kind[j] >= TURN:
+        return scale(along, 0.0), along, along
+    return along, twist(joints.arm_a[j], along), twist(joints.arm_b[j], along)
+
+
+@inlined
+def answer_at(joints, j, k, soft):
+    """The answer number k to row j, where what holds gives way or not."""
+    answer, further = (joints.soft_answer[j], joints.soft_further[j]) if soft else (joints.answer[j], joints.further[j])
+    d = len(answer)
+    return item(answer, k) if k < d else item(further, k - d)
+
+
+@inlined
+def giving_of(solver, first):
+    """By how much of what an impulse moves at it a joint gives way. Where that is the end of a long arm of a body which
+    turns easily it may have to bear the body itself, and gives way less."""
+    joints = solver.joints
+    w = solver.inverse_mass[joints.first[first]] + solver.inverse_mass[joints.second[first]]
+    share = MOST_LEVER * w * joints.mass[first] if joints.kind[first] < TURN else 1.0
+    return min(1.0, share) / joints.stiffness
+
+
+@part
+def couple(solver, first, gives):
+    """The masses of the rows of a joint behind its first one, and the answers to them of those before that hold.
+
+    Each row is made orthogonal to these, in the measure of kinetic energy and of what goes into the joint where that
+    gives way (Gram and Schmidt). gives: by so much of what an impulse at it moves, or 0; then of rows that hold alone.
+    """
+    joints, zero = solver.joints, scale(solver.joints.normal[first], 0.0)
+    force, spins_a, spins_b = stack_array(MOST, zero), stack_array(MOST, zero), stack_array(MOST, zero)
+    answers, furthers, masses = stack_array(MOST, zero), stack_array(MOST, zero), stack_array(MOST, 0.0)
+    a, b, d, held = joints.first[first], joints.second[first], len(zero), 0
+    w, point = solver.inverse_mass[a] + solver.inverse_mass[b], joints.kind[first] == POINT
+    arm_a, arm_b = joints.arm_a[first], joints.arm_b[first]
+    for j in range(first + 1 if point else first, end_of(joints, first)):
+        if gives > 0.0 and swings(joints, j):
+            continue
+        along, turn_a, turn_b = pushes_of(joints, j, 1.0)
+        push, spin_a, spin_b = along, change_of_spin(solver, a, turn_a), change_of_spin(solver, b, turn_b)
+        whole = w * dot(along, along) + dot(turn_a, spin_a) + dot(turn_b, spin_b)
+        answer = further = zero
+        if point:
+            apart = add(scale(along, w), add(cross_spin(spin_a, arm_a), cross_spin(spin_b, arm_b)))
+            answer = multiplied(joints.inverse[first], joints.inverse_products[first], apart)
+            answer = scale(answer, -1.0 / (1.0 + gives))
+            push = add(push, answer)
+            spin_a = add(spin_a, change_of_spin(solver, a, twist(arm_a, answer)))
+            spin_b = add(spin_b, change_of_spin(solver, b, twist(arm_b, answer)))
+        for i in range(held):
+            moved = w * dot(along, row(force, i, zero)) + dot(turn_a, row(spins_a, i, zero))
+            share = -(moved + dot(turn_b, row(spins_b, i, zero))) * masses[i]
+            push = add_scaled(push, row(force, i, zero), share)
+            spin_a = add_scaled(spin_a, row(spins_a, i, zero), share)
+            spin_b = add_scaled(spin_b, row(spins_b, i, zero), share)
+            answer = add_scaled(answer, row(answers, i, zero), share)
+            further = add_scaled(further, row(furthers, i, zero), share)
+            k = i + d if point else i
+            if k < d:
+                answer = replace(answer, k, item(answer, k) + share)
+            else:
+                further = replace(further, k - d, item(further, k - d) + share)
+        left = w * dot(along, push) + dot(turn_a, spin_a) + dot(turn_b, spin_b)
+        gives_way = gives * whole if holds(joints, j) else 0.0
+        mass = 1.0 / (left + gives_way) if left > NOTHING * whole else 0.0
+        if gives > 0.0:
+            joints.soft_answer[j], joints.soft_further[j] = answer, further
+            joints.mass_scale[j] = mass / joints.mass[j] if joints.mass[j] > 0.0 else 0.0
+            joints.impulse_scale[j] = gives_way * mass
+        else:
+            joints.mass[j], joints.answer[j], joints.further[j] = mass, answer, further
+        if holds(joints, j):
+            store(force, held, push)
+            store(spins_a, held, spin_a)
+            store(spins_b, held, spin_b)
+            store(answers, held, answer)
+            store(furthers, held, further)
+            masses[held] = mass
+            held += 1
