@@ -123,7 +123,8 @@ SPINS = Section(
     rolling_radius=floats(default=0.0),  # m: of a round body; 0: its surface moves as its centre
     rolling_friction=floats(),  # m
     turn=vectors(),  # rad, in the step
-    reach=floats(),  # m: how far turning moves points of the last level that has been measured, per rad, at most
+    # m: how far turning moves points of the last level that has been measured, per rad, at most; only of what turns
+    reach=floats(),
     driven=floats(default=0.0),  # m, by which motors may move it, about where joints hold it, farther than that
     driven_turn=floats(default=0.0),  # rad, by which they may turn it
     joined=flags(default=False),  # by joints, if any are active

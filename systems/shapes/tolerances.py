@@ -68,10 +68,10 @@ def turning_travel(state, span, a, b):
 @inlined
 def driven_travel(state, i):
     """How far motors may move points of body i beyond what its spin does."""
-    bodies = state.bodies
-    if state.solver.joints.active == 0:
+    bodies, angle = state.bodies, state.bodies.driven_turn
+    if state.solver.joints.active == 0 or not angle[i] > 0.0:
         return 0.0
-    return bodies.driven[i] + (bodies.driven_turn[i] * bodies.reach[i] if bodies.rolling_radius[i] == 0.0 else 0.0)
+    return bodies.driven[i] + (angle[i] * bodies.reach[i] if bodies.rolling_radius[i] == 0.0 else 0.0)
 
 
 @inlined

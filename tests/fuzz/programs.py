@@ -50,6 +50,7 @@ from carom.plugins.joints import (
 )
 from carom.plugins.parts import PartOf, Parts
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
+from carom.systems.contacts.constants import GAIN_MOTION
 from carom.systems.records import BODY_COLUMNS
 
 JOINTS = Ball, Cone, Distance, Hinge, Motor, MousePull, Slider, Weld, Wheel
@@ -343,7 +344,10 @@ class Game:
         world, bodies = self.world, self.world.bodies
         forces = np.any(world.gravity) or bodies.dynamic.constant_force.any()
         drives = forces or len(self.joints) or bodies.kinematic.linear_velocity.any() or world.get_component(PartOf)
-        return np.inf if drives else (1.0 + 1e-9) * world.kinetic_energy() + 1e-9
+        if drives:
+            return np.inf
+        pushed = (world.contacts.depth > 0.0).any()  # what overlaps is pushed out, and may keep so much of that
+        return (1.0 + (GAIN_MOTION if pushed else 1e-9)) * world.kinetic_energy() + 1e-9
 
     def check(self) -> None:
         """After steps."""

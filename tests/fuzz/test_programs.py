@@ -5,10 +5,12 @@ from __future__ import annotations
 import pytest
 from fuzz.programs import run
 
+FOUND = 3831, 4818  # once failed: a static body measured before anything turned; a push out of an overlap
+
 
 @pytest.mark.slow
 def test_programs_keep_their_promises():
-    for seed in range(200):
+    for seed in (*range(200), *FOUND):
         run(seed)
 
 
