@@ -199,6 +199,7 @@ class Joints(Plugin):
         self._rows.clear()
         found = {e: contents.components_of(e)[c] for c in (*KINDS, *self._own) for e in contents.members.get(c, ())}
         for entity, joint in sorted(found.items()):
+            joint._contents = contents
             if joint.attached:
                 joint.fit(self._physics.dimensions, entity)
                 self._take(entity, joint)

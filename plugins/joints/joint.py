@@ -161,7 +161,7 @@ class Joint(Component, abstract=True):
             if ends:
                 self.check_ends()
                 if self._contents is not None:
-                    self.check_in(self._contents, self._entity)
+                    self.check_in(self._contents, self._whose())
         except ValueError as error:
             held.update(before)
             self._version = version
@@ -189,9 +189,17 @@ class Joint(Component, abstract=True):
         if self.a == self.b:
             raise ValueError(f"{type(self).__name__} needs two bodies, got {self.a or None} as a and as b")
 
+    def _whose(self) -> int | None:
+        """Its entity, also before a step has taken it."""
+        if self._entity is None and self._contents is not None:
+            kind, contents = type(self), self._contents
+            found = (e for e in contents.members.get(kind, ()) if contents.components_of(e)[kind] is self)
+            self._entity = next(found, None)
+        return self._entity
+
     def _name(self) -> str:
         """For messages."""
-        return f"{'' if self._entity is None else f'entity {self._entity}: '}{type(self).__name__}"
+        return f"{'' if self._whose() is None else f'entity {self._entity}: '}{type(self).__name__}"
 
     def _ends(self, name: str, value: Any) -> tuple[Any, Any]:
         try:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from helpers_joints import at, disc, joint_world, plank, run
 
-from carom import Physics, RigidBody, SphereCollider, Transform, World
+from carom import Physics, RigidBody, Rotation, SphereCollider, Transform, World
 from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Motor, MousePull, Slider, Weld
 
 
@@ -247,3 +247,21 @@ def test_ends_that_do_not_fit_the_world_are_refused_at_the_call():
         joint.point_b = (0, 0, 1)
     assert np.array_equal(joint.point_b, (2.5, 0.5))
     world.step()
+
+
+def test_ends_are_refused_alike_after_a_world_was_loaded_or_restored(tmp_path):
+    """Also of a joint that no step has taken yet."""
+    world, _ = joint_world(gravity=(0, 0))
+    ball = disc(world, (0, 0))
+    first, second = (world.create_entity(Transform((x, 0)), SphereCollider(0.5)) for x in (3, 6))
+    entity = world.create_entity(Hinge(ball, first, anchor=(0, 0)))
+    for taken in (False, True):
+        if taken:
+            world.step()
+        snapshot = world.snapshot()
+        world.save(tmp_path / f"saved{taken}")
+        world.restore(snapshot)
+        loaded = World.load(tmp_path / f"saved{taken}", Physics(2, gravity=(0, 0)), Rotation(), Joints())
+        for one in (world, loaded):
+            with pytest.raises(ValueError, match=f"entity {entity}: Hinge joins no dynamic body: a is {second}"):
+                one.component_for_entity(entity, Hinge).a = second
