@@ -198,15 +198,19 @@ class Joints(Plugin):
         self._set.clear()
         self._rows.clear()
         found = {e: contents.components_of(e)[c] for c in (*KINDS, *self._own) for e in contents.members.get(c, ())}
+        had = by_row(saved)
         for entity, joint in sorted(found.items()):
             joint._contents = contents
             if joint.attached:
                 joint.fit(self._physics.dimensions, entity)
                 self._take(entity, joint)
+            elif rows := [key[1:5] for key in had if key[0] == entity]:  # it takes hold anew with the next step
+                joint.fit(self._physics.dimensions, entity)
+                self._rows.lay(joint, rows)
+                self._joints[entity], joint._taken = joint, self
             if joint.changed:
                 self._touched.add(entity)
                 self._set.add(entity)
-        had = by_row(saved)
         now = put_kept(record, slice(0, record.count), had)
         self._released = {*saved.get("released", ()), *(body for key in had.keys() ^ now for body in key[3:5])}
         for name in BEFORE_STEP:

@@ -53,16 +53,14 @@ class JointRows:
         """The rows of a joint as it is now; those that it has had, of the same two bodies, go on from there, and its
         angle unless it has just taken hold. Returns the bodies that it holds, or has held, and whether these are other
         rows."""
-        record, entity, span = self._record, joint.entity, self.span(joint.entity)
+        record, span = self._record, self.span(joint.entity)
         address = self._link(joint) if type(joint) in self._registry.joints else 0
         bodies, now = {joint.a, joint.b}, [(row.kind, row.rule, joint.a, joint.b) for row in rows]
         before = [tuple(getattr(record, name).item(j) for name in KEY[1:]) for j in range(span.start, span.stop)]
         if before != now:
             bodies.update(*(row[2:] for row in before))
             had = by_row({name: getattr(record, name)[span].copy() for name in (*KEY, *KEPT, *OF_PLUGINS)})
-            span = self._make_room(span, len(rows))
-            for j, key in enumerate(now, span.start):
-                record.joint[j], (record.kind[j], record.rule[j], record.entity_a[j], record.entity_b[j]) = entity, key
+            span = self.lay(joint, now)
             put_kept(record, span, had)
         if fresh and rows and rows[0].kind != GIVEN:
             record.value[span.start] = 0.0
@@ -77,6 +75,14 @@ class JointRows:
             record.breaking_force[j], record.breaking_torque[j] = force or math.inf, torque or math.inf
         self._keep_apart(joint)
         return bodies, before != now
+
+    def lay(self, joint: Joint, keys: list[Any]) -> slice:
+        """Rows that are known by these: kind, rule, entity a and entity b."""
+        record, entity, span = self._record, joint.entity, self._make_room(self.span(joint.entity), len(keys))
+        for j, key in enumerate(keys, span.start):
+            record.joint[j], (record.kind[j], record.rule[j], record.entity_a[j], record.entity_b[j]) = entity, key
+            record.breaking_force[j] = record.breaking_torque[j] = math.inf
+        return span
 
     def remove(self, entities: list[int]) -> None:
         """These joints have no rows any more."""

@@ -5,7 +5,9 @@ from __future__ import annotations
 import pytest
 from fuzz.programs import run
 
-FOUND = 3831, 4818  # once failed: a static body measured before anything turned; a push out of an overlap
+# Once failed: a static body measured before anything turned; a push out of an overlap; a joint that was moved before a
+# restore, and before a load.
+FOUND = 3831, 4818, 40165, 43525
 
 
 @pytest.mark.slow

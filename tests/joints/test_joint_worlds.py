@@ -335,3 +335,21 @@ def test_fast_boxes_pass_no_thin_wall_whether_something_holds_them_or_not(mode, 
         run(world, 8)
         assert at(world, box).x < 5.02, k
         world.close()
+
+
+def test_a_joint_that_is_to_take_hold_anew_goes_on_to_the_bit_after_restore():
+    """Its rows keep what they have borne, and are there at once."""
+    world, joints = joint_world()
+    ball = disc(world, (0, 0))
+    entity = world.create_entity(Hinge(None, ball, anchor=(0, 1)))
+    for _ in range(20):
+        world.step()
+    world.component_for_entity(entity, Hinge).anchor = (0.1, 1.2)
+    snapshot, seen = world.snapshot(), []
+    for _ in range(2):
+        impulse = joints.columns()["impulse"]
+        for _ in range(5):
+            world.step()
+        seen.append((len(joints), impulse.tobytes(), world.state_hash()))
+        world.restore(snapshot)
+    assert seen[0] == seen[1]
