@@ -322,6 +322,20 @@ def whole_body(contents: Any, body: Any) -> int:
     return body
 
 
+def ends_of(name: str) -> property:
+    """The property of that name: the fields ``lower`` and ``upper``."""
+
+    def get(self: Any) -> tuple[float | None, float | None] | None:
+        """The least and the most, None where there is no limit."""
+        return None if self.lower is self.upper is None else (self.lower, self.upper)
+
+    def put(self: Any, value: Any) -> None:
+        lower, upper = (None, None) if value is None else self._ends(name, value)
+        self.set_together(lower=lower, upper=upper)
+
+    return property(get, put)
+
+
 class Driven(Joint, abstract=True):
     """What has limits, a motor and a spring of its one free value."""
 
@@ -336,20 +350,12 @@ class Driven(Joint, abstract=True):
     damping_ratio: float = special_column(default=0.0, minimum=0.0, largest=MOST, kw_only=True)
     rest: float = special_column(default=0.0, kw_only=True, largest=MOST)
 
+    limits = ends_of("limits")
+
     def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:
         if limits is not None:
             values["lower"], values["upper"] = self._ends("limits", limits)
         super().__init__(*args, **values)
-
-    @property
-    def limits(self) -> tuple[float | None, float | None] | None:
-        """The least and the most, None where there is no limit."""
-        return None if self.lower is self.upper is None else (self.lower, self.upper)
-
-    @limits.setter
-    def limits(self, value: Any) -> None:
-        lower, upper = (None, None) if value is None else self._ends("limits", value)
-        self.set_together(lower=lower, upper=upper)
 
     def check(self) -> None:
         self.in_order("limits", self.lower, self.upper)

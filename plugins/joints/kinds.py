@@ -23,7 +23,7 @@ from ...systems.joints.records import (
     SPRING,
     TWIST,
 )  # fmt: skip
-from .joint import LEAST, MOST, UNLIMITED, WORLD, Driven, Joint, Place, Row, optional
+from .joint import LEAST, MOST, UNLIMITED, WORLD, Driven, Joint, Place, Row, ends_of, optional
 
 SQUARE = 1e-6  # cosine between directions that are at right angles
 
@@ -342,21 +342,12 @@ class Cone(Joint):
     swing: float = special_column(default=math.pi, minimum=0.0, kw_only=True)
     lower: float | None = optional(largest=MOST)
     upper: float | None = optional(largest=MOST)
+    twist = ends_of("twist")
 
     def __init__(self, *args: Any, twist: Any = None, **values: Any) -> None:
         if twist is not None:
             values["lower"], values["upper"] = self._ends("twist", twist)
         super().__init__(*args, **values)
-
-    @property
-    def twist(self) -> tuple[float | None, float | None] | None:
-        """The least and the most, None where there is no limit."""
-        return None if self.lower is self.upper is None else (self.lower, self.upper)
-
-    @twist.setter
-    def twist(self, value: Any) -> None:
-        lower, upper = (None, None) if value is None else self._ends("twist", value)
-        self.set_together(lower=lower, upper=upper)
 
     def check(self) -> None:
         self.in_order("twist", self.lower, self.upper)
