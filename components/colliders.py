@@ -13,6 +13,7 @@ from ..framework.typing import Vector, VectorField
 from ..framework.vectors import item, replace, scale
 
 ALL_LAYERS = -1  # every bit set
+BITS = ": bits of layers, as in 1 << 1 | 1 << 2"
 LONGEST = 1e150  # m: squares of it, and of distances of such shapes that meet, are finite
 # Arguments, checked like fields.
 LOWER = Column(item="vector", owner="AABBCollider", name="from_bounds lower")
@@ -70,9 +71,11 @@ class Collider(Component, abstract=True):
     sensor: bool = special_column(default=False, dtype=bool, kw_only=True, on_demand=True, also=("trigger",))
     layer: int = special_column(
         default=1, dtype=int, kw_only=True, on_demand=True, also=("category",),
-        nonzero="in no layer it meets nothing; mask=0 says so",
+        nonzero="in no layer it meets nothing; mask=0 says so", cure=BITS,
     )  # fmt: skip
-    mask: int = special_column(default=ALL_LAYERS, dtype=int, kw_only=True, on_demand=True, also=("collides_with",))
+    mask: int = special_column(
+        default=ALL_LAYERS, dtype=int, kw_only=True, on_demand=True, also=("collides_with",), cure=BITS
+    )
     group: int = special_column(
         default=0, dtype=int, kw_only=True, on_demand=True, also=("group_index", "collision_group")
     )

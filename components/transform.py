@@ -21,6 +21,8 @@ def _teleport(table: Any, row: int) -> None:
 def _turn_at_once(table: Any, row: int) -> None:
     """The same of an assigned rotation."""
     restart(table, row, ("rotation",))
+    if table.stops[0] <= row < table.stops[1]:
+        table.turned.add(int(table.column("entity")[row]))
 
 
 class Transform(Component, flat=True):

@@ -37,6 +37,7 @@ class Column:
     positive: bool = False
     minimum: float | None = None
     nonzero: str = ""  # why 0 is refused
+    cure: str = ""  # what is said of several numbers in place of one
     largest: float = LARGEST  # magnitude
     optional: bool = False  # None is allowed and stored as nan
     choices: tuple[str, ...] = ()  # stored as the index into it
@@ -115,7 +116,7 @@ class Column:
         array = self._as_numbers(value, entity)
         if array.ndim > (0 if self.item == "scalar" else 1):
             kind = "number or vector" if self.item == "angular" else self.item
-            raise self._error(value, f"must be one {kind}", entity)
+            raise self._error(value, f"must be one {kind}{self.cure}", entity)
         lengths, wanted = LENGTHS[self.item]
         if array.ndim == 1 and len(array) not in lengths:
             raise self._error(value, f"must be {wanted}", entity)
@@ -379,6 +380,7 @@ def special_column(
     on_write: Callable[[Any, int], None] | None = None,
     largest: float = LARGEST,
     nonzero: str = "",
+    cure: str = "",
     also: tuple[str, ...] = (),
     **options: Any,
 ) -> Any:
@@ -386,5 +388,5 @@ def special_column(
     return replace(
         column(default, kw_only=kw_only, **options),
         constructor=init, on_demand=on_demand, on_write=on_write, largest=largest, nonzero=nonzero,
-        also=also,
+        cure=cure, also=also,
     )  # fmt: skip

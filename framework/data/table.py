@@ -34,6 +34,7 @@ class Table(TableColumns):
         super().__init__(dimensions)
         self.clock: Any = None  # of the world
         self.version = 1  # changes whenever rows move
+        self.turned: set[int] = set()  # kinematic bodies whose rotation was assigned, for what looks at that
         self.members_version = 0  # changes whenever a body gains or loses a component
         self.static_version = 0  # changes whenever a static body does
         self.blocks = (0,) * BLOCKS  # first row after those that sleep, the dynamic, kinematic and static bodies

@@ -7,7 +7,7 @@ import math
 import numbers
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import Any, Self, TypeVar
+from typing import Any, Never, Self, TypeVar
 
 import esper
 
@@ -313,8 +313,13 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
 
     # -- time -------------------------------------------------------------------------------------
 
-    def step(self) -> None:
+    def step(self, *given: Never) -> None:
         """One fixed step of ``settings.dt``."""
+        if given:
+            raise TypeError(
+                f"step takes no time, got {given[0]!r}: each step is one of settings.dt, World(..., settings=Settings("
+                f"dt=1 / 60)); as many as fit into the seconds of a frame: world.advance(seconds)"
+            )
         if self.closed:
             self._open()
         self._pipeline.step()

@@ -178,7 +178,7 @@ class Parts(Plugin):
         for entity in lost:
             del places[entity]
         for entity, place in places.items():
-            self._check(entity, place.holder)
+            self._check(entity, place)
         if places or gone or lost:
             self._add_masses(places, [*gone, *lost])
         for entity, place in places.items():
@@ -212,8 +212,9 @@ class Parts(Plugin):
             columns[name].checked(getattr(part, name), entity)
         return Pose.of(part.position, part.rotation, self._physics.dimensions)
 
-    def _check(self, entity: int, holder: int) -> None:
+    def _check(self, entity: int, place: Place) -> None:
         """ValueError for a part that the body cannot have."""
+        holder, pose = place
         own, body = self._contents.entities.types_of(entity), self._contents.entities.types_of(holder)
         if Spin in own:
             raise ValueError(f"entity {entity}: a part turns with its body, entity {holder}: give that a Spin")
@@ -225,6 +226,19 @@ class Parts(Plugin):
         for component in own if new else ():
             if issubclass(component, Collider) and np.any(components[component].offset):
                 raise ValueError(f"entity {entity}: {component.__name__}.offset: give PartOf.position instead")
+        if new and self.world is not None:
+            self._tell_of_place(entity, components[Transform], self._contents.entities[holder][Transform], pose)
+
+    def _tell_of_place(self, entity: int, given: Transform, body: Transform, pose: Pose) -> None:
+        """A Transform that the game has given to a part, elsewhere than it will be."""
+        d = self._physics.dimensions
+        there = Pose.of(body.position, body.rotation, d).point(pose.position)
+        if np.any(given.position) and not any(np.allclose(given.position, p) for p in (body.position, there)):
+            self.world.report_fault(
+                f"entity {entity}: a part is where PartOf.position puts it on its body, its own Transform.position = "
+                f"{given.position.tolist()} is ignored: leave the Transform out",
+                kind="place of a part", entity=entity,
+            )  # fmt: skip
 
     def _add_masses(self, places: dict[int, Place], gone: list[int]) -> None:
         """What these add to the masses of their bodies, and no more what others have added."""

@@ -24,7 +24,9 @@ class Rotation(Plugin):
     def install(self, world: World) -> None:
         super().install(world)
         if world.physics is not None:
-            world.physics.extensions.followers.append(Slips(world.physics.table))
+            slips = Slips(world.physics.table)
+            world.physics.extensions.followers.append(slips)
+            world.physics.extensions.waiting.append(slips.waits)
 
 
 class Slips:
@@ -32,9 +34,12 @@ class Slips:
 
     def __init__(self, table: Any) -> None:
         self._table, self._seen, self._boxes_told = table, -1, False
+# kinematic bodies whose rotation was assigned before the last step: the new one, and whether it differed
+        self._turned: dict[int, tuple[Any, bool]] = {}
 
     def __call__(self, world: World) -> None:
         table = self._table
+        self._tell_of_flippers(world)
         seen = table.version + table.members_version  # these only grow
         if seen == self._seen:
             return
@@ -54,6 +59,29 @@ class Slips:
                 f"entity {entity[moves][boxes.argmax()]}: a dynamic body with a BoxCollider and no Spin never turns: "
                 f"give it a Spin(), or an AABBCollider if it is not to turn"
             )
+
+    def _tell_of_flippers(self, world: World) -> None:
+        """What a game turns step by step, while something touches it, pushes as if it stood still."""
+        table, spins, now = self._table, self._has(Spin), {}
+        for entity in sorted(table.turned):
+            row = table.row_of(entity)
+            if row < 0 or spins[row]:
+                continue
+            rotation = table.column("rotation")[row].tolist()
+            before, again = self._turned.get(entity, (rotation, False))
+            now[entity] = rotation, before != rotation
+            if before != rotation and again and world.contacts.of(entity):
+                world.report_fault(
+                    f"entity {entity}: a kinematic body whose Transform.rotation is set in each step, now {rotation}, "
+                    f"pushes as if its surface stood still: give it a Spin, and set angular_velocity",
+                    kind="turned by hand", entity=entity,
+                )  # fmt: skip
+        self._turned = now
+        table.turned.clear()
+
+    def waits(self) -> bool:
+        """Whether there is something to look at that shows in no version."""
+        return bool(self._table.turned or self._turned)
 
     def _has(self, component: type[Any]) -> np.ndarray:
         table = self._table

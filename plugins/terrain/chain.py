@@ -45,6 +45,8 @@ def create_chain(
         before[0], after[-2] = places[0], places[-1]
         starts, ends, before, after = starts[:-1], ends[:-1], before[:-1], after[:-1]
     middles = 0.5 * (starts + ends)
+    if world.physics is not None:
+        Facing.of(world).fresh = True
     return world.create_entities(
         len(middles),
         Transform.many(middles),
@@ -57,6 +59,40 @@ def create_chain(
             **material,
         ),
     )
+
+
+class Facing:
+    """Tells of chains in which nothing can stand, in the first step with the last of them: in a world whose statics are
+    chains alone, which are all solid above."""
+
+    def __init__(self) -> None:
+        self.fresh = True
+
+    @classmethod
+    def of(cls, world: Any) -> Facing:
+        followers = world.physics.extensions.followers
+        found = next((follower for follower in followers if type(follower) is cls), None)
+        if found is None:
+            found = cls()
+            followers.append(found)
+        return found
+
+    def __call__(self, world: Any) -> None:
+        if not self.fresh:
+            return
+        self.fresh, table = False, world.physics.table
+        statics = slice(table.stops[1], table.count)
+        if not table.has_mask(ChainSegmentCollider)[statics].all():
+            return
+        start, end = (table.column(f"chain_segment_collider.{name}")[statics] for name in ("start", "end"))
+        along, (x, y) = end - start, world.gravity
+        outward = along @ (y, -x)  # gravity times the length, out of the front, which is on the left
+        if 2.0 * outward.sum() > np.hypot(x, y) * np.hypot(*along.T).sum() and (outward >= 0.0).all():
+            world.report_fault(
+                f"entity {table.column('entity')[statics][0]}: all chains are solid above, where gravity is {(x, y)}: "
+                f"what is to lie on them falls through; draw ground from left to right, "
+                f"create_chain(world, points[::-1])"
+            )
 
 
 def bound(numbers: Any) -> str:

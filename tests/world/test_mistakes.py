@@ -73,6 +73,9 @@ REFUSED = [  # dimensions, what is done with a world, a body of it and its Spin,
      r"vertices must be at most 1e\+150 m, vertex 2"),
     (2, lambda w, e, s: create_chain(w, [(0, 0), (1, 1e200)]),
      r"points must be at most 1e\+150 m, point 1 is \(1.0, 1e\+200\)"),
+    (2, lambda w, e, s: w.step(1 / 60), r"step takes no time, got 0.016.*Settings\(dt=1 / 60\).*world.advance"),
+    (2, lambda w, e, s: SphereCollider(0.5, mask=[1, 2]),
+     r"SphereCollider.mask must be one scalar: bits of layers, as in 1 << 1 \| 1 << 2, got \[1, 2\]"),
 ]  # fmt: skip
 UNITS = [  # what is made, and the cure
     (lambda: Settings(dt=60), r"Settings.dt = 60 is in seconds: 60 steps a second are 1 / 60"),
@@ -173,3 +176,44 @@ def test_contacts_of_leave_out_what_has_been_deleted_as_pairs_do(at_once):
         assert seen[-1] == [right]
         world.delete_entity(player)
         assert world.contacts.of(player) == []
+
+
+def told_of(world, entity, text, each=lambda k: None):
+    """How many faults there are after 30 steps, and whether all tell that of the entity."""
+    for k in range(30):
+        each(k)
+        world.step()
+    assert all(fault.startswith(f"entity {entity}: {text}") for fault in world.faults)
+    return len(world.faults)
+
+
+def test_what_a_game_turns_by_hand_is_told_once_where_something_touches_it():
+    """A flipper; one that is placed anew now and then, or touches nothing, is not told, nor one that has a Spin."""
+    for told, every, height, spin in ((1, 1, 0.7, ()), (0, 5, 0.7, ()), (0, 1, 9.0, ()), (0, 1, 0.7, (Spin(),))):
+        with world_of(2, on_fault="ignore") as world:
+            placed = Transform((0, 0))
+            flipper = world.create_entity(placed, RigidBody(kind="kinematic"), BoxCollider((2, 0.2)), *spin)
+            world.create_entity(Transform((0.5, height)), RigidBody(), SphereCollider(0.5), Spin())
+
+            def turn(k, placed=placed, every=every):
+                placed.rotation = 0.01 * (k // every)
+
+            assert told_of(world, flipper, "a kinematic body whose Transform.rotation is set", turn) == told
+
+
+def test_chains_that_are_solid_above_are_told_in_the_first_step():
+    """A ceiling beside a floor is not."""
+    ground = np.array(((-5.0, 0.0), (0.0, -0.5), (5.0, 0.3)))
+    for told, chains in ((1, [ground[::-1]]), (0, [ground]), (0, [ground[::-1] + np.array((0, 5)), ground])):
+        with world_of(2, on_fault="ignore") as world:
+            first, *_ = [create_chain(world, points)[0] for points in chains]
+            assert told_of(world, first, "all chains are solid above") == told
+
+
+def test_the_place_of_a_part_that_is_ignored_is_told():
+    """Not where it is that of the body, or where the part belongs."""
+    for told, place in ((0, (0, 0)), (0, (3, 2)), (0, (4, 2)), (1, (7, 7))):
+        with world_of(2, on_fault="ignore") as world:
+            body = world.create_entity(Transform((3, 2)), RigidBody(), Spin(), BoxCollider((0.5, 0.5)))
+            part = world.create_entity(Transform(place), PartOf(body, (1, 0)), BoxCollider((0.5, 0.5)))
+            assert told_of(world, part, "a part is where PartOf.position puts it") == told
