@@ -316,9 +316,11 @@ class Column:
         """The stored value as users see it."""
         if self.choices:
             return self.choices[int(value)]
-        if self.optional and np.isscalar(value) and math.isnan(value):
-            return None
-        return value
+        if not self.optional:
+            return value
+        if type(value) is float:  # usual: a number that need not be given
+            return None if value != value else value
+        return None if np.isscalar(value) and math.isnan(value) else value
 
 
 def _holds_bool(value: Any) -> bool:

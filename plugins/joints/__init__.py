@@ -146,7 +146,7 @@ class Joints(Plugin):
         value, speed = self._measure(joints, found)
         return {name: column[own] for name, column in bears.items()} | {"value": value, "speed": speed}
 
-    def _bears(self, rows: slice) -> dict[str, np.ndarray]:
+    def _bears(self, rows: Any) -> dict[str, np.ndarray]:
         """What the joints of these rows have done in the last step."""
         record, dt = self._record, self.world.settings.dt if self.world else 1.0
         starts = np.flatnonzero(np.diff(record.joint[rows], prepend=WORLD))  # the first row of each
@@ -158,7 +158,7 @@ class Joints(Plugin):
         torque = torques[:, 0] if self._physics.dimensions == 2 else torques
         return {"entity": record.joint[rows][starts], "impulse": impulses, "torque": torque, "load": load}
 
-    def _given(self, rows: slice) -> tuple[np.ndarray, np.ndarray]:
+    def _given(self, rows: Any) -> tuple[np.ndarray, np.ndarray]:
         """The impulses and the torques of some rows, (k, d) each."""
         record, kind, total = self._record, self._record.kind[rows, None], self._record.total[rows, None]
         along, given = total * record.normal[rows], kind == GIVEN
@@ -412,8 +412,9 @@ class Joints(Plugin):
         if not self._breaking:
             return
         limits = np.minimum(*(getattr(self._record, name)[: self._record.count] for name in BREAKING))
-        self._breaking = bool((limits < np.inf).any())
-        bears, present = self._bears(slice(0, self._record.count)), self._present()
+        rows = np.flatnonzero(limits < np.inf)
+        self._breaking = len(rows) > 0
+        bears, present = self._bears(rows), self._present()
         broken = bears["entity"][bears["load"] > 1.0].tolist()
         self._end([(entity, present[entity]) for entity in broken if entity in present], "joint_broken")
 

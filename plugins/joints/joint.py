@@ -312,6 +312,8 @@ class Joint(Component, abstract=True):
 
 
 def _same(one: Any, other: Any) -> bool:
+    if type(one) is float is type(other):
+        return one == other
     return one == other if np.isscalar(one) and np.isscalar(other) else np.array_equal(one, other)
 
 

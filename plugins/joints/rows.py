@@ -56,7 +56,7 @@ class JointRows:
         record, span = self._record, self.span(joint.entity)
         address = self._link(joint) if type(joint) in self._registry.joints else 0
         bodies, now = {joint.a, joint.b}, [(row.kind, row.rule, joint.a, joint.b) for row in rows]
-        before = [tuple(getattr(record, name).item(j) for name in KEY[1:]) for j in range(span.start, span.stop)]
+        before = list(zip(*(getattr(record, name)[span].tolist() for name in KEY[1:]), strict=True))
         if before != now:
             bodies.update(*(row[2:] for row in before))
             had = by_row({name: getattr(record, name)[span].copy() for name in (*KEY, *KEPT, *OF_PLUGINS)})
@@ -66,13 +66,17 @@ class JointRows:
             record.value[span.start] = 0.0
         if address:
             self._put_own(joint, span, rows, address)
-        anchors, force, torque = (joint.at_a, joint.at_b), joint.breaking_force, joint.breaking_torque
+        anchors = joint.at_a, joint.at_b
+        anchor_a, anchor_b, axis = record.anchor_a, record.anchor_b, record.axis
         for j, row in enumerate(rows, span.start):
-            record.anchor_a[j], record.anchor_b[j] = row.ends or anchors
-            record.axis[j] = self._first if row.axis is None else row.axis
-            record.low[j], record.high[j], record.target[j], record.most[j] = row.low, row.high, row.target, row.most
-            record.frequency[j], record.damping_ratio[j] = row.frequency, row.damping_ratio
-            record.breaking_force[j], record.breaking_torque[j] = force or math.inf, torque or math.inf
+            anchor_a[j], anchor_b[j] = row.ends or anchors
+            axis[j] = self._first if row.axis is None else row.axis
+        for name in NUMBERS:
+            column = getattr(record, name)
+            for j, row in enumerate(rows, span.start):
+                column[j] = getattr(row, name)
+        record.breaking_force[span] = joint.breaking_force or math.inf
+        record.breaking_torque[span] = joint.breaking_torque or math.inf
         self._keep_apart(joint)
         return bodies, before != now
 
@@ -87,11 +91,15 @@ class JointRows:
     def remove(self, entities: list[int]) -> None:
         """These joints have no rows any more."""
         record = self._record
-        gone = np.isin(record.joint[: record.count], entities)
-        rows, rest = np.flatnonzero(gone), np.flatnonzero(~gone)
-        start, stop, left = rows[0], rows[-1] + 1, len(rest)
-        source = slice(stop, record.count) if stop - start == len(rows) else rest[start:]
-        for name in MOVED:
+        spans = [self.span(entity) for entity in entities]  # ascending, as their rows
+        start, left = spans[0].start, record.count - sum(span.stop - span.start for span in spans)
+        source: Any = slice(spans[0].stop, record.count)
+        if len(spans) > 1:
+            stays = np.ones(record.count, bool)
+            for span in spans:
+                stays[span] = False
+            source = np.flatnonzero(stays)[start:]
+        for name in MOVED if left > start else ():
             column = getattr(record, name)
             column[start:left] = column[source]
         self._changed(left)

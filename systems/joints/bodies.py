@@ -31,15 +31,26 @@ def left_out(state, i):
     return asleep or (i >= 0 and state.bodies.quarantined[i])
 
 
+@inlined
+def row_near(state, entity, row):
+    """The row of a body, or -1 of the world: most are where they were, or one row on."""
+    if entity == 0:
+        return -1
+    count, known = state.count, state.bodies.entity
+    for i in range(row - 1, row + 2):
+        if 0 <= i < count and known[i] == entity:
+            return i
+    return row_of(state, entity)
+
+
 @part
 def find_active(state):
     """The rows of joints that hold a body which may move, in their order."""
     joints, found = state.solver.joints, 0
     if joints.rows_version != state.version:
         for j in range(joints.count):
-            a, b = joints.entity_a[j], joints.entity_b[j]
-            joints.row_a[j] = row_of(state, a) if a > 0 else -1
-            joints.row_b[j] = row_of(state, b) if b > 0 else -1
+            joints.row_a[j] = row_near(state, joints.entity_a[j], joints.row_a[j])
+            joints.row_b[j] = row_near(state, joints.entity_b[j], joints.row_b[j])
         joints.rows_version = state.version
     for j in range(joints.count):
         a, b = joints.row_a[j], joints.row_b[j]
