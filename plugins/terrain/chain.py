@@ -82,7 +82,8 @@ class Facing:
             return
         self.fresh, table = False, world.physics.table
         statics = slice(table.stops[1], table.count)
-        if not table.has_mask(ChainSegmentCollider)[statics].all():
+        known = ChainSegmentCollider in table.mask_names  # not if it was gone before a step, as after a restore
+        if not (known and table.count > table.stops[1] and table.has_mask(ChainSegmentCollider)[statics].all()):
             return
         start, end = (table.column(f"chain_segment_collider.{name}")[statics] for name in ("start", "end"))
         along, (x, y) = end - start, world.gravity

@@ -210,6 +210,15 @@ def test_chains_that_are_solid_above_are_told_in_the_first_step():
             assert told_of(world, first, "all chains are solid above") == told
 
 
+def test_a_chain_that_is_gone_before_a_step_is_not_looked_at():
+    with world_of(2, on_fault="ignore") as world:
+        snapshot = world.snapshot()
+        create_chain(world, [(1, 0), (-1, 0)])
+        world.restore(snapshot)
+        world.step()
+        assert world.faults == []
+
+
 def test_the_place_of_a_part_that_is_ignored_is_told():
     """Not where it is that of the body, or where the part belongs."""
     for told, place in ((0, (0, 0)), (0, (3, 2)), (0, (4, 2)), (1, (7, 7))):
