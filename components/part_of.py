@@ -57,6 +57,9 @@ class PartOf(Component):
     added: float = special_column(default=0.0, init=False)
     holder: int = special_column(default=0, dtype=int, init=False)
     turn: RotationField = special_column(default=0.0, item="rotation", init=False)
+    # As in Spin: of the collider that it had last.
+    gyration: float | np.ndarray | None = special_column(default=None, item="angular", optional=True, init=False)
+    gyration_products: float | np.ndarray = special_column(default=0.0, item="angular", init=False)
 
     def check_in(self, contents: Any, entity: int | None, beside: Collection[type[Any]] = ()) -> None:
         """ValueError if its body is none, or is a part of this entity."""

@@ -14,7 +14,7 @@ from ..framework.errors import CaromError
 from ..framework.typing import Vector
 from ..framework.vectors import item
 from .colliders import AABBCollider, Collider
-from .part_of import rows_of_parts
+from .part_of import PartOf, rows_of_parts
 from .rigid_body import RigidBody, add_push, force_applied
 
 UNKNOWN = "Spin.inertia is None, and it has no collider that tells it, or several: give a number"
@@ -233,28 +233,30 @@ def inertia_without_parts(store: Any, row: Any, mass: float, turn: Any = 0.0) ->
     shape = mass_of_shape(store, row)
     if shape is not None:
         return shape.inertia(mass, turn)
-    if "spin.gyration" not in store.arrays or np.isnan(store.arrays["spin.gyration"][row]).any():
+    kind = "part_of" if PartOf in store.types_in(row) else "spin"
+    if f"{kind}.gyration" not in store.arrays or np.isnan(store.arrays[f"{kind}.gyration"][row]).any():
         return None
     if any(issubclass(component, Collider) for component in store.types_in(row)):
         return None
-    own, products = (store.arrays[f"spin.{name}"][row] for name in ("gyration", "gyration_products"))
+    own, products = (store.arrays[f"{kind}.{name}"][row] for name in ("gyration", "gyration_products"))
     if store.dimensions == 2:
         return mass * float(own)
     (xx, yy, zz), (xy, xz, yz) = own, products
-    return mass * np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
+    axes = axes_of(turn) if np.ndim(turn) else np.eye(3)
+    return axes @ (mass * np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))) @ axes.T
 
 
 def keep_gyration(store: Any, component: type[Component], rows: np.ndarray) -> None:
-    """Bodies that are about to lose that component turn on as they do if it was their only collider."""
-    if not issubclass(component, Collider) or Spin not in store.mask_names:
-        return
-    for row in rows[store.has_mask(Spin)[rows]].tolist():
-        shape = mass_of_shape(store, row)
-        if shape is not None:
-            tensor = shape.inertia(1.0)
-            own, products = store.make("spin.gyration"), store.make("spin.gyration_products")
-            own[row] = np.diagonal(tensor) if np.ndim(tensor) else tensor
-            products[row] = tensor[(0, 0, 1), (1, 2, 2)] if np.ndim(tensor) else 0.0
+    """Bodies and parts about to lose that component turn on as they do if it was their only collider."""
+    turning = {"spin": Spin, "part_of": PartOf} if issubclass(component, Collider) else {}
+    for kind, of in ((kind, of) for kind, of in turning.items() if of in store.mask_names):
+        for row in rows[store.has_mask(of)[rows]].tolist():
+            shape = mass_of_shape(store, row)
+            if shape is not None:
+                tensor = shape.inertia(1.0)
+                own, products = store.make(f"{kind}.gyration"), store.make(f"{kind}.gyration_products")
+                own[row] = np.diagonal(tensor) if np.ndim(tensor) else tensor
+                products[row] = tensor[(0, 0, 1), (1, 2, 2)] if np.ndim(tensor) else 0.0
 
 
 def spin_energy(store: Any, entities: np.ndarray) -> float:

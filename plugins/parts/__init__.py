@@ -355,6 +355,10 @@ class Parts(Plugin):
         record.mass[:count] = [self._added[entity][1] for entity in self._places]
         turns = np.reshape([place.pose.rotation for place in self._places.values()], (count, 1 if d == 2 else 4))
         record.turn[:count, : turns.shape[1]] = turns
+        rows, table = self._table.rows_of(record.entity[:count]), self._table
+        own, products = (table.column(f"part_of.{name}")[rows] for name in ("gyration", "gyration_products"))
+        record.kept[:count, 2 if d == 2 else slice(3)] = own  # nan where it has not lost one
+        record.kept[:count, 3:] = products if d == 3 else 0.0
 
     def _find_rows(self) -> None:
         """The rows of the parts and of their bodies."""

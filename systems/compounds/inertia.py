@@ -49,10 +49,15 @@ def inertia_of_compound(state, i, gyration):
     while k >= 0:
         p = bodies.part[k]
         if parts.mass[p] > 0.0:
-            if not tells_inertia(state, k):
+            m, kept = share * parts.mass[p], parts.kept
+            lost = not (state.collides and bodies.levels[state.level_count - 1, k] >= 0) and kept[p, 2] == kept[p, 2]
+            if lost:  # its collider, for a moment: as it was
+                tensor = m * kept[p, 0], m * kept[p, 1], m * kept[p, 2], m * kept[p, 3], m * kept[p, 4], m * kept[p, 5]
+            elif tells_inertia(state, k):
+                tensor = inertia_of_row(state, k, m)
+            else:
                 state.blamed = k + 1
                 raise ValueError(OF_PART)
-            tensor = inertia_of_row(state, k, share * parts.mass[p])
             if not plane:
                 turn = parts.turn[p, 0], parts.turn[p, 1], parts.turn[p, 2], parts.turn[p, 3]
                 tensor = turned_tensor(turn, tensor)

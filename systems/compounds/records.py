@@ -11,6 +11,7 @@ PARTS = Schema(
     body=ints(),  # the entity of the body that it belongs to, and moves with
     mass=floats(),  # kg
     turn=table("float64", 4),  # its rotation against the body: an angle, in space a quaternion w, x, y, z
+    kept=table("float64", 6),  # m^2, of the collider that it had last, as Spin.gyration; nan: of none
     rows_version=integer(),  # of the rows of bodies
     row=ints("int32"),
     body_row=ints("int32"),
