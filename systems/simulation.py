@@ -96,7 +96,8 @@ class Simulation:
         self.sleepers.box_now, self.table.on_changed_inside = self._box_now, self.sleepers.follow_change
         source.finish_found = lambda: self.program.run_one("finish_found", world.clock.dt)
         source.stored, source.disturb = self.sleepers.contacts, self.sleepers.disturb
-        self.wake, self.taken_out = self.sleepers.wake, self.quarantine.out_now
+        self.wake, self.notice_written = self.sleepers.wake, self.sleepers.notice_written
+        self.taken_out = self.quarantine.out_now
         self.attribute_errors = ErrorAttribution(
             world.registry, self.state, lambda: self.scene.linked.shapes if self.scene.linked else ()
         )

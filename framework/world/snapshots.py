@@ -128,6 +128,7 @@ def _check(snapshot: Snapshot, world: Any, physics: PhysicsServices) -> None:
 
 def state_hash(physics: PhysicsServices) -> str:
     """Of all values of all bodies' components, in order of the entity ids; 0.0 and -0.0 are the same."""
+    physics.notice_written()
     table = physics.table
     order = np.argsort(table.column("entity"), kind="stable")
     digest = hashlib.sha256(table.column("entity")[order].tobytes())

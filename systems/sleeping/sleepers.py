@@ -415,11 +415,16 @@ class Sleepers:
         self._dt = parts["dt"]
         state.asleep, state.due, state.fresh_statics, state.contacts.stored = parts["numbers"]
 
+    def notice_written(self) -> None:
+        """What code of the game has written into since the last step wakes."""
+        if self.on:
+            self._mark(self._lent.changed())
+
     def saved(self) -> dict[str, Any] | None:
         """For snapshots; also whether bodies have come or gone since the last step, and whether all wake."""
         if not self.on:
             return None
-        self._mark(self._lent.changed())
+        self.notice_written()
         followed = self._structure() == self._followed
         more = {"changes": list(self._changes)} if self._changes else {}
         seen = self._versions() == self._seen
