@@ -34,7 +34,7 @@ class Slips:
 
     def __init__(self, table: Any) -> None:
         self._table, self._seen, self._boxes_told = table, -1, False
-# kinematic bodies whose rotation was assigned before the last step: the new one, and whether it differed
+        # Kinematic bodies whose rotation was assigned before the last step: the new one, and whether it differed.
         self._turned: dict[int, tuple[Any, bool]] = {}
 
     def __call__(self, world: World) -> None:

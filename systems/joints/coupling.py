@@ -68,10 +68,10 @@ def multiplied(diagonal, others, v):
 
 
 @inlined
-def pushes_of(joints, j, impulse):
-    """(impulse, turn of a, turn of b) that a row which is no POINT gives its second body; the first one gets as much
-    back."""
-    along = scale(joints.normal[j], impulse)
+def pushes_of(joints, j):
+    """(impulse, turn of a, turn of b) that 1 N s or N m s of a row which is no POINT gives its second body; the first
+    one gets as much back."""
+    along = joints.normal[j]
     if joints.kind[j] >= TURN:
         return scale(along, 0.0), along, along
     return along, twist(joints.arm_a[j], along), twist(joints.arm_b[j], along)
@@ -111,7 +111,7 @@ def couple(solver, first, gives):
     for j in range(first + 1 if point else first, end_of(joints, first)):
         if gives > 0.0 and swings(joints, j):
             continue
-        along, turn_a, turn_b = pushes_of(joints, j, 1.0)
+        along, turn_a, turn_b = pushes_of(joints, j)
         push, spin_a, spin_b = along, change_of_spin(solver, a, turn_a), change_of_spin(solver, b, turn_b)
         whole = w * dot(along, along) + dot(turn_a, spin_a) + dot(turn_b, spin_b)
         answer = further = zero

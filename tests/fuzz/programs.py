@@ -345,9 +345,7 @@ class Game:
         world, bodies = self.world, self.world.bodies
         forces = np.any(world.gravity) or bodies.dynamic.constant_force.any()
         drives = forces or len(self.joints) or bodies.kinematic.linear_velocity.any() or world.get_component(PartOf)
-        if drives:
-            return np.inf
-        return (1.0 + 1e-9) * world.kinetic_energy() + 1e-9
+        return np.inf if drives else (1.0 + 1e-9) * world.kinetic_energy() + 1e-9
 
     def check(self) -> None:
         """After steps."""
