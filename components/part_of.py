@@ -13,8 +13,6 @@ from ..framework.typing import RotationField, VectorField
 from .rigid_body import RigidBody
 from .transform import Transform
 
-# kg, of the RigidBody of a part: what a part weighs is in its body's mass.
-WEIGHTLESS = 1e-200
 FARTHEST = 1e15  # m: further away a body of 1 m has no digits beside the arm
 
 
@@ -46,7 +44,7 @@ class PartOf(Component):
     plugin: ClassVar[str] = "parts"
     brings: ClassVar[Mapping[type[Component], Callable[[int], dict[str, Any]]]] = {
         Transform: lambda dimensions: {"position": (0.0,) * dimensions},
-        RigidBody: lambda dimensions: {"mass": WEIGHTLESS},
+        RigidBody: lambda dimensions: {},
     }
 
     body: int = special_column(dtype=int, minimum=1, on_write=_note)

@@ -12,6 +12,7 @@ from ..framework.data.component import Component
 from ..framework.data.table import KINDS
 from ..framework.typing import Vector, VectorField
 
+WEIGHTLESS = 1e-200  # kg, of the RigidBody of a part: what a part weighs is in its body's mass
 FASTEST = 1e307  # m/s along each axis: differences of two such velocities, and their lengths, are finite
 OF_A_SPIN = (
     "angular_velocity", "inertia", "moment", "angular_damping", "max_angular_speed", "rolling_friction", "torque",
@@ -134,7 +135,7 @@ class RigidBody(Component, flat=True):
         if at is not None:
             raise TypeError(AT_A_POINT.format("apply_impulse"))
         if self.kind == "dynamic":
-            self.linear_velocity = self.linear_velocity + self._vector(IMPULSE, impulse) / self.mass
+            self.linear_velocity = self.linear_velocity + self._vector(IMPULSE, impulse) / self._own_mass()
 
     def apply_force(self, force: Vector | float, *, at: None = None) -> None:
         """Push with ``force``, (d,) N; TypeError as of :meth:`apply_impulse`.
@@ -154,6 +155,14 @@ class RigidBody(Component, flat=True):
             store.make("force")[store.find(self._entity)] += push
         else:
             add_push(self, push, ("applied_force", "step_force"))
+
+    def _own_mass(self) -> float:
+        """kg; of a part that which it goes on with once it is none, also before the next step knows that it is none."""
+        store: Any = self._store
+        mass = self.mass
+        if mass == WEIGHTLESS and "part_of.added" in getattr(store, "arrays", ()):
+            return store.column("part_of.added").item(store.find(self._entity)) or 1.0
+        return mass
 
     def _vector(self, argument: Column, value: Any) -> Any:
         vector, velocity = argument.checked(value, self._entity), self.linear_velocity

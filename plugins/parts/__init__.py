@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...components import Collider, RigidBody, Transform
-from ...components.part_of import WEIGHTLESS, Changes, PartOf, rows_of_parts
+from ...components.part_of import Changes, PartOf, rows_of_parts
+from ...components.rigid_body import WEIGHTLESS
 from ...components.spin import Spin, mass_of_shape
 from ...framework import NoPhysicsError, Plugin, World
 from ...systems.compounds.records import PARTS

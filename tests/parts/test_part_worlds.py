@@ -20,7 +20,7 @@ from carom import (
     Transform,
     World,
 )
-from carom.components.part_of import WEIGHTLESS
+from carom.components.rigid_body import WEIGHTLESS
 from carom.framework.errors import StepError
 from carom.plugins import convex_polygon
 from carom.plugins.joints import Hinge, Joints, Weld
@@ -239,6 +239,30 @@ def test_what_breaks_off_flies_on_by_itself():
     assert world.component_for_entity(right, BoxCollider).offset == pytest.approx((0, 0))
     assert parts.of(body) == [left]
     assert momentum[0] == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize("mass", [None, 0.0, 4.0])
+def test_what_breaks_off_takes_impulses_at_once(mass):
+    """Mass and velocity are its own from the next step on; an impulse before that counts with them."""
+    world, _ = parts_world()
+    body = world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(1, 0)), SphereCollider(0.5))
+    part = world.create_entity(PartOf(body, (3, 0), mass=mass), SphereCollider(0.5))
+    world.step()
+    world.remove_component(part, PartOf)
+    body_of(world, part).apply_impulse((2, 4))
+    world.step()
+    own = mass or 1.0
+    assert body_of(world, part).mass == own
+    assert body_of(world, part).linear_velocity == pytest.approx((1 + 2 / own, 4 / own))
+
+
+def test_what_was_to_be_a_part_weighs_something():
+    world, _ = parts_world()
+    body = world.create_entity(Transform((0, 0)), RigidBody(), SphereCollider(0.5))
+    one, other = world.create_entities(2, PartOf.many(body=body, position=(3.0, 0.0)), SphereCollider.many(radius=0.3))
+    world.remove_component(one, PartOf)
+    world.step()
+    assert [body_of(world, entity).mass for entity in (body, one, other)] == [2.0, 1.0, WEIGHTLESS]
 
 
 def test_parts_of_parts_and_fields_that_change():
