@@ -160,7 +160,8 @@ def ask(solver, k, arms, asks):
     beyond = beyond if beyond < 0.0 else 0.0
     at_once = room / (h * bias_rate)
     at_once = at_once if at_once > deep else deep
-    near = at_once if hard else room
+    once = hard and (len(arms) == 0 or len(solver.normal[k]) == 2)  # what stands on three points would rock for ever
+    near = at_once if once else room
     push = deep + (beyond if beyond > least else least) if room < deep else near
     soft = (room <= OPEN * extent) & (not solver.parting[k])  # what was just closed, on either side of rounding
     wrong = excess_of(closing, opening, impulse) * dt > EXCESS * extent
