@@ -12,3 +12,10 @@ def root_of(island, i):
         island[i] = island[island[i]]
         i = island[i]
     return i
+
+
+@part
+def join_roots(island, i, k):
+    """Bodies i and k are in one island, which the first of its bodies stands for."""
+    one, other = root_of(island, i), root_of(island, k)
+    island[max(one, other)] = min(one, other)

@@ -303,6 +303,7 @@ CONTACTS = Schema(
 _fields = dict(SOLVER.fields)
 _fields.pop("starts")
 _fields.pop("joints")
+_fields.pop("direct")
 SOLVER_ARMS = Section("contact", "rotation", "bodies spin", **{name: _fields.pop(name) for name in ARMS})
 SOLVER_SPINS = Section("body at rest", "rotation", "bodies spin", **{name: _fields.pop(name) for name in TURNS})
 _split = list(_fields).index("bodies")

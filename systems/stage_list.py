@@ -3,6 +3,8 @@ docs/architecture.md read; and the parts of stages that are called by address.""
 
 from __future__ import annotations
 
+from functools import reduce
+
 from ..framework.schedule.stages import Rows, Stage
 from .broad_phase.boxes import bound_searches, box_rest_of_step, box_standing
 from .broad_phase.system import BroadPhase
@@ -104,7 +106,8 @@ def check_stages(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
             if name in TABLE_COLUMNS and name not in (*(kept[1] for kept in KEPT), *MADE_AGAIN):
                 raise ValueError(f"stage {stage.name} writes {name}, which a failed step does not put back")
         for rows in stage.room:
-            if not {*rows.columns} <= {*STATE.fields[rows.record].fields}:
+            record = reduce(lambda schema, name: schema.fields[name], rows.record.split("."), STATE)
+            if not {*rows.columns} <= {*record.fields}:
                 raise ValueError(f"stage {stage.name}: not all of its room is in record {rows.record}")
         if stage.needed not in (*CONDITIONS, stage.name):
             raise ValueError(f"stage {stage.name}: needed must be one of {', '.join(CONDITIONS)}, got {stage.needed!r}")

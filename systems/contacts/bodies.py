@@ -13,6 +13,7 @@ from ..compounds.stages import share_places
 from ..integration.trajectory import along, path_of
 from ..integration.turning import size_of_turn
 from ..joints.bodies import lay_joints
+from ..joints.records import DIRECT_BODIES
 from ..records import HELD, SOLVER_ARMS, SOLVER_BODIES, SOLVER_CONTACTS, SOLVER_SPINS
 from .constants import FREQUENCY, SAG, TIPPING_FREQUENCY, TIPPING_SAG
 from .points import points_of
@@ -82,6 +83,7 @@ ROOM_AT_REST = (
     Rows("solver", SOLVER_CONTACTS, rows_at_rest),
     Rows("solver", SOLVER_BODIES, bodies_at_rest),
     Rows("solver", SOLVER_ARMS, lambda s: rows_at_rest(s) if s.spinning else 0),
+    Rows("solver.direct", DIRECT_BODIES, lambda s: bodies_at_rest(s) if s.solver.joints.active > 0 else 0),
     Rows("solver", SOLVER_SPINS, lambda s: bodies_at_rest(s) if s.spinning else 0),
 )  # fmt: skip
 

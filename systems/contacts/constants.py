@@ -41,14 +41,18 @@ FINER_PASSES = 32  # less is; an island that may have more passes than these is 
 # Joints that hold: springs that the passes which push solve, and the others as if they were none.
 JOINT_FREQUENCY = 0.25  # times the rate of the substeps: a fixed one gains nothing by more of them
 JOINT_DAMPING_RATIO = 2.0
+MOST_RATIO = 16.0  # between the masses of joined bodies: above it joints are solved at once, as those of beams and
+BEND = 4.0  # frames are, which bend by this times the square of their welds as much as one
+STIFF = 1e3  # times as stiff those are,
+RIGID = 1e3  # and times that in the passes that do not push,
+MOST_RIGID = 1e11  # at most against their own masses: more is rounding
 SPRING_FREQUENCY = 0.125  # times the rate of the substeps: faster springs hold; with more, springs at a light body gain
 
 # The number of substeps of an island.
 MOST_SAG = 0.005  # extents: no contact sags more under the island's heaviest body,
-MOST_GIVE = 0.02  # of its length: no joint gives more under that body
+MOST_SWAY = 0.1  # of its length: no joint swings farther in a substep where it bears the heaviest body of joints
 LONG_WAY = 0.25  # extents per step, or rad of a limit: what strikes the bodies of joints faster would tear them in the
 JOLTED_SUBSTEPS = 32  # usual substeps
-BEND = 4.0  # times the square of the welds of an island: beams of them bend so much more than one
 OWN_SAG = 0.002  # nor a contact under one body alone: grains, whose contacts are hard
 STRUCK = 0.01  # extents per step: what closes slower strikes nothing
 STRIKE = 4.0  # substeps for each extent per step that a light body is closed on, times the ratio of masses

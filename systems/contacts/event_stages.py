@@ -92,7 +92,7 @@ def compare_contacts(state, dt):
     contacts.ends, contacts.begins, contacts.stays[now] = ends, begins, stays
     solver = state.solver
     faults = state.impacts.capped + state.impacts.halted + state.too_fast_for_discrete
-    faults += state.turns_too_far + solver.squeezed + solver.overloaded + solver.restrained
+    faults += state.turns_too_far + solver.squeezed + solver.overloaded + solver.restrained + solver.joints.torn
     staying = stays + contacts.stored if state.stay_wanted else 0
     state.event_count = ends + begins + staying + state.impacts.logged + faults
     return OK

@@ -293,6 +293,13 @@ class ContactEvents(StagedSystem):
                 f"steps, more substeps, or masses that differ less",
                 kind="restrained",
             )
+        if solver.joints.torn:
+            torn = int(solver.joints.torn_joint)
+            self.world.report_fault(
+                f"{solver.joints.torn} joints are torn open by more than a tenth of the size of a body, the first is "
+                f"entity {torn}: use more substeps, smaller steps, or less force and speed",
+                kind="torn", entity=torn,
+            )  # fmt: skip
         if impacts.halted:
             self.world.report_fault(
                 f"too many impacts for a step: {impacts.halted} bodies stood still for "

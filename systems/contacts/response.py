@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...framework.schedule.phases import Phase
-from ...framework.schedule.stages import Program, PythonPart, Stage
+from ...framework.schedule.stages import Program, PythonPart, Rows, Stage
 from ...framework.settings import Settings
 from ...framework.world.contacts import Contacts
 from ..compounds.stages import carry_parts
@@ -72,7 +72,7 @@ class Response(StagedSystem):
         ),
         Stage(
             solve_joined_contacts, "the same, with joints before the contacts", ("solver",), ("solver",),
-            "joints",
+            "joints", room=(Rows("solver.direct", ("values",), lambda s: s.solver.direct.blocks),),
         ),
         Stage(put_back, "where the resting bodies are at the end", ("solver",), MOTION, EITHER, REST),
         Stage(

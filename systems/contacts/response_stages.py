@@ -15,7 +15,8 @@ def begin_response(state, dt):
     unknown = state.sweeping and state.moved and state.neighbours_known_until < dt
     solver = state.solver
     state.response_idle = near + solver.joints.active + memory.counts[memory.now] == 0 and not unknown
-    solver.islands = solver.squeezed = solver.overloaded = solver.restrained = state.impacts.halted = 0
+    solver.islands = solver.squeezed = solver.overloaded = solver.restrained = solver.joints.torn = 0
+    state.impacts.halted = 0
     state.impacts_recorded = False
     if state.response_idle:
         return OK

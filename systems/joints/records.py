@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from ...framework.jit.records.schema import Schema, floats, integer, ints, number, vectors
+from ...framework.jit.records.schema import Column, Schema, flag, flags, floats, integer, ints, number, table, vectors
 
 POINT, LINE, SLIDE, TURN, ALIGN, CONE, TWIST, GIVEN = range(8)
 HOLD, LIMIT, DRIVE, SPRING, SERVO, FREE = range(6)
+MOST = 32  # neighbours of a body where joints are solved at once
 
 JOINTS = Schema(
     "Joints",
@@ -56,6 +57,8 @@ JOINTS = Schema(
     active=integer(),  # rows that take part, in the order of their ranges:
     order=ints("int32"),
     stream=ints("int32"),  # of each place: what holds points of an island, or all else of it
+    at_once=flags(),  # solved with all such of its island, see direct,
+    bears=floats(),  # and kg that it may have to bear, of angles times how far they bend
     open_row=ints("int32"),  # of these, those that further passes go over: so many
     opened=integer(),
     first=ints("int32"),  # places of the two bodies
@@ -68,6 +71,8 @@ JOINTS = Schema(
     axes_a=vectors(),  # of the bodies of a GIVEN, likewise: as many rows as there are dimensions
     soft_further=vectors(),
     axes_b=vectors(),
+    torn=integer(),  # joints that are wide open, and the first
+    torn_joint=integer(),
     # in a range
     begin=integer(),  # places in ``order``
     end=integer(),
@@ -98,3 +103,35 @@ JOINTS = Schema(
     soft_answer=vectors(),  # the same of those that give way, in the pass that pushes
     further=vectors(),  # and of those beyond as many as there are dimensions
 )
+
+# Islands whose joints are solved at once, by the places of their bodies; blocks of two bodies have rows of their own.
+DIRECT = Schema(
+    "Direct",
+    bodies=integer(),
+    body=ints("int32"),  # places in the order in which they go,
+    place=ints("int32"),  # and where each is in that
+    body_ends=ints("int32"),  # of each range
+    degree=ints("int32"),  # neighbours when it goes; -1: it has no such joint,
+    near=table("int32", MOST),  # these,
+    block=table("int32", MOST),  # and where their blocks are
+    blocks=integer(),
+    root=table("float64", 6),  # of its inverse inertia
+    diagonal=table("float64", 36),  # of the matrix, then its root
+    solution=table("float64", 6),
+    push=vectors(),  # N s
+    twist=vectors(),  # N m s
+    values=table("float64", 36),  # of a block
+    # of groups of bodies, by their first ones
+    light=floats(),  # 1/kg: inverse mass of the lightest body,
+    heavy=floats(),  # of the heaviest that a joint holds,
+    swing=floats(),  # and 1 / (kg m): largest one of a joint over its length
+    welds=ints("int32"),
+    freedom=ints("int32"),  # twice of what joints leave free, less one for each body
+    # in a range
+    begin=integer(),
+    end=integer(),
+    stiffer=number(),  # times as stiff as where the pass pushes
+    share=number(),  # of the errors of its joints that the pass pushes out
+    mixed=flag(),  # some of its rows are solved by passes
+)
+DIRECT_BODIES = [name for name, field in DIRECT.fields.items() if isinstance(field, Column) and name != "values"]

@@ -23,12 +23,15 @@ from ...framework.vectors import add, add_scaled, dot, item, length, replace, sc
 from ..contacts.constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY, SPRING_FREQUENCY
 from ..integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
 from .coupling import answer_at, couple, first_of, giving_of, holds, is_answered, multiplied, swings
+from .direct import bound_push, factorise, solve_direct
 from .given import measure_given, push_given, speed_of_given
+from .order import is_rigid
 from .records import ALIGN, DRIVE, GIVEN, LIMIT, POINT, SERVO, SLIDE, TURN, TWIST
 
 FULL_TURN = 2.0 * math.pi
 FOLDED = 1e-2  # 1 + cosine of a swing: beyond it a twist is nearly any angle
 LEAST_SHARE = 1e-9  # of its mass that a spring without damping takes part with
+TORN = 0.2  # of the reach of a body from its centre: a joint that is open by more is told
 BRAKES = 0.9  # of the speed from which a servo could just stop in time
 
 
@@ -70,10 +73,9 @@ def spring_of(angle, ratio, together):
 
 
 @part
-def start_joints(solver, h, period, usual):
-    """The joints of a range start with the forces that they had, in substeps of h. They are as stiff as in substeps of
-    ``period``, whatever blows ask for: changes of it would give energy to what is stretched. What is stiffer than
-    ``usual`` pushes errors out at the usual rate."""
+def start_joints(solver, h, period):
+    """The joints of a range start with the forces that they had, in substeps of h. They are as stiff as in the usual
+    ``period``, whatever contacts ask for: changes of it would give energy to what is stretched."""
     joints = solver.joints
     joints.step, joints.moved_for, joints.fastest = h, 0.0, SPRING_FREQUENCY / period
     count_springs(solver)
@@ -87,7 +89,7 @@ def start_joints(solver, h, period, usual):
             joints.push_rate[j], joints.mass_scale[j], joints.impulse_scale[j] = rate / h, mass_scale, 1.0 - mass_scale
             continue
         omega = 2.0 * math.pi * JOINT_FREQUENCY / period
-        damping = 2.0 * JOINT_DAMPING_RATIO * usual / period + h * omega
+        damping = 2.0 * JOINT_DAMPING_RATIO + h * omega
         stiffness = joints.stiffness = h * omega * damping
         joints.push_rate[j] = omega / damping
         holding = holds(joints, j)
@@ -363,8 +365,8 @@ def solve_row(solver, j, pushes):
 
 
 @part
-def solve_joints(solver, pushes):
-    """One pass over the joints of a range."""
+def pass_over_joints(solver, pushes):
+    """One pass over the joints of a range that are not solved at once."""
     joints, columns, velocity, spin = solver.joints, columns_of(solver), solver.velocity, solver.spin
     order, kind, first, second = joints.order, joints.kind, joints.first, joints.second
     arm_a, arm_b, gap, push, most = joints.arm_a, joints.arm_b, joints.gap, joints.push, joints.most
@@ -372,7 +374,7 @@ def solve_joints(solver, pushes):
     rate, mass_scale, impulse_scale = joints.push_rate, joints.mass_scale, joints.impulse_scale
     for e in range(joints.begin, joints.end):
         j = order[e]
-        if not pushes and swings(joints, j):
+        if (not pushes and swings(joints, j)) or joints.at_once[j]:
             continue
         if kind[j] != POINT:
             solve_row(solver, j, pushes)
@@ -396,13 +398,27 @@ def solve_joints(solver, pushes):
 
 
 @part
+def solve_joints(solver, pushes):
+    """One pass over the joints of a range; where they are solved at once two, as those that are not know of them."""
+    pass_over_joints(solver, pushes)
+    if solver.direct.begin < solver.direct.end:
+        factorise(solver, pushes)
+        if pushes:
+            bound_push(solver, solver.joints.step)
+        solve_direct(solver, pushes)
+        if solver.direct.mixed:
+            pass_over_joints(solver, pushes)
+            solve_direct(solver, pushes)
+
+
+@part
 def relax_open(solver):
     """A pass without pushing over the joints of islands whose contacts have further passes, as they have."""
     joints, columns = solver.joints, columns_of(solver)
     for e in range(joints.opened):
         j = joints.open_row[e]
         a, b = joints.first[j], joints.second[j]
-        if swings(joints, j):
+        if swings(joints, j) or joints.at_once[j]:
             continue
         if joints.kind[j] != POINT:
             solve_row(solver, j, False)
@@ -414,6 +430,8 @@ def relax_open(solver):
             new = scale(new, limit * joints.step / size)
         joints.push[j] = new
         push_apart(columns, (a, b), (joints.arm_a[j], joints.arm_b[j]), sub(new, old))
+    if solver.direct.begin < solver.direct.end:
+        solve_direct(solver, False)
 
 
 @part
@@ -425,6 +443,17 @@ def add_joints(solver):
         j = order[e]
         total[j] += impulse[j]
         thrust[j] = add(thrust[j], push[j])
+
+
+@inlined
+def is_torn(solver, j):
+    """Whether a joint is wide open where the step ends, against the size of its smaller body."""
+    joints = solver.joints
+    a, b, reach = joints.first[j], joints.second[j], math.inf
+    for q in (a, b):
+        if solver.inverse_mass[q] > 0.0 and solver.reach[q] > 0.0:
+            reach = min(reach, solver.reach[q])
+    return is_rigid(joints, j) and length(joints.gap[j]) > TORN * reach
 
 
 @part
@@ -439,3 +468,5 @@ def keep_joints(solver, dt):
         pull, most = scale(joints.push[j], by), length(joints.thrust[j]) / dt
         size = length(pull)
         joints.pull[j] = scale(pull, most / size) if size > most else pull
+        if joints.kind[j] == POINT and is_torn(solver, j):
+            joints.torn, joints.torn_joint = joints.torn + 1, joints.joint[j] if joints.torn == 0 else joints.torn_joint

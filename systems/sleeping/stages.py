@@ -10,7 +10,7 @@ from ...framework.vectors import dot, item, length, sub
 from ..codes import LOOK, OK, WAKE, WAKE_TOUCHED
 from ..compounds.rows import has_parts, next_row, owner_of
 from ..forces.stages import is_zero
-from ..islands import root_of
+from ..islands import join_roots, root_of
 from ..shapes.tolerances import contact_margin
 
 # Values of ``bodies.still``. FALLING: its first step asleep is the next one. What cannot be moved is still, too.
@@ -282,20 +282,17 @@ def join_islands(state, dt, needed):
         a, b = min(pairs.a[c], pairs.b[c]), max(pairs.a[c], pairs.b[c])
         awake = b < state.dynamic and still[a] == AWAKE and still[b] == AWAKE
         if awake and pairs.is_solid[c] and (pairs.near_contact[c] or wakes(state, dt, c, reach)):
-            one, other = root_of(root, a), root_of(root, b)
-            root[max(one, other)] = min(one, other)
+            join_roots(root, a, b)
     for i in range(state.first, state.dynamic if state.compound else state.first):
         if owner_of(state, i) != i:
             keeps_awake[i] = False
-            one, other = root_of(root, i), root_of(root, owner_of(state, i))
-            root[max(one, other)] = min(one, other)
+            join_roots(root, i, owner_of(state, i))
     joints = state.solver.joints
     for e in range(joints.active):
         a, b = joints.row_a[joints.order[e]], joints.row_b[joints.order[e]]
         low, high = min(a, b), max(a, b)
         if low >= state.first and high < state.dynamic:
-            one, other = root_of(root, low), root_of(root, high)
-            root[max(one, other)] = min(one, other)
+            join_roots(root, low, high)
     for k in range(pairs.disabled_count):
         for i in (pairs.a[pairs.disabled[k]], pairs.b[pairs.disabled[k]]):
             if i < state.dynamic:

@@ -18,21 +18,21 @@ from ....framework.vectors import add, dot, length, sub
 from ...bits import lowest_bit
 from ...compounds.rows import owner_of, place_of
 from ...integration.turning import arms_to, velocity_by_spin
-from ...islands import root_of
-from ...joints.records import HOLD, LIMIT, LINE, POINT, TURN
+from ...islands import join_roots, root_of
+from ...joints.order import choose_direct, order_direct
+from ...joints.records import LIMIT, TURN
 from ...narrow_phase.manifolds import centre_offset_at_start
 from ...shapes.tolerances import smaller_extent
 from ..constants import (
-    BEND,
     FURTHER_PASSES,
     FURTHER_WORK,
     JOLTED_SUBSTEPS,
     LEAST_FURTHER_PASSES,
     LEAST_WORK_SUBSTEPS,
     LONG_WAY,
-    MOST_GIVE,
     MOST_SAG,
     MOST_SUBSTEPS,
+    MOST_SWAY,
     OWN_SAG,
     SAG,
     STRIKE,
@@ -53,7 +53,7 @@ def number_body(state, i):
     if place[i] < 0:
         q = solver.bodies
         place[i] = q
-        solver.body_row[q], solver.used[q], solver.island[q] = i, 0, q
+        solver.body_row[q], solver.used[q], solver.island[q], solver.group[q] = i, 0, q, q
         solver.bodies += 1
     return place[i]
 
@@ -86,8 +86,7 @@ def colour_rows(state):
         if moves_b:
             used[q] |= 1 << colour
         if moves_a and moves_b:
-            one, other = root_of(island, p), root_of(island, q)
-            island[max(one, other)] = min(one, other)
+            join_roots(island, p, q)
         chosen = 2 * colour + (r + 1 < solver.contacts and solver.point[r + 1] > 0)
         solver.colour[r] = chosen
         starts[chosen + 1] += 1
@@ -97,14 +96,14 @@ def colour_rows(state):
 
 @part
 def join_bodies(state):
-    """Number the bodies of joints, which join islands as contacts do."""
-    joints, island, inverse_mass = state.solver.joints, state.solver.island, state.bodies.inverse_mass
+    """Number the bodies of joints, which join islands as contacts do, and groups, which contacts do not join."""
+    joints, inverse_mass = state.solver.joints, state.bodies.inverse_mass
     for e in range(joints.active):
         a, b = joints.row_a[joints.order[e]], joints.row_b[joints.order[e]]
         p, q = number_body(state, a) if a >= 0 else -1, number_body(state, b) if b >= 0 else -1
         if p >= 0 and q >= 0 and inverse_mass[a] > 0.0 and inverse_mass[b] > 0.0:
-            one, other = root_of(island, p), root_of(island, q)
-            island[max(one, other)] = min(one, other)
+            join_roots(state.solver.island, p, q)
+            join_roots(state.solver.group, p, q)
 
 
 @part
@@ -117,9 +116,8 @@ def island_of_joint(state, j):
 
 @part
 def weigh_joint(state, j, dt):
-    """How much a row of joints gives way, for its size, under a force on it; and whether its bodies turn so fast that
-    a limit strikes them."""
-    solver, joints, inverse_mass, spin = state.solver, state.solver.joints, state.bodies.inverse_mass, state.bodies.spin
+    """Count a row of joints for its island, and find whether its bodies turn so fast that a limit strikes them."""
+    solver, joints, spin = state.solver, state.solver.joints, state.bodies.spin
     a, b, t = joints.row_a[j], joints.row_b[j], island_of_joint(state, j)
     solver.jointed[t] = True
     solver.links[t] += 1
@@ -128,15 +126,6 @@ def weigh_joint(state, j, dt):
         nothing = zero_of(state)
         turned = sub(spin[b] if b >= 0 else nothing, spin[a] if a >= 0 else nothing)
         solver.jolted[t] |= length(turned) * dt > LONG_WAY
-    w_a, w_b = inverse_mass[a] if a >= 0 else 0.0, inverse_mass[b] if b >= 0 else 0.0
-    solver.borne[t] = min(solver.borne[t], w_a if w_a > 0.0 else w_b, w_b if w_b > 0.0 else w_a)
-    solver.welds[t] += joints.kind[j] == TURN and joints.rule[j] == HOLD
-    if joints.kind[j] <= LINE and joints.rule[j] <= LIMIT:
-        size = joints.low[j] if joints.rule[j] == HOLD else joints.high[j]
-        if joints.kind[j] == POINT:
-            reach_a = length(joints.anchor_a[j]) if w_a > 0.0 else 0.0
-            size = max(reach_a, length(joints.anchor_b[j]) if w_b > 0.0 else 0.0)
-        solver.give[t] = max(solver.give[t], (w_a + w_b) / size if size > 0.0 else 0.0)
 
 
 @part
@@ -160,8 +149,7 @@ def number_islands(state, dt):
             solver.stiff[t] = solver.own[t] = solver.strike[t] = solver.taken[t] = 0.0
             solver.size_of[t], solver.leader[t] = 0, i
             solver.driven[t], solver.jolted[t], solver.credit[t] = False, False, 0.0
-            solver.jointed[t], solver.give[t], solver.borne[t], solver.welds[t] = False, 0.0, math.inf, 0
-            solver.links[t] = 0
+            solver.jointed[t], solver.at_once[t], solver.sway[t], solver.links[t] = False, False, 0.0, 0
         solver.number[q] = t
         change = sub(velocity[i], start[i])
         if warm_started[i]:
@@ -175,6 +163,7 @@ def number_islands(state, dt):
         island[q] = solver.number[q]
     for e in range(solver.joints.active):
         weigh_joint(state, solver.joints.order[e], dt)
+    choose_direct(state)
 
 
 @part
@@ -207,18 +196,17 @@ def choose_substeps(solver, t, usual, dt):
     Its contacts may have to bear its heaviest body: the sag under that falls with the square of the substeps, what one
     is struck by goes in by 1 / substeps. Where the own weight of bodies asks for too many, contacts are hard. What the
     most substeps cannot bear counts as lighter, see ``bears``. From masses, not from impulses, which would change with
-    the substeps; by factors of two, so that it seldom changes. Joints may have to bear the heaviest body of joints.
+    the substeps; by factors of two, so that it seldom changes. Where light bodies of joints
+    bear heavy ones these swing fast.
     """
     sag, least = SAG * solver.most_change[t] * dt, usual
-    pulled = sag * solver.give[t] * max(1.0, BEND * solver.welds[t] ** 2) / (solver.borne[t] * MOST_GIVE)
-    while float(least * least) < pulled and 2 * least <= LEAST_WORK_SUBSTEPS:
+    while MOST_SWAY * float(least * least) < sag * solver.sway[t] and 2 * least <= LEAST_WORK_SUBSTEPS:
         least *= 2
-    solver.stiffness_of[t] = least
     if solver.jolted[t]:
         least = max(least, JOLTED_SUBSTEPS)
     if solver.size_of[t] == 0:  # it has joints alone
         solver.substeps_of[t], solver.hard_of[t], solver.passes[t], solver.bears[t] = least, False, 0, math.inf
-        return least > usual
+        return least > usual or solver.at_once[t]
     rows = solver.size_of[t] + solver.links[t]
     own = sag * solver.own[t] / OWN_SAG
     need = sag * solver.stiff[t] / (solver.lightest[t] * MOST_SAG)
@@ -235,7 +223,7 @@ def choose_substeps(solver, t, usual, dt):
     solver.substeps_of[t], solver.hard_of[t] = substeps, hard
     solver.passes[t] = max(LEAST_FURTHER_PASSES, min(FURTHER_PASSES, FURTHER_WORK // rows))
     solver.bears[t] = float(substeps * substeps) / need if need > 0.0 else math.inf
-    return substeps > usual or hard
+    return substeps > usual or hard or solver.at_once[t]
 
 
 @part
@@ -367,3 +355,4 @@ def order_rows(state, dt):
         solver.joint_ends[s] = 0
     if solver.joints.active > 0:
         order_joints(state)
+        order_direct(solver)

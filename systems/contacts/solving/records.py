@@ -14,7 +14,7 @@ from ....framework.jit.records.schema import (
     table,
     vectors,
 )  # fmt: skip
-from ...joints.records import JOINTS
+from ...joints.records import DIRECT, JOINTS
 
 SOLVER = Schema(
     "Solver",
@@ -87,6 +87,7 @@ SOLVER = Schema(
     used=ints(),  # colours of its rows; later a row, or after how many further passes it was changed
     number=ints("int32"),
     island=ints("int32"),  # -1: cannot be moved
+    group=ints("int32"),  # of what joints join
     velocity=vectors(),
     velocity_before=vectors(),  # of a substep, without contacts
     shift=vectors(),  # m since the step began
@@ -141,11 +142,9 @@ SOLVER = Schema(
     driven=flags(),  # by motors or springs, which give energy
     jolted=flags(),  # so fast struck that its joints need more substeps
     credit=floats(),  # J that joints have taken in this step, and may give back
-    give=floats(),  # 1 / (kg m): largest inverse mass of a joint over its length
-    borne=floats(),  # inverse mass of the heaviest body of joints
-    welds=ints("int32"),
+    at_once=flags(),  # some of its joints are solved at once
+    sway=floats(),  # 1/m: how fast light bodies of joints swing that bear heavy ones, see direct
     links=ints("int32"),  # rows of joints
-    stiffness_of=ints("int32"),  # its joints are as stiff as with so many substeps
     # ranges: the ordinary islands, then each special one
     ranges=integer(),
     usual=integer(),  # substeps,
@@ -165,6 +164,7 @@ SOLVER = Schema(
     restrained=integer(),  # first bodies of islands to which contacts would have given much energy
     restrained_row=integer(),
     joints=JOINTS,
+    direct=DIRECT,
 )
 
 ARMS = (

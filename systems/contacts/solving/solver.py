@@ -15,6 +15,7 @@ from ....framework.compilation import packed, part
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add, add_scaled, dot, scale
 from ...codes import OK
+from ...joints.direct import solve_direct
 from ...joints.rows import add_joints, keep_joints, measure_joints, solve_joints, start_joints, warm_start_joints
 from ..constants import (
     DAMPING_RATIO,
@@ -139,6 +140,8 @@ def solve_substep(solver, springs, most, dt, h, kind, ends, span):
     solve_pass(solver, solver.pushing, True, 1.0, span)
     if stiff:
         converge(solver, True, h, span)
+    if len(span[4]) > 1 and solver.direct.begin < solver.direct.end and start < stop:
+        solve_direct(solver, True)
     move(solver, h, span)
     if solver.lightened:
         weigh_down(solver, h, span)
@@ -152,6 +155,8 @@ def solve_substep(solver, springs, most, dt, h, kind, ends, span):
         solve_pass(solver, opening, False, OVER if one < last else 1.0, span)
     if stiff:
         converge(solver, False, h, span)
+    if len(span[4]) > 1 and solver.direct.begin < solver.direct.end and start < stop:
+        solve_direct(solver, False)
     finish_substep(solver, springs[0][1], any_struck, h, dt, span)
     if solver.lightened:
         weigh_down(solver, 0.0, span)
@@ -237,8 +242,7 @@ def solve_range(solver, substeps, kind, dt, span):
         sag = LOADED * solver.sag * solver.impulse[k] * h / solver.mass[k]
         solver.loaded[k] = 0.0 if stiff else min(sag, MOST_LOADED * solver.extent[k])
     if len(span[4]) > 1:
-        period = dt / (solver.stiffness_of[solver.island[span[2]]] if special else solver.usual)
-        start_joints(solver, h, period, dt / solver.usual)
+        start_joints(solver, h, dt / solver.usual)
     measure(solver, h, springs, dt, stiff, False, span)
     most = most_impulse(solver, solver.island[span[2]], substeps) if special else math.inf
     for step in range(substeps):
@@ -301,6 +305,8 @@ def advance(state, dt, arms):
         if len(arms) > 1:
             solver.joints.begin = solver.joints.end if special else 0
             solver.joints.end = solver.joint_ends[s]
+            solver.direct.begin = solver.direct.end if special else 0
+            solver.direct.end = solver.direct.body_ends[s]
             any_joint = solver.joints.begin < solver.joints.end
         if span[1] > start or any_joint:
             substeps, kind = state.substeps, ORDINARY

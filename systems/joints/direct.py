@@ -1,0 +1,349 @@
+"""Joints of an island that are solved all at once, by elimination of one body after the other (Cholesky).
+
+Passes over one joint after the other let heavy loads, beams and towers of joints give way. Where these hold without a
+limit their equations are solved as they are: of all velocities those are taken that least change the motion, in the
+measure of kinetic energy, and what goes into the joints, which are soft springs where the pass pushes and nearly rigid
+where it does not. In the measure u with v = R u, where R R' are the inverse masses, this is (1 + J' W J) u = J' W b.
+
+Bodies with few neighbours go first: in trees no other pair of bodies than those of joints appears. An island in which
+a body would have more than MOST neighbours is solved by passes, as all others are.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ...framework.compilation import inlined, part
+from ...framework.jit.stack_arrays import stack_array
+from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
+from ..contacts.constants import MOST_RIGID, RIGID
+from ..integration.turning import change_of_spin, cross_spin, twist
+from .given import speed_of_given
+from .order import NO_BLOCK, block_of, freedoms
+from .records import GIVEN, POINT, TURN
+
+PUSHES, RELAXES, RESULT_OF, ERRORS = 0, 1, 2, -2  # what is asked of rows; even: errors are pushed out
+
+
+@part
+def lay_root(solver, q):
+    """The root of the inverse inertia of a body: below the diagonal, row by row."""
+    root, d, p = solver.direct.root, solver.inverse_inertia[q], solver.inverse_products[q]
+    if len(d) == 2:
+        root[q, 0] = math.sqrt(item(d, 0))
+        return
+    last = len(d) - 1
+    a = math.sqrt(max(0.0, item(d, 0)))
+    b = item(p, 0) / a if a > 0.0 else 0.0
+    c = item(p, 1) / a if a > 0.0 else 0.0
+    e = math.sqrt(max(0.0, item(d, 1) - b * b))
+    f = (item(p, last) - b * c) / e if e > 0.0 else 0.0
+    root[q, 0], root[q, 1], root[q, 2], root[q, 3], root[q, 4] = a, b, e, c, f
+    root[q, 5] = math.sqrt(max(0.0, item(d, last) - c * c - f * f))
+
+
+@inlined
+def to_measure(solver, q, push, turn, out):
+    """R' times an impulse and an angular impulse of body q."""
+    root, d = solver.direct.root, len(push)
+    w = math.sqrt(solver.inverse_mass[q])
+    for k in range(d):
+        out[k] = w * item(push, k)
+    if d == 2:
+        out[2] = root[q, 0] * item(turn, 0)
+    else:
+        x, y, z = item(turn, 0), item(turn, 1), item(turn, d - 1)
+        out[3] = root[q, 0] * x + root[q, 1] * y + root[q, 3] * z
+        out[4] = root[q, 2] * y + root[q, 4] * z
+        out[5] = root[q, 5] * z
+
+
+@inlined
+def from_measure(solver, q, like):
+    """(velocity, spin) of the solution of body q: R times that."""
+    root, x, d = solver.direct.root, solver.direct.solution, len(like)
+    w, v, spin = math.sqrt(solver.inverse_mass[q]), like, scale(like, 0.0)
+    for k in range(d):
+        v = replace(v, k, w * x[q, k])
+    if d == 2:
+        return v, replace(spin, 0, root[q, 0] * x[q, 2])
+    spin = replace(spin, 0, root[q, 0] * x[q, 3])
+    spin = replace(spin, 1, root[q, 1] * x[q, 3] + root[q, 2] * x[q, 4])
+    return v, replace(spin, d - 1, root[q, 3] * x[q, 3] + root[q, 4] * x[q, 4] + root[q, 5] * x[q, 5])
+
+
+@inlined
+def pushes_at(joints, j, k):
+    """(impulse of a, its turn, impulse of b, its turn) that 1 N s or N m s of row j gives; of a POINT its axis k."""
+    along, kind = joints.normal[j], joints.kind[j]
+    if kind == GIVEN:
+        return joints.along_a[j], joints.turn_a[j], along, joints.turn_b[j]
+    zero = scale(along, 0.0)
+    if kind >= TURN:
+        return zero, scale(along, -1.0), zero, along
+    if kind == POINT:
+        along = replace(zero, k, 1.0)
+    return scale(along, -1.0), scale(twist(joints.arm_a[j], along), -1.0), along, twist(joints.arm_b[j], along)
+
+
+@inlined
+def weight_of(solver, j):
+    """How stiff a row is: as if it bore the heaviest body of its group; of angles, at the end of a beam of welds."""
+    joints, a, b = solver.joints, solver.joints.first[j], solver.joints.second[j]
+    w = max(solver.inverse_mass[a], solver.inverse_mass[b])
+    share = min(solver.direct.stiffer * joints.stiffness * joints.bears[j] * w, MOST_RIGID)
+    if joints.kind[j] < TURN:
+        return share / w
+    if joints.kind[j] == GIVEN:
+        return share * joints.mass[j]
+    axis = joints.normal[j]
+    moved = dot(axis, change_of_spin(solver, a, axis)) + dot(axis, change_of_spin(solver, b, axis))
+    return share / moved if moved > 0.0 else 0.0
+
+
+@part
+def add_row(solver, j, weight):
+    """J' W J of row j."""
+    joints, direct = solver.joints, solver.direct
+    a, b, zero = joints.first[j], joints.second[j], scale(joints.normal[j], 0.0)
+    n, of_a, of_b = freedoms(zero), stack_array(6, 0.0), stack_array(6, 0.0)
+    moves_a, moves_b = solver.island[a] >= 0, solver.island[b] >= 0
+    block, first = NO_BLOCK, a
+    if moves_a and moves_b:
+        first = a if direct.place[a] < direct.place[b] else b
+        block = block_of(direct, first, b if first == a else a)
+    for axis in range(len(zero) if joints.kind[j] == POINT else 1):
+        push_a, turn_a, push_b, turn_b = pushes_at(joints, j, axis)
+        if moves_a:
+            to_measure(solver, a, push_a, turn_a, of_a)
+            for i in range(n):
+                by = weight * of_a[i]
+                for k in range(i + 1):
+                    direct.diagonal[a, n * i + k] += by * of_a[k]
+        if moves_b:
+            to_measure(solver, b, push_b, turn_b, of_b)
+            for i in range(n):
+                by = weight * of_b[i]
+                for k in range(i + 1):
+                    direct.diagonal[b, n * i + k] += by * of_b[k]
+        if block != NO_BLOCK:
+            for i in range(n):
+                for k in range(n):
+                    if first == a:
+                        direct.values[block, n * i + k] += weight * of_a[i] * of_b[k]
+                    else:
+                        direct.values[block, n * i + k] += weight * of_b[i] * of_a[k]
+
+
+@part
+def factorise_body(direct, q, n):
+    """The root of the diagonal block of body q, and its blocks with those that go after it divided by that. What is
+    left of 1 + J' W J is never less than 1, but for rounding."""
+    diagonal, values = direct.diagonal, direct.values
+    for i in range(n):
+        for k in range(i + 1):
+            left = diagonal[q, n * i + k]
+            for m in range(k):
+                left -= diagonal[q, n * i + m] * diagonal[q, n * k + m]
+            diagonal[q, n * i + k] = math.sqrt(max(1.0, left)) if i == k else left / diagonal[q, n * k + k]
+    for e in range(direct.degree[q]):
+        block = direct.block[q, e]
+        for i in range(n):
+            for m in range(i):
+                by = diagonal[q, n * i + m]
+                for k in range(n):
+                    values[block, n * i + k] -= by * values[block, n * m + k]
+            by = 1.0 / diagonal[q, n * i + i]
+            for k in range(n):
+                values[block, n * i + k] *= by
+
+
+@part
+def take_from_pair(direct, one, other, p, o, n):
+    """What is left between bodies p and o where their blocks with a body that goes are these."""
+    values = direct.values
+    if p == o:
+        for m in range(n):
+            for i in range(n):
+                by = values[one, n * m + i]
+                for k in range(i + 1):
+                    direct.diagonal[p, n * i + k] -= by * values[one, n * m + k]
+        return
+    if direct.place[p] > direct.place[o]:
+        one, other, p, o = other, one, o, p
+    block = block_of(direct, p, o)
+    for m in range(n):
+        for i in range(n):
+            by = values[one, n * m + i]
+            for k in range(n):
+                values[block, n * i + k] -= by * values[other, n * m + k]
+
+
+@part
+def factorise(solver, pushes):
+    """The root of the matrix of a range, for a pass that pushes or not."""
+    joints, direct = solver.joints, solver.direct
+    n = freedoms(solver.velocity[solver.bodies])
+    for e in range(direct.begin, direct.end):
+        q = direct.body[e]
+        lay_root(solver, q)
+        for i in range(n):
+            for k in range(i):
+                direct.diagonal[q, n * i + k] = 0.0
+            direct.diagonal[q, n * i + i] = 1.0
+        for k in range(direct.degree[q]):
+            for i in range(n * n):
+                direct.values[direct.block[q, k], i] = 0.0
+    direct.stiffer, direct.mixed = 1.0 if pushes else RIGID, False
+    for e in range(joints.begin, joints.end):
+        j = joints.order[e]
+        if joints.at_once[j]:
+            add_row(solver, j, weight_of(solver, j))
+        else:
+            direct.mixed = True
+    for e in range(direct.begin, direct.end):
+        q = direct.body[e]
+        factorise_body(direct, q, n)
+        for k in range(direct.degree[q]):
+            for i in range(k + 1):
+                take_from_pair(
+                    direct, direct.block[q, i], direct.block[q, k], direct.near[q, i], direct.near[q, k], n
+                )
+
+
+@inlined
+def note_push(direct, q, push, turn, impulse):
+    direct.push[q] = add_scaled(direct.push[q], push, impulse)
+    direct.twist[q] = add_scaled(direct.twist[q], turn, impulse)
+
+
+@inlined
+def speed_of(solver, j):
+    """How fast the value of a row that is no POINT changes."""
+    joints, a, b = solver.joints, solver.joints.first[j], solver.joints.second[j]
+    if joints.kind[j] == GIVEN:
+        return speed_of_given(solver, j)
+    turning = sub(solver.spin[b], solver.spin[a])
+    if joints.kind[j] >= TURN:
+        return dot(joints.normal[j], turning)
+    v_a = add(solver.velocity[a], cross_spin(solver.spin[a], joints.arm_a[j]))
+    return dot(joints.normal[j], sub(add(solver.velocity[b], cross_spin(solver.spin[b], joints.arm_b[j])), v_a))
+
+
+@part
+def note_rows(solver, what):
+    """What rows ask for, as impulses of their bodies; in the end these are the impulses that they get.
+
+    what: ERRORS, of the errors that they push out alone; PUSHES and RELAXES with the velocities as they are; RESULT_OF
+    either with those of the solution.
+    """
+    joints, direct = solver.joints, solver.direct
+    errors, pushes, ends = what == ERRORS, what % 2 == 0, what >= RESULT_OF
+    for q in range(direct.begin, direct.end):
+        direct.push[direct.body[q]] = direct.twist[direct.body[q]] = scale(solver.velocity[solver.bodies], 0.0)
+    for e in range(joints.begin, joints.end):
+        j = joints.order[e]
+        if not joints.at_once[j]:
+            continue
+        a, b, weight = joints.first[j], joints.second[j], weight_of(solver, j)
+        if joints.kind[j] == POINT:
+            v_a = add(solver.velocity[a], cross_spin(solver.spin[a], joints.arm_a[j]))
+            speed = sub(add(solver.velocity[b], cross_spin(solver.spin[b], joints.arm_b[j])), v_a)
+            speed = scale(speed, 0.0) if errors else speed
+            if pushes:
+                speed = add_scaled(speed, joints.gap[j], direct.share * joints.push_rate[j])
+            change = scale(speed, -weight)
+            if pushes and not errors:
+                change = sub(change, joints.push[j])
+            if ends:
+                joints.push[j] = add(joints.push[j], change)
+            note_push(direct, a, change, twist(joints.arm_a[j], change), -1.0)
+            note_push(direct, b, change, twist(joints.arm_b[j], change), 1.0)
+            continue
+        asked = direct.share * joints.pushing[j] if pushes else joints.opening[j]
+        change = weight * (asked - (0.0 if errors else speed_of(solver, j)))
+        if pushes and not errors:
+            change -= joints.impulse[j]
+        if ends:
+            joints.impulse[j] += change
+        push_a, turn_a, push_b, turn_b = pushes_at(joints, j, 0)
+        note_push(direct, a, push_a, turn_a, change)
+        note_push(direct, b, push_b, turn_b, change)
+
+
+@part
+def divide(solver, n):
+    """The solution for the impulses of the bodies: first what is asked of each, then how it moves."""
+    direct, out = solver.direct, stack_array(6, 0.0)
+    diagonal, values, x = direct.diagonal, direct.values, direct.solution
+    for e in range(direct.begin, direct.end):
+        q = direct.body[e]
+        to_measure(solver, q, direct.push[q], direct.twist[q], out)
+        for k in range(n):
+            x[q, k] = out[k]
+    for e in range(direct.begin, direct.end):
+        q = direct.body[e]
+        for i in range(n):
+            for k in range(i):
+                x[q, i] -= diagonal[q, n * i + k] * x[q, k]
+            x[q, i] /= diagonal[q, n * i + i]
+        for m in range(direct.degree[q]):
+            block, p = direct.block[q, m], direct.near[q, m]
+            for i in range(n):
+                for k in range(n):
+                    x[p, k] -= values[block, n * i + k] * x[q, i]
+    for e in range(direct.end - 1, direct.begin - 1, -1):
+        q = direct.body[e]
+        for m in range(direct.degree[q]):
+            block, p = direct.block[q, m], direct.near[q, m]
+            for i in range(n):
+                for k in range(n):
+                    x[q, i] -= values[block, n * i + k] * x[p, k]
+        for i in range(n - 1, -1, -1):
+            for k in range(i + 1, n):
+                x[q, i] -= diagonal[q, n * k + i] * x[q, k]
+            x[q, i] /= diagonal[q, n * i + i]
+
+
+@part
+def bound_push(solver, h):
+    """What share of their errors the joints push out in a substep: as bodies turn they move along circles, and what
+    they stray by that from where they are pushed is to be less than the errors."""
+    joints, direct, zero = solver.joints, solver.direct, scale(solver.velocity[solver.bodies], 0.0)
+    error = strays = 0.0
+    direct.share = 1.0
+    note_rows(solver, ERRORS)
+    divide(solver, freedoms(zero))
+    for e in range(direct.begin, direct.end):
+        q = direct.body[e]
+        _, direct.twist[q] = from_measure(solver, q, zero)
+    for e in range(joints.begin, joints.end):
+        j = joints.order[e]
+        if not joints.at_once[j]:
+            continue
+        point = joints.kind[j] == POINT
+        error = max(error, h * (joints.push_rate[j] * length(joints.gap[j]) if point else abs(joints.pushing[j])))
+        for q, arm in ((joints.first[j], joints.arm_a[j]), (joints.second[j], joints.arm_b[j])):
+            if joints.kind[j] < TURN and solver.island[q] >= 0:
+                turn = h * length(direct.twist[q])
+                strays = max(strays, turn * turn * length(arm))
+    direct.share = error / strays if error < strays else 1.0
+
+
+@part
+def solve_direct(solver, pushes):
+    """The joints of a range that are solved at once."""
+    direct, zero, what = solver.direct, scale(solver.velocity[solver.bodies], 0.0), PUSHES if pushes else RELAXES
+    note_rows(solver, what)
+    divide(solver, freedoms(zero))
+    for e in range(direct.begin, direct.end):
+        q = direct.body[e]
+        v, spin = from_measure(solver, q, zero)
+        solver.velocity[q], solver.spin[q] = add(solver.velocity[q], v), add(solver.spin[q], spin)
+    note_rows(solver, what + RESULT_OF)
+    for e in range(direct.begin, direct.end):  # what the impulses make of it, to the last bit
+        q = direct.body[e]
+        v, spin = from_measure(solver, q, zero)
+        v = sub(scale(direct.push[q], solver.inverse_mass[q]), v)
+        spin = sub(change_of_spin(solver, q, direct.twist[q]), spin)
+        solver.velocity[q], solver.spin[q] = add(solver.velocity[q], v), add(solver.spin[q], spin)

@@ -1,0 +1,170 @@
+"""Which joints are solved at once, see direct, and the order in which the bodies of their islands go."""
+
+from __future__ import annotations
+
+import math
+
+from ...framework.compilation import inlined, part
+from ...framework.jit.records.record_type import zero_of
+from ...framework.vectors import length
+from ..compounds.rows import place_of
+from ..contacts.constants import BEND, MOST_RATIO, STIFF
+from ..islands import root_of
+from .records import HOLD, LIMIT, LINE, MOST, POINT, TURN
+
+NO_BLOCK = -1
+
+
+@inlined
+def freedoms(v):
+    """Numbers of the motion of a body."""
+    return 3 * (len(v) - 1)
+
+
+@inlined
+def is_rigid(joints, j):
+    """Whether a row holds its value, whatever force that takes."""
+    return joints.rule[j] == HOLD and joints.most[j] == math.inf
+
+
+@part
+def weigh_group(state, j):
+    """What a row of joints is to the group of its bodies, by whose first one that is known; returns that."""
+    solver, joints, inverse_mass = state.solver, state.solver.joints, state.bodies.inverse_mass
+    direct, a, b = solver.direct, joints.row_a[j], joints.row_b[j]
+    w_a, w_b = inverse_mass[a] if a >= 0 else 0.0, inverse_mass[b] if b >= 0 else 0.0
+    g = root_of(solver.group, place_of(state, a if w_a > 0.0 else b))
+    direct.light[g] = max(direct.light[g], max(w_a, w_b))
+    direct.heavy[g] = min(direct.heavy[g], w_a if w_a > 0.0 else w_b, w_b if w_b > 0.0 else w_a)
+    direct.welds[g] += joints.kind[j] == TURN and joints.rule[j] == HOLD
+    if is_rigid(joints, j):
+        direct.freedom[g] -= 2 * (len(joints.normal[j]) if joints.kind[j] == POINT else 1)
+    if joints.kind[j] <= LINE and joints.rule[j] <= LIMIT:
+        size = joints.low[j] if joints.rule[j] == HOLD else joints.high[j]
+        if joints.kind[j] == POINT:
+            reach_a = length(joints.anchor_a[j]) if w_a > 0.0 else 0.0
+            size = max(reach_a, length(joints.anchor_b[j]) if w_b > 0.0 else 0.0)
+        direct.swing[g] = max(direct.swing[g], (w_a + w_b) / size if size > 0.0 else 0.0)
+    return g
+
+
+@part
+def choose_direct(state):
+    """Joints are solved at once where masses differ much, in beams and frames; from what is joined alone, as another
+    way to solve what is stretched would give energy."""
+    solver, joints, island = state.solver, state.solver.joints, state.solver.island
+    direct, free = solver.direct, 2 * freedoms(zero_of(state)) - 1
+    for q in range(solver.bodies if joints.active > 0 else 0):
+        direct.light[q], direct.heavy[q], direct.swing[q], direct.welds[q], direct.freedom[q] = 0.0, math.inf, 0.0, 0, 0
+    for q in range(solver.bodies if joints.active > 0 else 0):
+        direct.freedom[root_of(solver.group, q)] += free
+    for e in range(joints.active):
+        weigh_group(state, joints.order[e])
+    for e in range(joints.active):
+        j = joints.order[e]
+        a = joints.row_a[j]
+        q = place_of(state, a if a >= 0 and state.bodies.inverse_mass[a] > 0.0 else joints.row_b[j])
+        g, t = root_of(solver.group, q), island[q]
+        light, heavy, bend = direct.light[g], direct.heavy[g], max(1.0, BEND * direct.welds[g] ** 2)
+        chosen = light > MOST_RATIO * heavy or direct.welds[g] > 1 or direct.freedom[g] < 0
+        joints.at_once[j] = chosen and is_rigid(joints, j)
+        joints.bears[j] = STIFF / heavy * (bend if joints.kind[j] >= TURN else 1.0)
+        solver.at_once[t] |= joints.at_once[j]
+        solver.sway[t] = max(solver.sway[t], direct.swing[g] / heavy)
+
+
+@inlined
+def block_of(direct, q, p):
+    """The block of body q, which goes first, and p; NO_BLOCK if there is none."""
+    for k in range(direct.degree[q]):
+        if direct.near[q, k] == p:
+            return direct.block[q, k]
+    return NO_BLOCK
+
+
+@part
+def note_near(direct, q, p, block):
+    """Body q has a neighbour more; returns whether there is room for it."""
+    k = direct.degree[q]
+    if k == MOST:
+        return False
+    direct.near[q, k], direct.block[q, k], direct.degree[q] = p, block, k + 1
+    return True
+
+
+@part
+def join_pair(direct, q, p):
+    """A block for two bodies, unless they have one; returns whether there is room for it."""
+    if block_of(direct, q, p) != NO_BLOCK:
+        return True
+    block = direct.blocks
+    direct.blocks += 1
+    return note_near(direct, q, p, block) and note_near(direct, p, q, block)
+
+
+@part
+def leave(direct, q, p):
+    """Body q, which goes, is no neighbour of p any more."""
+    last = direct.degree[p] - 1
+    for k in range(last + 1):
+        if direct.near[p, k] == q:
+            direct.near[p, k], direct.block[p, k] = direct.near[p, last], direct.block[p, last]
+            break
+    direct.degree[p] = last
+
+
+@part
+def eliminate(direct, q):
+    """Body q goes: its neighbours become neighbours of each other. Returns whether there is room for that."""
+    direct.place[q], direct.body[direct.bodies] = direct.bodies, q
+    direct.bodies += 1
+    for k in range(direct.degree[q]):
+        leave(direct, q, direct.near[q, k])
+    for k in range(direct.degree[q]):
+        for i in range(k):
+            if not join_pair(direct, direct.near[q, i], direct.near[q, k]):
+                return False
+    return True
+
+
+@part
+def order_island(solver, begin, end, rows_begin, rows_end):
+    """The order in which the bodies of a range go, those with few neighbours first; returns whether there is one."""
+    joints, direct, island = solver.joints, solver.direct, solver.island
+    for q in range(begin, end):
+        direct.degree[q] = direct.place[q] = -1
+    for e in range(rows_begin, rows_end):
+        j = joints.order[e]
+        if joints.at_once[j]:
+            a, b = joints.first[j], joints.second[j]
+            for q in (a, b):
+                if island[q] >= 0:
+                    direct.degree[q] = max(0, direct.degree[q])
+            if island[a] >= 0 and island[b] >= 0 and not join_pair(direct, a, b):
+                return False
+    for least in range(MOST + 1):
+        for one in range(begin, end):
+            q = one
+            while q >= 0 and direct.place[q] < 0 and 0 <= direct.degree[q] <= least:
+                if not eliminate(direct, q):
+                    return False
+                following = -1
+                for k in range(direct.degree[q]):  # chains go on from their ends
+                    if direct.degree[direct.near[q, k]] <= least:
+                        following = direct.near[q, k]
+                q = following
+    return True
+
+
+@part
+def order_direct(solver):
+    """The order of the bodies of all islands with joints that are solved at once; by passes, where there is none."""
+    joints, direct, begin, rows_begin = solver.joints, solver.direct, 0, 0
+    direct.bodies = direct.blocks = 0
+    for s in range(solver.ranges):
+        end, rows_end, first, blocks = solver.body_ends[s], solver.joint_ends[s], direct.bodies, direct.blocks
+        if s > 0 and solver.at_once[solver.special[s]] and not order_island(solver, begin, end, rows_begin, rows_end):
+            direct.bodies, direct.blocks = first, blocks
+            for e in range(rows_begin, rows_end):
+                joints.at_once[joints.order[e]] = False
+        direct.body_ends[s], begin, rows_begin = direct.bodies, end, rows_end
