@@ -48,14 +48,11 @@ clean:
 	$(PYTHON) -m venv .venv || { $(PYTHON) -m venv --clear --without-pip .venv && $(PYTHON) -m pip --python $@ install --quiet pip; }
 
 STUDIES := $(BIN)/python -m studies
-ACCURACY := spring orbit jump bouncing stack thermal_gas
+ACCURACY := spring orbit jump bouncing stack thermal_gas billiards
 
 figures: .venv/bench  # measure again what the tables and charts of docs/tables show
 	for scene in $(ACCURACY); do \
-	  $(STUDIES) accuracy $$scene --against pymunk --out out/$$scene --into docs/tables/accuracy.md || exit 1; \
+	  $(STUDIES) accuracy $$scene --out docs/pictures --into docs/tables/accuracy.md || exit 1; \
 	done
-	$(STUDIES) accuracy billiards --out out/billiards --into docs/tables/accuracy.md
-	cp $(foreach scene,$(filter-out bouncing,$(ACCURACY)) billiards,out/$(scene)/trade-$(scene)-*-work.png) docs/pictures/
-	cp out/bouncing/trade-bouncing-*-time.png docs/pictures/
 	$(STUDIES) limits --long --into docs/tables/limits.md --out docs/pictures
 	$(STUDIES) settings --into docs/tables/settings.md

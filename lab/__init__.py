@@ -11,21 +11,17 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .inputs import Inputs
     from .limits.step_length import step_limits, suggest_dt
-    from .trading.answer import Target
-    from .trading.records import Trade
-    from .trading.trade import Only, trade
+    from .trading.trade import Trade, trade
 
 _MODULES = {
     "Inputs": "inputs",
-    "Only": "trading.trade",
-    "Target": "trading.answer",
-    "Trade": "trading.records",
+    "Trade": "trading.trade",
     "step_limits": "limits.step_length",
     "suggest_dt": "limits.step_length",
     "trade": "trading.trade",
 }
 
-__all__ = ["Inputs", "Only", "Target", "Trade", "step_limits", "suggest_dt", "trade"]
+__all__ = ["Inputs", "Trade", "step_limits", "suggest_dt", "trade"]
 
 
 def __getattr__(name: str) -> Any:

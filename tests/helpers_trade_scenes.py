@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
 from pathlib import Path
 
 HEAD = '''"""{first_line}"""
-import multiprocessing, os, signal
 from pathlib import Path
 import numpy as np
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
@@ -72,27 +68,8 @@ def build(settings, seed=0):
     return world
 '''
 
-# Kills its own process when it builds the scene: the first few times.
-DEADLY = BALL.replace(
-    "    world = World",
-    '''    marks = Path(__file__).with_suffix(".marks")
-    marks.mkdir(exist_ok=True)
-    if multiprocessing.parent_process() is not None and len(list(marks.iterdir())) < {times}:
-        (marks / str(os.getpid())).touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    world = World''',
-    1,
-)
-
-
 def scene_file(folder: Path, text: str, name: str = "mine.py", first_line: str = "A scene of one's own.") -> str:
     """Write the file; returns its path as typed on the command line."""
     path = folder / name
     path.write_text(HEAD.format(first_line=first_line) + text, encoding="utf-8")
     return str(path)
-
-
-def dies(task: object) -> None:
-    """Replaces `perform`: kills its process, which must not be that of the tests."""
-    assert multiprocessing.parent_process() is not None
-    os.kill(os.getpid(), signal.SIGKILL)

@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from ...framework import Settings
-from ...framework.settings import COLLISION_MODES, GEOMETRY_MODES
+from ...framework.settings import COLLISION_MODES
 from .usage_errors import Problem, did_you_mean, one_line
 
 WORDS = "carom.words"  # key for the words of a command line: see KeepsWords
@@ -278,7 +278,7 @@ case_options = together(
 only_options = together(
     click.option(
         "--integrators", metavar="NAME,NAME", callback=listed("--integrators", "names", str),
-        help="Only these (default: all that differ in the scene; so for the next three).",
+        help="Only these (default: all that differ in the scene; so for the next two).",
     ),
     click.option(
         "--collisions", metavar="NAME,NAME",
@@ -289,22 +289,15 @@ only_options = together(
         "--substeps", metavar="N,N", callback=listed("--substeps", "whole numbers from 1", whole_number),
         help="Only these of the solver.",
     ),
-    click.option(
-        "--geometry", "geometries", metavar="NAME,NAME",
-        callback=listed("--geometry", "names", one_of("--geometry", GEOMETRY_MODES)),
-        help=f"Only these of {', '.join(GEOMETRY_MODES)}.",
-    ),
 )  # fmt: skip
 
 # -- execution of runs ------------------------------------------------------------------------------------------
 
-thorough_option = click.option("--thorough", is_flag=True, help="All steps and all repeats: minutes to hours.")
 runs_options = together(
-    thorough_option,
     click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Processes (default: one a core)."),
     click.option("--cluster", metavar="ADDRESS", help="Run on the workers of this dask.distributed scheduler."),
     click.option(
-        "--runs", "kept", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
-        default=Path("out/runs.sqlite"), show_default=True, help="Finished runs are kept here, and used again.",
+        "--runs", "kept", type=click.Path(path_type=Path, file_okay=False), metavar="FOLDER",
+        default=Path("out/runs"), show_default=True, help="Finished runs are kept here, and used again.",
     ),
-)
+)  # fmt: skip

@@ -1,27 +1,23 @@
-"""carom and pymunk behind one interface, so that both are measured in the same way."""
+"""A running world as measurements see it."""
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ...components.spin import Spin
 from ...framework import World
-from ..measure.body_shapes import Enclosure, Floats, moving_rows, overlaps_of, sensor_entities, sizes_of
+from ..measure.body_shapes import Enclosure, Floats, sensor_entities, sizes_of
 from ..measure.timing import timed
-from ..trading.records import PYMUNK
-from .pymunk_space import PymunkSpace
 
 MOST_TOUCHES = 400  # pairs whose first contact is kept
 
 
-class Engine(ABC):
-    """A running scene. Bodies are the dynamic ones there are, ascending by entity id, which is the order of creation.
+class CaromEngine:
+    """A running world. Bodies are the dynamic ones there are, ascending by entity id, which is the order of creation.
 
     After a step: ``impulse`` N s on static bodies, ``times`` s of the impacts of the step, ``struck`` (n,) true for
     bodies that have had an impact or a contact since the start. ``spent`` s on the clock of ``measure.timing`` for
@@ -42,21 +38,25 @@ class Engine(ABC):
         self.times: list[float] = []
         self.struck = np.zeros(len(self.ids), bool)
         self.spent = self.timed_seconds = 0.0
+        self._bodies = np.array(world.bodies.entity)
+        self._sensors = [sensor_entities(world)]  # and those before the last change: what is touched may be deleted
 
     @property
     def time(self) -> float:
         """Seconds since the start."""
         return self.world.time
 
-    @abstractmethod
     def step(self, dt: float) -> None:
         """One step of ``dt`` seconds."""
-
-    def _timed(self, step: Callable[[], Any], dt: float) -> None:
-        seconds, valid, _ = timed(step)
+        world = self.world
+        if world.settings.dt != dt:
+            world.settings = world.settings.replace(dt=dt)
+        before = world.time
+        seconds, valid, _ = timed(world.step)
         if valid:
             self.spent += seconds
             self.timed_seconds += dt
+        self.take_in(before)
 
     def follow(self) -> None:
         """Take up which bodies there are now."""
@@ -89,10 +89,6 @@ class Engine(ABC):
         kinetic = self.world.kinetic_energy()
         return kinetic, kinetic + self.world.potential_energy()
 
-    @abstractmethod
-    def overlaps(self) -> Floats:
-        """(k,) depths of the overlapping pairs, in sizes of the smaller body."""
-
     @cached_property
     def sizes(self) -> dict[int, float]:
         """The smallest extent of each entity that has a built-in shape."""
@@ -104,37 +100,16 @@ class Engine(ABC):
         known = [self.sizes[e] for e in self.ids.tolist() if e in self.sizes]
         return min(known, default=0.0) or float(np.abs(self.position).max(initial=0.0)) or 1.0
 
-    @abstractmethod
-    def counts(self) -> dict[str, float]:
-        """Machine-independent counts since the start."""
-
     def close(self) -> None:
         """Close the world."""
         self.world.close()
-
-
-class CaromEngine(Engine):
-    """A world of carom."""
-
-    def __init__(self, world: World) -> None:
-        super().__init__(world)
-        self._bodies = np.array(world.bodies.entity)
-        self._sensors = sensor_entities(world)  # all that there were: what is touched may be deleted
-
-    def step(self, dt: float) -> None:
-        world = self.world
-        if world.settings.dt != dt:
-            world.settings = world.settings.replace(dt=dt)
-        before = world.time
-        self._timed(world.step, dt)
-        self.take_in(before)
 
     def take_in(self, before: float) -> None:
         """What the world's last step has done, which began at that time."""
         self.follow()
         if not np.array_equal(self._bodies, bodies := self.world.bodies.entity):
             self._bodies = np.array(bodies)
-            self._sensors = np.union1d(self._sensors, sensor_entities(self.world))
+            self._sensors = [sensor_entities(self.world), self._sensors[0]]
         contacts = self.world.contacts
         self._note_touches(before)
         self.impulse, self.times = 0.0, []
@@ -174,7 +149,8 @@ class CaromEngine(Engine):
     def _solid(self) -> np.ndarray:
         """True for contacts without a sensor."""
         contacts = self.world.contacts
-        return ~(np.isin(contacts.entity_a, self._sensors) | np.isin(contacts.entity_b, self._sensors))
+        sensors = np.concatenate(self._sensors)
+        return ~(np.isin(contacts.entity_a, sensors) | np.isin(contacts.entity_b, sensors))
 
     def deep(self) -> np.ndarray:
         """True for the contacts in which solid bodies overlap."""
@@ -183,97 +159,15 @@ class CaromEngine(Engine):
         return (contacts.depth > 0) & moves & self._solid()
 
     def overlaps(self) -> Floats:
+        """(k,) depths of the overlapping pairs, in sizes of the smaller body."""
         contacts, sizes, deep = self.world.contacts, self.sizes, self.deep()
         pairs = zip(contacts.entity_a[deep].tolist(), contacts.entity_b[deep].tolist(), strict=True)
         smaller = [min(sizes.get(a, math.inf), sizes.get(b, math.inf)) for a, b in pairs]
         return np.asarray(contacts.depth)[deep] / np.array(smaller, float)
 
     def counts(self) -> dict[str, float]:
+        """Machine-independent counts since the start."""
         return counts_of(self.world)
-
-
-class PymunkEngine(Engine):
-    """pymunk on the bodies of a world of carom. The world is kept in sync; it sums the forces and the energies.
-
-    Force systems follow pymunk's manual: their force is applied to each body before the step. substeps: iterations of
-    the solver. NotPlainError for scenes that cannot be translated.
-    """
-
-    def __init__(self, world: World, iterations: int) -> None:
-        super().__init__(world)
-        self.space = PymunkSpace(world)
-        self.space.space.iterations = iterations
-        self._iterations = iterations
-        physics: Any = world.physics
-        physics.refresh_for_queries()  # the forces are summed without a step of carom
-        self._sums = physics.forces
-        self._time, self._steps, self._forces, self._pairs = 0.0, 0, 0, 0
-        self._dt = 0.0
-        self._impacts = 0
-        handler = self.space.space
-        bodies = {body: row for row, body in enumerate(self.space.bodies)}
-        handler.on_collision(None, None, begin=self._begin, post_solve=self._solved, data=bodies)
-
-    @property
-    def time(self) -> float:
-        return self._time
-
-    def _begin(self, arbiter: Any, space: Any, bodies: dict[Any, int]) -> None:
-        del space
-        self._impacts += 1
-        self.times.append(self._time + self._dt)
-        for body in arbiter.bodies:
-            if body in bodies:
-                self.struck[bodies[body]] = True
-
-    def _solved(self, arbiter: Any, space: Any, bodies: dict[Any, int]) -> None:
-        del space
-        self._pairs += 1
-        if not all(body in bodies for body in arbiter.bodies):
-            self.impulse += arbiter.total_impulse.length
-
-    def step(self, dt: float) -> None:
-        self.impulse, self.times, self._dt = 0.0, [], dt
-        if self.world.force_systems:
-            self._push()
-        self.space.dt = dt
-        self._timed(lambda: self.space.step(1), dt)
-        self._time += dt
-        self._steps += 1
-        self._mirror()
-
-    def overlaps(self) -> Floats:
-        self.world.refresh_queries()
-        return overlaps_of(self.world)[2]
-
-    def _push(self) -> None:
-        """Apply the forces of the force systems at this state for one step; pymunk applies gravity itself."""
-        self._forces += 1
-        self._sums.evaluate(self._time)
-        dynamic = self.world.bodies.dynamic
-        weight = (dynamic.mass * dynamic.gravity_scale)[:, None] * np.asarray(self.world.gravity)
-        force = (np.array(dynamic.force) - weight)[self._order]
-        for body, (x, y) in zip(self.space.bodies, force.tolist(), strict=True):
-            body.apply_force_at_world_point((x, y), body.position)
-
-    def _mirror(self) -> None:
-        position, velocity = self.space.state()
-        dynamic = self.world.bodies.dynamic
-        dynamic.position[self._order] = position
-        dynamic.linear_velocity[self._order] = velocity
-        if self.world.bodies.has(Spin).any():
-            rows = moving_rows(self.world)
-            self.world.bodies.rotation[rows], self.world.bodies.spin.angular_velocity[rows] = self.space.turns()
-
-    def counts(self) -> dict[str, float]:
-        return {
-            "steps": float(self._steps),
-            "force_evaluations": float(max(self._forces, self._steps)),
-            "body_steps": float(self._steps * len(self.ids)),
-            "pairs": float(self._pairs),
-            "impacts": float(self._impacts),
-            "solver_loops": float(self._pairs * self._iterations),
-        }
 
 
 def carried(values: Any, old: Any, new: Any, start: Any) -> Any:
@@ -281,11 +175,6 @@ def carried(values: Any, old: Any, new: Any, start: Any) -> Any:
     _, mine, theirs = np.intersect1d(new, old, assume_unique=True, return_indices=True)
     start[mine] = values[theirs]
     return start
-
-
-def engine_for(world: World, engine: str, iterations: int) -> Engine:
-    """The engine of that name on ``world``, which it will close; iterations: of pymunk's solver."""
-    return PymunkEngine(world, iterations) if engine == PYMUNK else CaromEngine(world)
 
 
 # -- cost ------------------------------------------------------------------------------------------------

@@ -13,19 +13,17 @@ import numpy as np
 from rich.console import Console
 
 from ...framework import Settings, World
-from ..cases.case import QUICK, case_of
-from ..cases.subjects import Subject, load_once
 from ..cli.loading import Loaded, stdout_kept_clean
-from ..cli.options import above_zero, thorough_option, traceback_option, world_options
+from ..cli.options import above_zero, traceback_option, world_options
 from ..cli.usage_errors import Problem
-from ..jobs.runs import Runs
-from ..measure.effects import SHARE, in_words, names_told, noticed
+from ..jobs import Jobs
 from ..plain import Plain, jsonable
 from ..reporting.progress import Progress
 from ..reporting.text import counted, metres, number
-from ..trading.records import CaseTrade, Cell, known_well
-from ..trading.report import failures
-from ..trading.trade import measured
+from ..trading.errors import SHARE
+from ..trading.grid import FIELDS
+from ..trading.subject import Subject, load_once
+from ..trading.trade import SceneTrade, measured
 from .step_length import StepLimits, step_limits
 
 LOOKS = 20  # times that a running scene is examined
@@ -45,11 +43,10 @@ DEFAULT_SECONDS = 10.0  # for a file that does not define it
     help="How far a body may be from where it should (default: 1 % of the smallest one's size).",
 )  # fmt: skip
 @world_options
-@thorough_option
 @traceback_option
 def limits_command(
     target: str, as_json: bool, seconds: float | None, way: float | None, settings: Settings | None,
-    changes: dict[str, Any], seed: int, plugins: tuple[str, ...], thorough: bool,
+    changes: dict[str, Any], seed: int, plugins: tuple[str, ...],
 ) -> None:  # fmt: skip
     """How long the step of a scene, or of a file that defines build(settings, seed=0), may be, and what limits it.
 
@@ -65,7 +62,7 @@ def limits_command(
     with Progress(Console(stderr=True)) as bar:
         with closing(scene.world(None)) as world:
             found = _watched(loaded, world, seconds, bar)
-        outcome = outcome_of_steps(scene, seconds, Runs(progress=bar), thorough, way)
+        outcome = outcome_of_steps(scene, seconds, Jobs(progress=bar), way)
     _show(loaded.name, found, outcome, as_json)
 
 
@@ -170,35 +167,30 @@ class StepOutcome(Plain):
         return [*lines, f"Known {self.known}."]
 
 
-
-def outcome_of_steps(
-    scene: Subject, seconds: float, runs: Runs, thorough: bool = False, way: float | None = None
-) -> StepOutcome:
+def outcome_of_steps(scene: Subject, seconds: float, jobs: Jobs, way: float | None = None) -> StepOutcome:
     """Run the scene with its own settings and several steps; way: see :class:`StepOutcome`."""
     if not seconds:
         return StepOutcome(refused="it was not run")
     try:
-        case = case_of(scene, seconds=seconds, each=runs.each)
-        own = case.survey.settings
-        longest = min(LONGEST, seconds / 3)
-        steps = tuple(own.dt * factor for factor in STEPS if factor <= 1 or own.dt * factor <= longest)
-        case = case.replace(steps=steps, given=("steps",))
-        return _outcome(measured(case, None if thorough else QUICK, [Cell.of(own).method], None, False, runs), way)
+        with closing(scene.world(None)) as world:
+            own, longest = world.settings, min(LONGEST, seconds / 3)
+        vary: dict[str, Any] = {name: (getattr(own, name),) for name in FIELDS}
+        vary["dt"] = [own.dt * factor for factor in STEPS if factor <= 1 or own.dt * factor <= longest]
+        case = measured(scene, jobs, vary=vary, seconds=seconds, thorough=True, tolerance=way)
+        return _outcome(case, scene, way)
     except Problem as problem:
         return StepOutcome(refused=problem.message)
 
 
-def _outcome(case: CaseTrade, way: float | None) -> StepOutcome:
-    points = known_well(case.points)
-    points.sort(key=lambda point: point.cell.dt)
-    size = next((point.effects["size"] for point in points if point.effects), 1.0)
-    found = StepOutcome(0.0, points[0].cell.dt, size, way, compared=names_told(points[0].effects))
+def _outcome(case: SceneTrade, scene: Subject, way: float | None) -> StepOutcome:
+    points = sorted(case.points, key=lambda point: point.settings.dt)
+    found = StepOutcome(0.0, points[0].settings.dt, case.size, way, compared=scene.names)
     runs = sum(point.repeats for point in points)
     found.known = f"from {counted(runs, 'run')} of {number(case.seconds)} s with {counted(len(points), 'step')}"
     for point in points:
-        if point.failed or noticed(point.effects, way):
-            words = [failures(point)] * point.failed + in_words(point.effects, noticed(point.effects, way))
-            found.link, found.beyond = "; ".join(words), point.cell.dt
+        noticed = [figure.text for _, figure in point.noticed]
+        if point.failed or noticed:
+            found.link, found.beyond = "; ".join([point.failed] * bool(point.failed) + noticed), point.settings.dt
             break
-        found.longest = point.cell.dt
+        found.longest = point.settings.dt
     return found

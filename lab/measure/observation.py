@@ -18,11 +18,12 @@ from typing import Any
 import numpy as np
 
 from ...framework import World
-from ..engines.adapters import Engine, carried
+from ..engines.adapters import CaromEngine, carried
 from ..plain import Plain
-from ..trading.records import BLEW_UP, ESCAPED, NOT_FINITE
 from .body_shapes import Floats
 
+# Failures of runs; STOPPED: ended by an error.
+NOT_FINITE, ESCAPED, TUNNELLED, BLEW_UP, STOPPED = "not finite", "escaped", "tunnelled", "blew up", "stopped"
 SETTLED = 0.5  # fraction of the run after which contacts at rest are measured
 EARLY = 0.2  # fraction of the run after which statistics begin
 MOST_TIMES = 200  # impacts whose times are kept
@@ -55,7 +56,7 @@ class Seen(Plain):
     touches: pairs of entities and the time of their first contact, in order of time
     values: what a game compares, see ``Loaded.values_of``; spread: standard deviations from game to game, where these
     are means over that many ``runs``
-    doubt: m, of a reference: how far another one has a body elsewhere in the end
+    doubt, tolerance: m, of a reference: how far it may itself have a body elsewhere in the end; and a run, unnoticed
     """
 
     position: Floats
@@ -92,20 +93,21 @@ class Seen(Plain):
     spread: dict[str, float] = field(default_factory=dict)
     runs: int = 1
     doubt: float = 0.0
+    tolerance: float = 0.0
 
 
 def observe(
-    engine: Engine, seconds: float, dt: float, phase: float = 1.0, whole_steps: bool = False, walled: bool = True,
-    far: float = math.inf, inputs: Sequence[float] = (),
+    engine: CaromEngine, seconds: float, dt: float, phase: float = 1.0, whole_steps: bool = False, walled: bool = True,
+    inputs: Sequence[float] = (),
     values: Callable[[World], dict[str, list[float]]] | None = None,
 ) -> Seen:  # fmt: skip
     """Run ``engine`` for ``seconds``; phase: the first step's length in steps, above 0 up to 1.
 
     whole_steps: leave out the last partial step, because a change of the step length disturbs contacts at rest. walled:
-    a body outside the walls around all bodies has escaped. far: m from its start, a body there has blown up. inputs:
-    when they change, s; there a step ends. values: what a game compares, read at the end.
+    a body outside the walls around all bodies has escaped. inputs: when they change, s; there a step ends. values:
+    what a game compares, read at the end.
     """
-    watch = Observer(engine, seconds, walled, far)
+    watch = Observer(engine, seconds, walled)
     steps = step_lengths(seconds, dt, phase, whole_steps, inputs)
     every = -(-len(steps) // LOOKS)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -165,8 +167,8 @@ class Observer:
     ``energies``: kinetic and whole energy, J, at the start and at each look.
     """
 
-    def __init__(self, engine: Engine, seconds: float, walled: bool = True, far: float = math.inf) -> None:
-        self.engine, self.walled, self.far = engine, walled, far
+    def __init__(self, engine: CaromEngine, seconds: float, walled: bool = True) -> None:
+        self.engine, self.walled = engine, walled
         self.start = self.settled = engine.position
         self.ids = engine.ids
         self.energies = [engine.energies]
@@ -209,8 +211,6 @@ class Observer:
             self.mean_overlaps.append(float(depths.sum()) / max(len(position), 1))
         if self.walled and engine.enclosure.outside(position):
             seen.failure = ESCAPED
-        elif seen.reach > self.far:
-            seen.failure = BLEW_UP
 
     def _followed(self) -> Floats:
         """The positions; what has come starts where it is seen first."""

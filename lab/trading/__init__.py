@@ -1,4 +1,5 @@
-"""``carom trade``: the trade-off between speed and accuracy, measured over a grid of settings.
+"""``carom trade``: what settings cost in a scene or a game, what they buy, and and the cheapest that do.
 
-Reads the results of jobs and the clock. Writes records, tables, charts, a page, JSON and CSV.
+subject builds the scene; grid finds the settings that matter in it and runs them; errors compares each run with the
+reference; trade chooses; answer says why; chart draws; command prints.
 """

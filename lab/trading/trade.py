@@ -1,266 +1,332 @@
-"""``trade()``: the trade-off between speed and accuracy, measured over a grid of settings."""
+"""``trade()``: the errors and the cost of the settings that matter in a scene, and which of them to use.
+
+Choices are made by counts of work, which are the same on every machine and in every call.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
+from ...framework import Settings
 from ..bench.report import machine
-from ..cases import grid as grids
-from ..cases.case import FIRST, FOR_REFERENCES, QUICK, Case, Effort, case_of, check_arguments
-from ..cases.subjects import subject_of
 from ..cli.usage_errors import Problem
-from ..jobs.runs import Runs, Store, inputs_late, measure, refined_reference
-from ..jobs.tasks import Task, bare_cost, engine_of
-from ..jobs.workers import Workers
-from ..measure.norms import NORMS, check_norm, norm_of
-from ..measure.timing import Spread
+from ..engines.adapters import work_of
+from ..jobs import Jobs
+from ..measure.observation import Seen
+from ..plain import jsonable
 from ..reporting.progress import NO_PROGRESS, Progress
-from ..reporting.text import counted
-from .answer import Target, clearly_worse, next_choice, price, recommended
-from .records import (
-    CAROM,
-    FIELDS,
-    PYMUNK,
-    CaseTrade,
-    Cell,
-    Curve,
-    Point,
-    Reference,
-    Trade,
-    by_method,
-    observed_order,
-    python_line,
-)
+from .errors import TRUSTED, Figure, failure_of, figures_of, norms_for, reference_of
+from .grid import FEWEST_STEPS, FIELDS, PHASES, SEEDS, Facts, grid, milliseconds, perform, survey, tasks_of
+from .subject import Subject
 
-ROUNDING = 1e-12  # smaller errors are rounding, which has no order
-SURE = 1e-10  # a reference with a better agreement needs no refinement
-SMALL = 0.1  # relative errors above this are too large for asymptotic orders
-CLEAR = 4.0  # a statistic's error must exceed its own noise by this factor to count for the order
-ASYMPTOTIC = 4  # number of finest points used for the order
-INPUT_PHASES = 8  # start phases, at least, that show how late inputs act
-TURNS, MOST_ROUNDS = 3, 4  # of the settings timed again; of choices that the clock may refuse
-
-Show = Callable[[CaseTrade], None]
+HARDLY = 1.25  # times the cost: within it, costs are the same
+BETTER = 0.5  # of the error: what a dearer choice must have to be worth a line
+ROUNDING = 1e-9  # smaller errors are none
+FIRST = 0.4  # of the scene's own step: smaller ones are tried later
+APEX_PHASES = 32  # the error of a highest point is as large as its distance from a step's end
 
 
-@dataclass(frozen=True)
-class Only:
-    """The requested part of the grid; empty: all that matters in the scene. TypeError for a name instead of several."""
+@dataclass
+class Point:
+    """One setting. line: the code that makes it; asked: it may be recommended; repeats: its runs; failed: why it cannot
+    be used, else ""; work: weighted counts per simulated second; milliseconds: of this machine for it, if timed"""
 
-    integrators: tuple[str, ...] = ()
-    collisions: tuple[str, ...] = ()
-    substeps: tuple[int, ...] = ()
-    geometries: tuple[str, ...] = ()
+    settings: Settings
+    line: str
+    asked: bool
+    repeats: int
+    figures: dict[str, Figure]
+    failed: str
+    work: float
+    milliseconds: float | None = None
 
-    def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
-            if isinstance(getattr(self, field.name), (str, int)):
-                raise TypeError(f"Only.{field.name} must be a sequence, got {getattr(self, field.name)!r}")
+    @property
+    def noticed(self) -> list[tuple[str, Figure]]:
+        """What a player would notice, the worst first."""
+        found = [(name, figure) for name, figure in self.figures.items() if figure.times > 1]
+        return sorted(found, key=lambda one: -one[1].times)
 
-    def of(self, case: Case) -> tuple[Cell, ...]:
-        """The methods of the case; a named field is varied even without effect. Problem if there is none."""
-        found = grids.methods(case.survey)
-        for field, wanted in zip(FIELDS, dataclasses.astuple(self), strict=True):
-            if wanted:
-                found = tuple(dataclasses.replace(cell, **{field: value}) for cell in found for value in wanted)
-        if self != Only():
-            for cell in found:
-                case.subject.world(cell.settings(case.survey.settings)).close()  # raises for unknown names
-        return tuple(dict.fromkeys(grids.with_own_flight(cell) for cell in found))
+    @property
+    def severity(self) -> float:
+        """How many times what a player would notice, at the worst."""
+        return max((figure.times for figure in self.figures.values()), default=0.0)
+
+
+@dataclass
+class SceneTrade:
+    """One scene.
+
+    chaotic, why: places cannot be compared, and how that is known
+    norms: in words, the first counts; game: the names of what the game compares
+    reference: in words; agreement: its own error by norm
+    scale: what the first norm is relative to, in the scene's units; size: m, of the smallest body
+    max_error, max_cost: what is asked for, relative to the scale, and ms per simulated second
+    own, chosen, more: what it has now, what to use, and one step more; None: there is none
+    inputs: what is noticed if inputs act in whole steps, by the length of the step, s
+    refused: why nothing was measured, else ""
+    """
+
+    scene: str
+    chaotic: bool = False
+    why: str = ""
+    norms: dict[str, str] = field(default_factory=dict)
+    game: tuple[str, ...] = ()
+    seconds: float = 0.0
+    reference: str = ""
+    agreement: Mapping[str, float] = field(default_factory=dict)
+    scale: float = 1.0
+    size: float = 1.0
+    max_error: float = math.inf
+    max_cost: float = math.inf
+    points: list[Point] = field(default_factory=list)
+    own: Point | None = None
+    chosen: Point | None = None
+    more: Point | None = None
+    inputs: dict[float, list[str]] = field(default_factory=dict)
+    refused: str = ""
+
+    @property
+    def norm(self) -> str:
+        return next(iter(self.norms))
+
+    @property
+    def usable(self) -> list[Point]:
+        """Those that may be recommended: without failures."""
+        return [point for point in self.points if point.asked and not point.failed]
+
+    @property
+    def unknowable(self) -> bool:
+        """True if the reference cannot tell errors of the size that is asked for."""
+        return not self.chaotic and not self.trusts(self.norm, self.max_error)
+
+    def trusts(self, norm: str, error: float) -> bool:
+        """True if an error of that size can be distinguished from the reference's own."""
+        return error >= TRUSTED * self.agreement.get(norm, 0.0)
+
+    def error(self, point: Point) -> float:
+        """The largest error in the first norm, with the reference's own."""
+        return point.figures[self.norm].error + self.agreement.get(self.norm, 0.0)
+
+
+@dataclass
+class Trade:
+    """All scenes of one call, on one machine; ``command`` reproduces it."""
+
+    machine: dict[str, str]
+    command: str
+    scenes: list[SceneTrade]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return jsonable(self)
 
 
 def trade(
-    *targets: Any, norms: Sequence[str] = (), seconds: float | None = None, repeats: int | None = None,
-    steps: Sequence[float] = (), only: Only | None = None, target: Target | None = None, against_pymunk: bool = False,
-    timing: bool = True, options: Mapping[str, Any] | None = None, seed: int = 0, quick: bool = False,
-    workers: int | Workers | None = None, store: Store | None = None, progress: Progress = NO_PROGRESS,
-    command: str = "", show: Show | None = None,
+    *scenes: Any, norms: Sequence[str] = (), max_error: float | None = None, max_cost: float | None = None,
+    absolute: bool = False, vary: Mapping[str, Sequence[Any]] | None = None, seconds: float | None = None,
+    repeats: int | None = None, options: Mapping[str, Any] | None = None, seed: int = 0, timing: bool = True,
+    thorough: bool = False, workers: int | None = None, cluster: str = "", folder: Path | None = None,
+    progress: Progress = NO_PROGRESS, command: str = "",
 ) -> Trade:  # fmt: skip
-    """Measure work and error of every setting that matters in each scene.
+    """Measure errors and cost of the settings that matter in each scene, and choose the cheapest.
 
-    targets: names of scenes, files, or functions build(settings, seed=0) -> World. norms: the first is the main one;
-    seconds of each run; repeats of each setting (start phases, or seeds of chaotic scenes); steps s. Values not given
-    follow from the scene. target: the error or cost asked for. quick: only what fits into a minute, the same each time;
-    show is called with a first part of it. workers: processes at most, None for all cores (small amounts of work use
-    none), or those of a cluster; store: finished runs, to be continued. Of several scenes, one that cannot be measured
-    is in the result with the reason. ValueError or Problem for wrong arguments, and for a single scene that cannot be
-    measured.
+    scenes: names of the library, files, or functions build(settings, seed=0) -> World. norms: the first counts.
+    max_error: the cheapest that keeps it, relative to the norm's scale or ``absolute``; max_cost: ms per frame of
+    1/60 s. vary: values by field of Settings, as in {"dt": (1 / 30, 1 / 60)}, for those that matter. seconds, repeats:
+    of each run. thorough: all repeats of all settings, not only of those in question. workers: processes, None for all
+    cores; cluster: the address of a scheduler; folder: where finished runs are kept. Of several scenes, one that cannot
+    be measured is in the result with the reason. ValueError, TypeError or Problem for wrong arguments, and for a single
+    scene that cannot be measured.
     """
-    check_arguments(norms, seconds, repeats, steps)
-    subjects = [subject_of(scene, options, seed) for scene in targets]
-    for name in norms:
-        check_norm(name, () if name in NORMS else [own for subject in subjects for own in subject.names])
-    runs = Runs(workers, store, progress)
-    result = Trade(machine(), command, [])
-    for scene in targets:
-        name = scene if isinstance(scene, str) else getattr(scene, "__name__", "scene")
-        progress.say(f"{name}: survey")
+    vary = vary or {}
+    for name, values in {"norms": norms, **vary}.items():
+        if isinstance(values, str) or not isinstance(values, Sequence):
+            raise TypeError(f"{name} must be a sequence, got {values!r}")
+    for name, value in {"max_error": max_error, "max_cost": max_cost, "seconds": seconds, "repeats": repeats}.items():
+        whole = isinstance(value, int) or (isinstance(value, float) and name != "repeats")
+        if value is not None and (isinstance(value, bool) or not whole or not 0 < value < math.inf):
+            raise ValueError(f"{name} must be a {'whole ' * (name == 'repeats')}number above 0, got {value!r}")
+    subjects = [Subject.of(scene, options, seed) for scene in scenes]
+    jobs, found = Jobs(workers, folder, progress, cluster), []
+    for subject in subjects:
         try:
-            case = case_of(
-                scene, norms=norms, seconds=seconds, repeats=repeats, steps=steps, options=options, seed=seed,
-                each=runs.each,
-            )  # fmt: skip
-            methods = (only or Only()).of(case) + _peers(case, against_pymunk)
-            if quick and show is not None:
-                show(measured(case, FIRST, methods, target, timing, runs))
-            result.cases.append(measured(case, QUICK if quick else None, methods, target, timing, runs))
+            found.append(measured(
+                subject, jobs, norms, vary, seconds, repeats, max_error, max_cost, absolute, timing, thorough
+            ))  # fmt: skip
         except Problem as problem:
-            if len(targets) == 1:
+            if len(subjects) == 1:
                 raise
-            why = problem.message
-            nothing = {"norms": {"": ""}, "seconds": 0.0, "repeats": 0, "repeated": "", "reference": Reference("")}
-            result.cases.append(CaseTrade(name, name, "", "", "", **nothing, curves=[], refused=why))
-    return result
-
-
-def _peers(case: Case, wanted: bool) -> tuple[Cell, ...]:
-    """pymunk's methods; Problem, with the reason, if it cannot represent the scene."""
-    peers = grids.peer_methods() if wanted else ()
-    if peers:
-        engine_of(case, dataclasses.replace(peers[0], dt=case.steps[0]), 0).close()
-    return peers
+            found.append(SceneTrade(subject.name, refused=problem.message))
+    return Trade(machine(), command, found)
 
 
 def measured(
-    whole: Case, effort: Effort | None, methods: Sequence[Cell], target: Target | None, timing: bool, runs: Runs
-) -> CaseTrade:
-    """One scene with that effort; None: all of it."""
-    case = whole if effort is None else whole.at(effort)
+    subject: Subject, jobs: Jobs, norms: Sequence[str] = (), vary: Mapping[str, Sequence[Any]] | None = None,
+    seconds: float | None = None, repeats: int | None = None, max_error: float | None = None,
+    max_cost: float | None = None, absolute: bool = False, timing: bool = False, thorough: bool = False,
+    tolerance: float | None = None,
+) -> SceneTrade:  # fmt: skip
+    """One scene. Each setting runs once, with much smaller steps than its own only if no other will do; what would be
+    the answer runs as often as it takes to know, until it still is the answer. tolerance: see ``reference_of``."""
+    vary = vary or {}
+    with closing(subject.world(None)) as world:
+        for name, value in ((name, value) for name, values in vary.items() for value in values):
+            subject.world(world.settings.replace(**{name: value})).close()  # raises for unknown names
+    facts = survey(subject, seconds or subject.seconds, jobs)
+    known, shown = norms_for(subject.name, facts, norms)
+    cells, own = grid(facts, vary), facts.settings
+    usual = SEEDS if facts.chaotic else APEX_PHASES if "apex" in norms else 1 if facts.rests else PHASES
+    repeats = repeats or usual
 
-    def is_enough(known: Case, found: Reference) -> bool:
-        apart = max(found.agreement.values(), default=0.0)
-        return apart <= SURE or (target is not None and target.is_known_by(known, found))
+    # The two finest steps: of the reference's method, or with half of the seeds each: chance hides what is finer.
+    fine, runs = (own.dt / 2, max(repeats // 2, 2)) if facts.chaotic else (min(cell.dt for cell in cells) / 2, 1)
+    tasks = [tasks_of(subject, facts, facts.exact.replace(dt=dt), range(runs)) for dt in (fine, fine / 2)]
+    found = jobs.all(perform, [*tasks[0], *tasks[1]], f"{subject.name}: reference")
+    right, agreement = reference_of(subject.name, facts, known, shown, found[:runs], found[runs:], tolerance)
 
-    case, reference, _ = refined_reference(case, runs, is_enough)
-    own = Cell.of(case.survey.settings)
-    cells = grids.grid(methods, case.steps)
-    if effort is None:
-        points = measure(case, cells, runs, bare=timing)
-    else:
-        points = _measured_quickly(case, effort, sorted(cells, key=lambda cell: _distance(cell, own)), own, runs)
-    for point in points:
-        point.line = python_line(point.cell, case.survey.settings)
-        point.milliseconds = point.milliseconds if timing else None
-    found = dataclasses.replace(summed_up(case, reference, points), own=own, scale=case.scale(case.norms[0]))
-    if not found.usable:
-        return found
-    chosen = recommended(found, target)
-    for _ in range(MOST_ROUNDS if timing else 0):
-        _time_alone(case, [point for point in _answers(found, chosen) if not point.alone])
-        chosen = recommended(found, target)
-    if chosen is None:
-        return found
-    case = case.replace(repeats=max(chosen.repeats, INPUT_PHASES))
-    steps = dict.fromkeys((own, chosen.cell) if own.dt <= case.steps[0] else (chosen.cell,))
-    late = {repr(cell.dt): inputs_late(case, cell, runs) for cell in steps}
-    return dataclasses.replace(found, inputs={dt: effects for dt, effects in late.items() if effects})
-
-
-def _measured_quickly(case: Case, effort: Effort, cells: Sequence[Cell], own: Cell, runs: Runs) -> list[Point]:
-    """The nearest settings once, in half of the time; those that the answer may be about as often as fits in the rest.
-    """
-    half = (1 - FOR_REFERENCES) / 2 * effort.seconds
-    fitting, spent = [], 0.0
-    for cell in cells:
-        spent += case.seconds_of(cell)
-        if spent <= half or not fitting:
-            fitting.append(cell)
-    once = measure(case.replace(repeats=1), fitting, runs)
-    worse = clearly_worse(once) - {own}
-    again = [cell for cell in fitting if cell not in worse]
-    most = int(half / sum(map(case.seconds_of, again))) + 1
-    repeats = max(min(case.repeats, most), min(case.repeats, 2))
-    points = measure(case.replace(repeats=repeats), again, runs)
-    return points + [point for point in once if point.cell in worse]
-
-
-def _answers(case: CaseTrade, chosen: Point | None) -> list[Point]:
-    """Those whose times the answer tells: the chosen one, the next one, and what the scene has now."""
-    known = chosen or min(case.usable, key=price)
-    _, other = next_choice(case, known) or ("", known)
-    now = [point for point in case.usable if point.cell == case.own]
-    return list({point.cell: point for point in (*now, known, other)}.values())
-
-
-def _time_alone(case: Case, points: Sequence[Point]) -> None:
-    """In turns, with nothing else running: the first times were taken beside other runs."""
-    passes: list[list[float]] = [[] for _ in points]
-    for _ in range(TURNS):
-        for point, found in zip(points, passes, strict=True):
-            cost = bare_cost(Task(case, point.cell, 0))
-            found += [] if cost is None else [cost]
-    for point, found in zip(points, passes, strict=True):
-        point.milliseconds, point.alone = Spread.of(found) if found else point.milliseconds, True
-
-
-def _distance(cell: Cell, own: Cell) -> float:
-    """How far a setting is from the scene's own: fields that differ, and halvings or doublings of the step; smaller
-    steps are farther, because they cost more."""
-    alike = grids.with_own_flight(dataclasses.replace(own, collision=cell.collision))
-    differ = cell.differences(alike) + (cell.collision != own.collision)
-    halvings = math.log2(own.dt / cell.dt)
-    return differ + (1.5 * halvings if halvings > 0 else -halvings)
-
-
-def summed_up(case: Case, reference: Reference, points: Iterable[Point]) -> CaseTrade:
-    """The record of a case."""
-    points = list(points)
-    methods = by_method(points)
-    curves = []
-    for method, found in methods.items():
-        curve = Curve(label_of(method, methods), found)
-        for norm in case.norms:
-            curve.theory[norm] = case.theory(method, norm)
-            curve.orders[norm] = order_of(found, norm, reference)
-        curves.append(curve)
-    subject, norms = case.subject, {norm: norm_of(norm).text for norm in case.norms}
-    repeats = max((point.repeats for point in points), default=case.repeats)
-    return CaseTrade(
-        subject.name, subject.target or subject.name, subject.description, case.kind, case.why, norms, case.seconds,
-        repeats, case.repeated, reference, curves,
+    method = facts.exact.collision if facts.contacts else facts.exact.integrator
+    scale = known[shown[0]].scale(right, right)
+    case = SceneTrade(
+        subject.name, facts.chaotic, facts.why, {name: known[name].text for name in shown}, tuple(right.values),
+        facts.seconds, f"{method}, steps of {seconds_text(fine)} and {seconds_text(fine / 2)} s", agreement, scale,
+        right.size, math.inf if max_error is None else max_error / (scale if absolute else 1.0),
+        math.inf if max_cost is None else 60 * max_cost,
     )  # fmt: skip
+    seens: dict[Settings, list[Seen]] = {}
+    times: dict[Settings, float | None] = {}
+
+    def run(some: Sequence[Settings], count: int) -> None:
+        new = [(cell, range(len(seens.setdefault(cell, [])), count)) for cell in some]
+        tasks = [(cell, task) for cell, numbers in new for task in tasks_of(subject, facts, cell, numbers)]
+        what = f"{subject.name}: {len(some)} settings, {count} {'seeds' if facts.chaotic else 'start phases'}"
+        for (cell, _), seen in zip(tasks, jobs.all(perform, [task for _, task in tasks], what), strict=True):
+            seens[cell].append(seen)
+
+    later = [] if thorough or "dt" in vary else sorted({cell.dt for cell in cells if cell.dt < FIRST * own.dt})
+    first = [cell for cell in cells if cell.dt not in later]
+    run([*first, *[own] * (own not in first and FEWEST_STEPS * own.dt <= facts.seconds)], repeats if thorough else 1)
+    while True:
+        case.points = []
+        for cell, found in seens.items():
+            failures = [failure_of(seen, right, facts.chaotic) for seen in found]
+            good = [seen for seen, failure in zip(found, failures, strict=True) if failure is None]
+            words = [f"{failures.count(one)} of {len(found)} {one}" for one in dict.fromkeys(filter(None, failures))]
+            case.points.append(Point(
+                cell, settings_line(cell), cell in cells, len(found), figures_of(good, right, known, facts.chaotic),
+                ", ".join(words), _work(found), times.get(cell),
+            ))  # fmt: skip
+        case.own = next((point for point in case.points if point.settings == own), None)
+        case.chosen = recommended(case)
+        case.more = next_better(case)
+        answers = [point for point in (case.own, case.chosen) if point is not None]
+        if few := {point.settings: 0 for point in answers if point.repeats < repeats and not point.failed}:
+            run(list(few), repeats)
+        elif later and (case.chosen is None or (case.max_error == math.inf and case.chosen.severity > 1)):
+            run([cell for cell in cells if cell.dt == later[-1]], 1)
+            later.pop()
+        elif timing and (untimed := {point.settings for point in (*answers, case.more) if point} - times.keys()):
+            times |= {cell: milliseconds(tasks_of(subject, facts, cell, [0])[0]) for cell in untimed}
+        else:
+            break
+    if facts.inputs and not facts.chaotic:
+        for cell in dict.fromkeys(point.settings for point in answers):
+            case.inputs[cell.dt] = _inputs_late(subject, facts, cell, repeats, jobs)
+    return case
 
 
-def order_of(points: Sequence[Point], norm: str, reference: Reference) -> float | None:
-    """The order of the usable points: without failures, above rounding and the reference's own error, and small enough
-    for the asymptotic order to hold."""
-    usable = [point for point in points if _tells(point, norm, reference)]
-    finest = usable[-ASYMPTOTIC:]
-    return observed_order([p.cell.dt for p in finest], [p.errors[norm].mean for p in finest])
+def _work(seens: Sequence[Seen]) -> float:
+    """Per simulated second, the mean of the runs."""
+    known = [work_of(seen.counts) / (seen.simulated or seen.seconds) for seen in seens if seen.counts]
+    return sum(known) / max(len(known), 1)
 
 
-def _tells(point: Point, norm: str, reference: Reference) -> bool:
-    if point.failed or norm not in point.errors:
-        return False
-    error = point.errors[norm]
-    small = norm_of(norm).absolute or error.mean < SMALL
-    noise = CLEAR * error.uncertainty if norm_of(norm).signed else 0.0
-    return small and error.mean > max(ROUNDING, noise) and reference.trusts(norm, error.mean)
+def _inputs_late(subject: Subject, facts: Facts, cell: Settings, repeats: int, jobs: Jobs) -> list[str]:
+    """What is noticed of inputs that act in whole steps, as in the game, beside the same runs in which they act in
+    time."""
+    exact = tasks_of(subject, facts, cell, range(repeats))
+    late = [dataclasses.replace(task, inputs=()) for task in exact]
+    seens = jobs.all(perform, [*exact, *late], f"{subject.name}: inputs in whole steps")
+    worst: dict[str, Figure] = {}
+    for right, seen in zip(seens[:repeats], seens[repeats:], strict=True):
+        if not (right.failure or seen.failure):
+            right = dataclasses.replace(right, tolerance=right.size / 100)
+            for name, figure in figures_of([seen], right, norms_for(subject.name, facts, ())[0]).items():
+                worst[name] = max(worst.get(name, figure), figure, key=lambda figure: figure.times)
+    return [figure.text for figure in sorted(worst.values(), key=lambda figure: -figure.times) if figure.times > 1]
 
 
-def label_of(method: Cell, others: Iterable[Cell]) -> str:
-    """A label that distinguishes the method from the others."""
-    if method.engine == PYMUNK:
-        return f"pymunk, {method.substeps} iterations"
-    own = [other for other in others if other.engine == CAROM]
+# -- the choice -------------------------------------------------------------------------------------------------------
 
-    def differs(read: Callable[[Cell], Any]) -> bool:
-        return len({read(other) for other in own}) > 1
 
-    parts = []
-    if method.collision == "event_driven":
-        parts.append("event-driven")
-    else:
-        if differs(lambda cell: cell.integrator) or not differs(lambda cell: cell.collision):
-            parts.append(method.integrator.replace("_", " "))
-        if differs(lambda cell: cell.collision):
-            parts.append(method.collision)
-    if differs(lambda cell: cell.substeps):
-        parts.append(counted(method.substeps, "substep"))
-    if differs(lambda cell: cell.geometry):
-        parts.append(method.geometry)
-    return ", ".join(parts)
+def recommended(case: SceneTrade) -> Point | None:
+    """The settings to use; None if nothing can be used, or is what is asked for.
+
+    The cheapest of which nothing would be noticed, or hardly more than with the best of all; with the largest error
+    given, the cheapest that keeps it. The scene's own if they cost hardly more; else, of those that cost hardly more
+    than the cheapest, the one with the fewest changes.
+    """
+    points = [
+        point for point in case.usable
+        if case.error(point) <= case.max_error and (point.milliseconds or 0.0) <= case.max_cost
+    ]  # fmt: skip
+    if not points or case.unknowable:
+        return None
+    if case.max_error == math.inf:
+        least = min(point.severity for point in points)
+        points = [point for point in points if point.severity <= (HARDLY * least if least > 1 else 1)]
+    cheapest = min(point.work for point in points)
+
+    def order(point: Point) -> tuple[Any, ...]:
+        own = point if case.own is None else case.own
+        changes = [name for name in FIELDS if getattr(point.settings, name) != getattr(own.settings, name)]
+        return bool(changes), len({*changes} - {"dt"}), point.work, point.severity
+
+    return min((point for point in points if point.work <= HARDLY * cheapest), key=order)
+
+
+def next_better(case: SceneTrade) -> Point | None:
+    """The next dearer settings that have at most half of what is noticed; where nothing is, at most half of the error,
+    if the reference can tell that."""
+    chosen = case.chosen
+    if chosen is None:
+        return None
+    seen, half = chosen.severity, BETTER * case.error(chosen)
+    known = half > 2 * case.agreement.get(case.norm, 0.0) + ROUNDING
+    better = [
+        point for point in case.usable
+        if point.work > HARDLY * chosen.work and point.severity <= max(BETTER * seen, 1.0)
+        and (seen > 1 or (known and case.error(point) <= half))
+    ]  # fmt: skip
+    return min(better, key=lambda point: point.work, default=None)
+
+
+# -- settings as a line of Python -------------------------------------------------------------------------------------
+
+
+def settings_line(settings: Settings) -> str:
+    """The shortest ``Settings(...)`` with identical values, bit for bit: those of the default are left out."""
+    values = {each.name: getattr(settings, each.name) for each in dataclasses.fields(Settings)}
+    changed = {name: value for name, value in values.items() if value != getattr(Settings(), name)}
+    parts = [f"{name}={seconds_text(value) if name == 'dt' else quoted(value)}" for name, value in changed.items()]
+    return f"Settings({', '.join(parts)})"
+
+
+def seconds_text(dt: float) -> str:
+    """A step as Python source: 1/30 or 2/45 where that is the same number and shorter."""
+    fraction = Fraction(dt).limit_denominator(1_000_000)
+    text = f"{fraction.numerator}/{fraction.denominator}"
+    same = fraction.numerator and fraction.numerator / fraction.denominator == dt
+    return text if same and fraction.denominator > 1 and len(text) <= min(len(repr(dt)), 8) else repr(float(dt))
+
+
+def quoted(value: object) -> str:
+    """The Python repr, with the quotation marks used in the documentation."""
+    return json.dumps(value) if isinstance(value, str) else repr(value)

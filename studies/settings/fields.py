@@ -14,12 +14,13 @@ from typing import Any
 from carom.framework import Settings, World
 from carom.framework.settings import COLLISION_MODES
 from carom.lab import testing as kit
-from carom.lab.cases.grid import ALL_METHODS
 from carom.lab.engines.adapters import counts_of, work_of
+from carom.lab.trading.grid import METHODS
 
 from ..runner import WARM_UP_STEPS, Axis, nanoseconds_per_step
 from . import scenes as at
 
+ALL_METHODS = ("explicit_euler", *METHODS)
 ENOUGH = 0.03  # s of processor time per repeat: shorter runs are repeated until then
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from carom.lab.measure.timing import Spread
 from carom.lab.reporting.text import NOTHING, TextTable, compact
-from carom.lab.trading.records import quoted, seconds
+from carom.lab.trading.trade import quoted, seconds_text
 
 from ..runner import Line, Result, Sample
 from .fields import VARIED, Varied
@@ -89,7 +89,7 @@ def ratio(of: float) -> str:
 
 def source(field: str, of: Any) -> str:
     """The value as Python source; a step as a fraction."""
-    return seconds(of) if field == "dt" else quoted(of)
+    return seconds_text(of) if field == "dt" else quoted(of)
 
 
 def _amount(amount: float, unit: str) -> str:

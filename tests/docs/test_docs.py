@@ -22,7 +22,6 @@ import pytest
 from click.testing import CliRunner
 
 from carom.framework import World
-from carom.lab.cases import case
 
 pytestmark = pytest.mark.early
 
@@ -130,7 +129,6 @@ RUN = [
 
 @pytest.mark.parametrize("page", RUN, ids=name_of)
 def test_the_python_blocks_run(page, namespace, monkeypatch):
-    monkeypatch.setattr(case, "FINER", 2)  # pages of the laboratory: no block asks how exact its own references are
     run(python_blocks(page), page, namespace)
 
 

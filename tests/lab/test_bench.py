@@ -66,10 +66,6 @@ def test_settings_of_both_are_stated(result):
         assert word in text
 
 
-def test_results_go_through_json_and_back(result):
-    assert bench_report.Result.from_dict(json.loads(json.dumps(result.as_dict()))) == result
-
-
 def test_settings_of_a_subject_are_used_kept_and_named():
     """Swept, no disc leaves the box that some leave otherwise; the settings of other subjects stay at their
     defaults."""
@@ -82,7 +78,6 @@ def test_settings_of_a_subject_are_used_kept_and_named():
     assert one == 0 < other
     assert found.settings["carom"]["collision"] == "discrete"
     assert "collision discrete, substeps 4; fastgas, swept: collision continuous" in bench_report.remarks(found)[2]
-    assert bench_report.Result.from_dict(json.loads(json.dumps(found.as_dict()))) == found
 
 
 def test_queries_find_the_same_in_both_engines():
@@ -157,8 +152,7 @@ def tiny(monkeypatch):
 def test_json_is_all_there_is_on_stdout(carom, tiny):
     done = carom(*TINY, "--json")
     assert done.exit_code == 0, done.stderr
-    read = bench_report.Result.from_dict(json.loads(done.stdout))
-    assert read.rows[0].scene == "fastgas"
+    assert json.loads(done.stdout)["rows"][0]["scene"] == "fastgas"
 
 
 def test_tables_and_charts(carom, tiny, tmp_path):

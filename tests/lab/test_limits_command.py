@@ -11,7 +11,7 @@ import helpers_cli
 import pytest
 from helpers_cli import refusal
 
-from carom.lab.cases.subjects import Subject
+from carom.lab.trading.subject import Subject
 
 carom = helpers_cli.carom  # fixture
 

@@ -5,17 +5,15 @@ from __future__ import annotations
 
 import os
 import re
+from dataclasses import replace
 
-import helpers_trade as made
 import pytest
 from click.testing import CliRunner
 
 from carom.lab.cli.usage_errors import Problem
-from carom.lab.trading.charts import TIME, figure
-from carom.lab.trading.records import Trade
 from studies import joints, ladder, spins, startup
 from studies.__main__ import STUDIES, cli
-from studies.accuracy import published, summary
+from studies.accuracy import KNOWN
 from studies.runner import Axis, run
 
 
@@ -183,39 +181,18 @@ def test_a_process_is_timed_and_one_that_fails_is_no_measurement(tmp_path):
 # -- accuracy ------------------------------------------------------------------------------------
 
 
-def test_published_points_share_the_axes_of_wall_time():
-    assert published("orbit", "energy_square") == published("bouncing", "position") == []
-    case = made.bouncing()
-    case.curves += published("bouncing", "energy_square")
-    drawn = {line.get_label(): line for line in figure(case, TIME).axes[0].get_lines()}
-    for engine in ("RaiSim", "ODE", "Bullet", "DART"):
-        assert len(drawn[f"_{engine}, published"].get_xdata()) == 5
-
-
-def test_the_summary_has_the_largest_step_of_each_method_that_meets_a_target():
-    table = summary(made.smooth(), targets=(0.1, 0.01))
-    assert table.headings == ("method", "position, order", "energy, order", "10 %", "1 %", "best", "failed")
-    rows = {row[0]: row for row in table.rows}
-    assert rows["rk4"][1:] == ("4.00 (4)", "5.00 (5)", "1/30: 2.7e6", "1/60: 5.4e6", "1.2e-8", "-")
-    assert rows["explicit euler"][-1] == "1/15: tunnelled; 1/30: 2 of 64 escaped"
-
-
-def test_accuracy_writes_a_page_and_a_chart(studies, tmp_path, monkeypatch):
+def test_accuracy_finds_the_orders_of_the_methods_and_fills_a_page(studies, tmp_path, monkeypatch):
+    """Against a reference of its own: first order for both Euler methods, 2 for velocity Verlet, 4 for the others."""
+    monkeypatch.setitem(KNOWN, "spring", replace(KNOWN["spring"], steps=(1 / 60, 1 / 120, 1 / 240), seconds=1.3))
     page = tmp_path / "page.md"
-    page.write_text("<!-- studies accuracy bouncing -->\nold\n<!-- end of studies accuracy bouncing -->\n")
-    asked = []
-
-    def trade(scene: str, **options: object) -> Trade:
-        asked.append((scene, options["against_pymunk"], options["command"]))
-        return Trade(made.MACHINE, str(options["command"]), [made.bouncing()])
-
-    monkeypatch.setattr("studies.accuracy.trade", trade)
-    done = studies("accuracy", "bouncing", "--against", "pymunk", "--into", "page.md", "--out", "pictures")
+    page.write_text("<!-- studies accuracy spring -->\nold\n<!-- end of studies accuracy spring -->\n")
+    done = studies("accuracy", "spring", "--into", "page.md", "--out", "pictures")
     assert done.exit_code == 0, done.output
-    command = "python -m studies accuracy bouncing --against pymunk --into page.md --out pictures"
-    assert asked == [("bouncing", True, command)]
-    text = page.read_text()
-    assert "**bouncing: orders observed" in text
-    assert command in text
-    assert "published by SimBenchmark" in text
-    assert (tmp_path / "pictures" / "trade-bouncing-energy_square-time.png").exists()
+    rows = [row.split(" | ") for row in page.read_text().splitlines() if row.startswith("| ")][2:]
+    orders = {"explicit euler": 1, "semi implicit euler": 1, "velocity verlet": 2, "rk4": 4, "yoshida4": 4}
+    assert [row[0].strip("| ") for row in rows] == list(orders)
+    for row, order in zip(rows, orders.values(), strict=True):
+        assert float(row[1]) == pytest.approx(order, abs=0.3)
+    assert "python -m studies accuracy spring --into page.md" in page.read_text()
+    assert (tmp_path / "pictures" / "trade-spring-position.png").exists()
+    assert "no scene 'sprin' here; did you mean 'spring'" in studies("accuracy", "sprin").stderr

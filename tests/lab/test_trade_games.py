@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from pathlib import Path
 
@@ -11,20 +10,18 @@ import pytest
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Component, Phase, Settings, System, World
-from carom.lab import Inputs, Only, trade
-from carom.lab.cases import case
-from carom.lab.cases.subjects import subject_of
+from carom.lab import Inputs, trade
 from carom.lab.cli.usage_errors import Problem
-from carom.lab.measure.effects import NEVER, at_worst, effects_of, in_words, noticed, told
-from carom.lab.measure.norms import errors_of, norm_of, other_touches
-from carom.lab.measure.observation import Seen, mean_of, step_lengths
-from carom.lab.trading.answer import answer, recommended
-from carom.lab.trading.records import CHAOTIC, IMPACTS, Cell
+from carom.lab.jobs import Jobs
+from carom.lab.trading.answer import answer
+from carom.lab.trading.grid import grid, survey
+from carom.lab.trading.subject import Subject
 from carom.plugins import Physics
 
 ROOT = Path(__file__).parents[2]
 
-FEW = {"repeats": 3, "timing": False, "only": Only(collisions=("discrete",), integrators=("semi_implicit_euler",))}
+METHOD = {"collision": ("discrete",), "integrator": ("semi_implicit_euler",)}
+FEW = {"repeats": 3, "timing": False, "thorough": True}
 
 
 class Shot(Component):
@@ -79,19 +76,17 @@ def compared(world):
 shots.compared = compared
 
 
-def test_a_game_that_spawns_is_compared_by_means_over_its_seeds(monkeypatch):
-    monkeypatch.setattr(case, "ENSEMBLE", 4)
-    result = trade(shots, seconds=1.5, steps=(1 / 30,), **FEW).cases[0]
-    assert result.kind == CHAOTIC
-    assert "bodies come" in result.why
-    assert result.repeated == "seeds"
-    assert list(result.norms) == ["mean gone", "mean fired"]  # a place is another one in each game
-    point = result.curves[0].points[0]
-    assert point.errors["mean fired"].mean == 0
-    assert point.errors["mean gone"].high < 1
-    assert point.effects["right fired"] == 15
-    assert point.effects["runs"] == 3
+def test_a_game_that_spawns_is_compared_by_means_over_its_seeds():
+    result = trade(shots, seconds=1.5, vary={"dt": (1 / 30,), **METHOD}, **FEW).scenes[0]
+    assert result.chaotic
+    assert "0.01 of a body apart" in result.why
+    assert list(result.norms) == ["gone", "fired"]  # a place is another one in each game
+    point = result.points[0]
+    assert point.repeats == 3
+    assert point.figures["fired"].error == 0
+    assert point.figures["gone"].error < 1
     text = "\n".join(answer(result))
+    assert "(chaotic: means over seeds)" in text
     assert "fired: 15 on average instead of 15" in text
 
 
@@ -99,68 +94,9 @@ def test_without_a_name_for_it_bodies_are_matched_in_the_order_of_their_creation
     def plain(settings, seed=0):
         return shots(settings, 0)
 
-    found = trade(plain, seconds=0.2, steps=(1 / 60,), **FEW).cases[0]
+    found = trade(plain, seconds=0.2, vary={"dt": (1 / 60,), **METHOD}, **FEW).scenes[0]
     assert found.norm == "position"
-    assert found.curves[0].points[0].errors["position"].high < 0.1
-
-
-def seen(values, **more):
-    return Seen(np.zeros((1, 2)), values=values, seconds=1.0, reach=4.0, entities=[1], **more)
-
-
-@pytest.mark.parametrize(("mine", "right", "error", "words"), [
-    ([7.0], [7.0], 0.0, []),
-    ([6.0], [7.0], 1 / 7, ["x: 6 instead of 7"]),
-    ([3.205], [3.2005], 0.0045 / 3.2005, []),
-    ([3.3], [3.2005], 0.0995 / 3.2005, ["x: 3.3 instead of 3.2"]),
-    ([math.nan], [3.0], 1.0, ["x: none instead of 3"]),
-    ([3.0], [math.nan], 1.0, ["x: there is one, and there should be none"]),
-    ([math.nan], [math.nan], 0.0, []),
-    ([math.nan], [0.0, 3.0], 1.0, ["x: none, and there should be one"]),
-    ([0.0, 3.0], [math.nan], 1.0, ["x: there is one, and there should be none"]),
-    ([0.0, 1.0], [0.0, 3.0], 0.5, ["x ends 2 m from where it should"]),
-    ([0.0, 1.0], [0.0, 1.009], 0.009 / 4, []),
-])  # fmt: skip
-def test_values_of_a_game_are_compared_by_name(mine, right, error, words):
-    one, other = seen({"x": mine}), seen({"x": right})
-    assert errors_of(one, other, ["x"])["x"] == pytest.approx(error)
-    effects = at_worst([effects_of(one, other, IMPACTS)])
-    assert in_words(effects) == words
-    assert len(told(effects)) == 1
-
-
-def test_a_mean_is_noticed_beyond_chance_and_beyond_what_games_differ_by():
-    right = mean_of([seen({"kills": [kills]}) for kills in (90.0, 110.0, 100.0, 100.0)], ())
-    assert right.values == {"kills": [100.0]}
-    assert right.runs == 4
-    assert right.spread["kills"] == pytest.approx(8.165, 1e-3)
-
-    def effects(mean, count):
-        return at_worst([effects_of(seen({"kills": [mean]}), right, CHAOTIC)] * count)
-
-    assert not noticed(effects(110.0, 1))
-    assert not noticed(effects(90.0, 2))
-    assert not noticed(effects(110.0, 16))  # four games are few: 3.2 standard errors may be chance
-    assert noticed(effects(120.0, 16))
-    assert noticed(effects(70.0, 2))
-    assert in_words(effects(130.0, 4)) == [
-        "kills: 130 on average instead of 100; one game differs from the next by 8.2"
-    ]
-    assert norm_of("mean kills").signed
-    assert not norm_of("kills").signed
-    assert errors_of(seen({"kills": [90.0]}), right, ["mean kills"]) == {"mean kills": -0.1}
-    assert abs(at_worst([effects_of(seen({}), right, CHAOTIC)])["mean kills"]) == NEVER
-
-
-def test_the_order_of_first_contacts():
-    right = seen({}, touches=[(1, 2, 0.1), (1, 3, 0.2), (2, 3, 0.3), (3, 4, 0.4)])
-    assert other_touches(dataclasses.replace(right, touches=right.touches[::-1]), right) == []  # the times stay
-    swapped = seen({}, touches=[(1, 2, 0.1), (2, 3, 0.2), (1, 3, 0.3), (3, 5, 0.5)])
-    assert sorted(other_touches(swapped, right)) == [(1, 3, "order"), (3, 4, "never"), (3, 5, "touches")]
-    assert errors_of(swapped, right, ["order"])["order"] == 0.75
-    at_once = seen({}, touches=[(1, 2, 0.1), (2, 3, 0.2), (1, 3, 0.2), (3, 4, 0.4)])  # in one step: no order
-    assert other_touches(at_once, right) == []
-    assert in_words(effects_of(swapped, right, IMPACTS)) == ["entity 3 never touches entity 4 (3 such pairs)"]
+    assert found.points[0].figures["position"].error < 0.1
 
 
 def test_balls_on_a_line_touch_in_order():
@@ -172,8 +108,8 @@ def test_balls_on_a_line_touch_in_order():
         world.create_entity(Transform((6, 0)), AABBCollider((0.5, 2), restitution=1))
         return world
 
-    found = trade(line, norms=("order",), seconds=2.0, steps=(1 / 60,), **FEW).cases[0]
-    assert found.curves[0].points[0].errors["order"].high == 0
+    found = trade(line, norms=("order",), seconds=2.0, vary={"dt": (1 / 60,), **METHOD}, **FEW).scenes[0]
+    assert found.points[0].figures["order"].error == 0
 
 
 def test_inputs_are_played_back_with_steps_of_any_length(tmp_path):
@@ -220,14 +156,13 @@ runner.compared = lambda world: {"hero": world.bodies.position[0]}
 
 def test_inputs_act_at_their_times_in_every_run_and_their_age_is_told_apart():
     """A key acts up to a step early and ends up to a step late, each of which is 5 m/s times the step."""
-    plan = {"seconds": 1.0, "repeats": 4, "timing": False, "only": Only(integrators=("semi_implicit_euler",))}
-    found = trade(runner, steps=(1 / 15, 1 / 30, 1 / 60), **plan).cases[0]
-    assert [point.effects["value at hero"] < 1e-9 for point in found.points] == [True] * 3
-    chosen = recommended(found)
-    assert chosen is not None
-    late = {float(dt): effects["value at hero"] for dt, effects in found.inputs.items()}
-    assert late.keys() == {1 / 60, chosen.cell.dt}
-    for dt, metres in late.items():
+    plan = {"seconds": 1.0, "repeats": 4, "timing": False, "thorough": True}
+    found = trade(runner, vary={"dt": (1 / 30, 1 / 60), **METHOD}, **plan).scenes[0]
+    assert [point.figures["hero"].error * found.scale < 1e-9 for point in found.points] == [True] * 2
+    assert found.chosen is not None
+    assert found.inputs.keys() == {1 / 60, found.chosen.settings.dt} == {1 / 60, 1 / 30}
+    for dt, (words,) in found.inputs.items():
+        metres = float(words.partition("ends ")[2].partition(" cm")[0]) / 100
         assert 0.5 * 5 * dt < metres <= 2 * 5 * dt
         again = []
         for phase in (1.0, 0.5, 0.75, 0.25):  # in whole steps, with nothing but a world
@@ -237,15 +172,11 @@ def test_inputs_act_at_their_times_in_every_run_and_their_age_is_told_apart():
                     world.settings = world.settings.replace(dt=dt)
                 again.append(abs(world.bodies.position[0, 0] - 2.05))
         assert max(again) / 2 <= metres <= 2 * max(again)
-    assert "inputs   read once a step" in answer(found)[-1]
-    assert found.own == Cell(1 / 60, substeps=8)  # what the build makes of None
-    assert trade(runner, steps=(1 / 30, 1 / 60), **plan).cases[0].points[-1].line == "Settings(substeps=8)"
+    assert "keys  read once a step, which is in no error above: 16.7 ms: hero ends" in answer(found)[-1]
+    assert found.own.line == "Settings(substeps=8)"  # what the build makes of None
 
 
-def test_steps_end_where_inputs_change():
-    assert step_lengths(1.0, 0.25, 1.0, inputs=(0.5, 0.6)) == pytest.approx([0.25, 0.25, 0.1, 0.15, 0.25])
-    assert step_lengths(1.0, 0.25, 0.5, inputs=(0.38, 2.0)) == pytest.approx([0.125, 0.255, 0.245, 0.25, 0.125])
-    assert step_lengths(1.0, 0.25, 1.0) == step_lengths(1.0, 0.25, 1.0, inputs=(0.25, 0.75)) == [0.25] * 4
+def test_steps_are_not_tried_that_inputs_would_cut_into_pieces():
     dense = Inputs([(k / 60, str(k)) for k in range(60)])
 
     def watched(settings, seed=0):
@@ -255,8 +186,9 @@ def test_steps_end_where_inputs_change():
         world.add_system(watches)
         return world
 
-    steps = case.case_of(watched, seconds=1.0).steps
-    assert max(steps) <= 1 / 60 * (1 + 1e-9)  # longer ones would be cut into pieces too often to be judged
+    facts = survey(Subject.of(watched), 1.0, Jobs(1))
+    assert len(facts.inputs) == 59
+    assert max(cell.dt for cell in grid(facts, {})) == facts.settings.dt
 
 
 @pytest.mark.parametrize(("returned", "words"), [
@@ -268,18 +200,18 @@ def test_what_cannot_be_compared_is_refused(returned, words):
 
     game.compared = lambda world: returned
     with pytest.raises(Problem, match=words):
-        print(subject_of(game).names)
+        print(Subject.of(game).names)
     if isinstance(returned, dict):
         game.compared = lambda world: {"where": world.bodies.position[0]}
         with pytest.raises(Problem, match="let compared give numbers too"):
-            trade(game, seconds=1.5, steps=(1 / 30,), **FEW)
+            trade(game, seconds=1.5, vary={"dt": (1 / 30,)}, **FEW)
         with pytest.raises(Problem, match="no norm 'wher'"):
             trade(game, norms=("wher",), **FEW)
 
 
 @pytest.mark.parametrize(("name", "options"), [("survivors", {"enemies": 40}), ("platformer", {}), ("pool", {})])
 def test_the_games_of_the_examples_play(name, options):
-    game = subject_of(str(ROOT / "examples" / "games" / f"{name}.py"), options)
+    game = Subject.of(str(ROOT / "examples" / "games" / f"{name}.py"), options)
     with game.world(None) as world:
         before = game.loaded.values_of(world)
         for _ in range(90):

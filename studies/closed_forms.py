@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ...framework import World
-from ..measure.body_shapes import Floats, dynamic_by_id
-from ..measure.observation import Seen
-from ..testing.predict import bounce_times, collide, free_flight, impact_time, orbit_speed, spring
+from carom.framework import World
+from carom.lab.measure.body_shapes import Floats, dynamic_by_id
+from carom.lab.measure.observation import Seen
+from carom.lab.testing.predict import bounce_times, collide, free_flight, impact_time, orbit_speed, spring
 
 SAMPLES = 2000  # of a path, to find the largest displacement
 Path = Callable[[float], Floats]  # maps seconds to positions (n, d)
@@ -25,7 +25,8 @@ def _seen(path: Path, seconds: float, world: World, struck: bool, times: list[fl
     energy = world.kinetic_energy() + world.potential_energy()
     found.setdefault("energy_scale", world.kinetic_energy())
     return Seen(
-        path(seconds), reach=float(np.linalg.norm(places - start, axis=2).max()), energy=energy, energy_start=energy,
+        path(seconds), entities=sorted(world.bodies.dynamic.entity.tolist()),
+        reach=float(np.linalg.norm(places - start, axis=2).max()), energy=energy, energy_start=energy,
         impacts=len(times), times=times, struck=[struck] * len(start), seconds=seconds, **found,
     )  # fmt: skip
 

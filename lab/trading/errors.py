@@ -1,0 +1,390 @@
+"""The reference of a scene, and the norms: the error of a run against it, and how much of it a player would notice."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..cli.usage_errors import Problem, did_you_mean
+from ..measure.observation import BLEW_UP, NOT_FINITE, TUNNELLED, Seen, mean_of
+from ..reporting.text import metres
+from .grid import STILL, Facts
+
+AT_ONCE = 0.01  # s: contacts this close have no order
+CONSERVED = 1e-6  # a reference with a relative energy change below this conserves energy
+NO_ENERGY = 1e-3  # relative to the largest kinetic energy: a smaller total is no useful scale
+FAR = 1e3  # times the reach of the reference, or a size: a body farther away has blown up
+TRUSTED = 10.0  # an error counts as measured if it is so many times the reference's own
+
+SHARE = 0.01  # of a body's size, of a number, or of the energy in a minute: less is not noticed
+SPEED = 0.02  # sizes per second
+LATE = 0.01  # s
+OF_SPREAD = 0.5  # of the spread from game to game
+CHANCE = (12.7, 4.3, 3.2, 2.8, 2.6, 2.4, 2.4, 2.3, 2.3, 2.2)  # standard errors, 5 %, from 1 degree of freedom on
+OF_MANY = 2.0  # standard errors, from many
+NEVER = 1e9  # times the limit: only one of the runs has the value
+
+Measure = Callable[[Seen, Seen], Any]
+
+
+class Figure(NamedTuple):
+    """Of a setting in one norm, at the worst of its runs: the error relative to the norm's scale, of statistics the
+    mean plus two standard errors; how many times what a player would notice; and in words."""
+
+    error: float
+    times: float
+    text: str
+
+
+class Norm(NamedTuple):
+    """``measure``: run, reference -> how much it is off, in the unit of ``scale`` and of ``limit``, from which on it is
+    noticed; ``words`` for a player; ``text``: the quantity, and what 1 is.
+
+    by_body: single bodies are compared, which chaos does not allow; mean: over all runs, of which one alone is chance;
+    needs: the field of the reference without which there is nothing to compare
+    """
+
+    text: str
+    measure: Measure
+    scale: Measure
+    limit: Measure = lambda seen, right: math.inf
+    words: Callable[[float, Seen, Seen], str] = lambda value, seen, right: ""
+    by_body: bool = False
+    mean: bool = False
+    needs: str = ""
+
+
+# -- what is measured -----------------------------------------------------------------------------------------------
+
+
+def distances(seen: Seen, right: Seen) -> tuple[np.ndarray, np.ndarray]:
+    """How far each body that both runs have ends from where it should, (n,), and their ids, by order of creation."""
+    ids, a, b = np.intersect1d(seen.entities, right.entities, return_indices=True)
+    apart = seen.position[a] - right.position[b]
+    return np.sqrt((apart * apart).reshape(len(ids), -1).sum(axis=1)), ids
+
+
+def other_touches(seen: Seen, right: Seen) -> list[tuple[int, int, str]]:
+    """Pairs of bodies that touch in one of the runs only, or in another order than in the reference."""
+    mine, should = ({(a, b): at for a, b, at in one.touches} for one in (seen, right))
+    found = [(*pair, "never touches") for pair in should if pair not in mine]
+    found += [(*pair, "should not touch") for pair in mine if pair not in should]
+    latest = -math.inf
+    for pair in sorted(mine.keys() & should.keys(), key=lambda pair: (mine[pair], should[pair])):
+        if should[pair] < latest - AT_ONCE:
+            found.append((*pair, "touches out of turn"))
+        latest = max(latest, should[pair])
+    return found
+
+
+def conserves(right: Seen) -> bool:
+    """True if the scene conserves energy according to the reference."""
+    return right.energy_worst <= CONSERVED * (right.energy_scale or 1.0)
+
+
+def _energy_scale(seen: Seen, right: Seen) -> float:
+    """The largest kinetic energy, or the energy at the start if smaller, since the zero of the energy is arbitrary."""
+    kinetic, total = right.energy_scale or seen.energy_scale or 1.0, abs(right.energy_start)
+    return min(kinetic, total) if total > NO_ENERGY * kinetic else kinetic
+
+
+def _impact_time(seen: Seen, right: Seen) -> float:
+    count = max(len(seen.times), len(right.times))
+    mine, should = (times + [right.seconds] * (count - len(times)) for times in (seen.times, right.times))
+    return float(np.abs(np.subtract(mine, should)).max(initial=0.0))
+
+
+def difference(seen: Seen, right: Seen, name: str) -> float:
+    """What a game compares against the right value: of numbers the difference, of places the distance; +-inf if only
+    one of the runs has it."""
+    mine, should = (np.array(one.values.get(name, [math.nan])) for one in (seen, right))
+    has, wanted = not np.isnan(mine).any(), not np.isnan(should).any()
+    if not (has and wanted):
+        return math.inf * (has - wanted) if has or wanted else 0.0
+    return float(mine[0] - should[0]) if len(should) == 1 else float(np.linalg.norm(mine - should))
+
+
+def _reach(seen: Seen, right: Seen) -> float:
+    return right.reach or seen.reach or 1.0
+
+
+def _names_places(right: Seen) -> bool:
+    """True for a game that says itself which places count."""
+    return any(len(value) > 1 for value in right.values.values())
+
+
+def _judged(limit: Measure) -> Measure:
+    """That limit where bodies can be compared; else nothing is noticed."""
+
+    def found(seen: Seen, right: Seen) -> float:
+        known = seen.fixed and not _names_places(right) and right.doubt <= right.tolerance
+        return limit(seen, right) if known else math.inf
+
+    return found
+
+
+def _where_any(limit: float) -> Measure:
+    """That limit if both runs have impacts: what hardly bounces may come to rest without one."""
+    return lambda seen, right: limit if seen.times and right.times else math.inf
+
+
+def _off(field: str) -> Measure:
+    return lambda seen, right: getattr(seen, field) - getattr(right, field)
+
+
+def _size_of(field: str) -> Measure:
+    return lambda seen, right: abs(getattr(right, field)) or abs(getattr(seen, field)) or 1.0
+
+
+def _ends(value: float, seen: Seen, right: Seen) -> str:
+    apart, ids = distances(seen, right)
+    return f"entity {ids[int(np.argmax(apart))]} ends {metres(value)} from where it should"
+
+
+def _touching(value: float, seen: Seen, right: Seen) -> str:
+    one, other, how = other_touches(seen, right)[0]
+    return f"entity {one} {how} entity {other}{f' ({value:.0f} such pairs)' if value > 1 else ''}"
+
+
+def _more(text: str, more: str, less: str, scale: float = 1.0) -> Callable[[float, Seen, Seen], str]:
+    return lambda value, seen, right: text.format(abs(value) * scale, more if value > 0 else less)
+
+
+def _one(seen: Seen, right: Seen) -> float:
+    return 1.0
+
+
+NORMS: Mapping[str, Norm] = {
+    "position": Norm(
+        "largest distance of a body from where it should be in the end; 1 is the longest way a body gets from its "
+        "start",
+        lambda seen, right: float(distances(seen, right)[0].max(initial=0.0)), _reach,
+        lambda seen, right: max(right.tolerance, right.doubt) if seen.fixed and not _names_places(right) else math.inf,
+        _ends, by_body=True,
+    ),
+    "energy": Norm(
+        "largest departure of the energy on the way (in the end, where it is not conserved); 1 is the energy at the "
+        "start, or the largest kinetic energy if that is smaller",
+        lambda seen, right: seen.energy_worst if conserves(right) else seen.energy - right.energy, _energy_scale,
+    ),
+    "energy_gain": Norm(
+        "energy gained in a minute, where it is conserved (a loss looks like drag); 1 as for energy",
+        lambda seen, right: max(seen.energy - seen.energy_start, 0.0) * 60 / seen.seconds, _energy_scale,
+        lambda seen, right: SHARE * _energy_scale(seen, right) if conserves(right) and seen.fixed else math.inf,
+        lambda value, seen, right: f"the energy grows by {100 * value / _energy_scale(seen, right):.2g} % a minute",
+        mean=True,
+    ),
+    "apex": Norm(
+        "height of the highest point reached, at steps; 1 is the right height", _off("apex"), _size_of("apex"),
+        _judged(lambda seen, right: right.tolerance),
+        lambda value, seen, right: f"the highest point is {metres(value)} {'higher' if value > 0 else 'lower'}",
+        by_body=True, needs="apex",
+    ),
+    "impact_time": Norm(
+        "largest error of an impact's time, a missing one being at the end; 1 is the whole run", _impact_time,
+        _size_of("seconds"), by_body=True, needs="times",
+    ),
+    "first_contact": Norm(
+        "error of the first impact's time; 1 is the whole run",
+        lambda seen, right: (seen.times or [right.seconds])[0] - (right.times or [right.seconds])[0],
+        _size_of("seconds"), _judged(_where_any(LATE)),
+        _more("the first contact is {:.3g} ms {}", "late", "early", 1e3), by_body=True, needs="times",
+    ),
+    "count": Norm(
+        "number of impacts; 1 is the right number", _off("impacts"), _size_of("impacts"), _judged(_where_any(0.5)),
+        _more("{:.0f} impacts {}", "more", "fewer"), by_body=True, needs="impacts",
+    ),
+    "order": Norm(
+        "pairs that touch for the first time in another order, or in one of the runs only; 1 is as many as should "
+        "touch",
+        lambda seen, right: len(other_touches(seen, right)), lambda seen, right: max(len(right.touches), 1),
+        _judged(lambda seen, right: math.inf if _rests(right) else 0.5), _touching, by_body=True, needs="touches",
+    ),
+    "energy_square": Norm(
+        "mean square of the departure of the energy, in J²: not relative to anything",
+        lambda seen, right: seen.energy_square, _one,
+    ),
+    "overlap": Norm(
+        "deepest overlap in the second half, in sizes of the smaller body", lambda seen, right: seen.overlap, _one,
+        lambda seen, right: right.tolerance / seen.size if seen.fixed else math.inf,
+        lambda value, seen, right: f"bodies sink {metres(value * seen.size)} into each other",
+    ),
+    "speed": Norm(
+        "largest speed in the end, in sizes of the smallest body per second", lambda seen, right: seen.speed, _one,
+        lambda seen, right: SPEED if seen.fixed and _rests(right) else math.inf,
+        lambda value, seen, right: f"what rests still moves at {metres(value * seen.size)} per second",
+    ),
+    "drift": Norm(
+        "largest distance that a body gets in the second half, in sizes of the smallest body",
+        lambda seen, right: seen.drift, _one,
+    ),
+    "pressure": Norm(
+        "mean force on all that stands still, after the first fifth; 1 is the right one", _off("pressure"),
+        _size_of("pressure"), mean=True, needs="pressure",
+    ),
+    "rate": Norm(
+        "impacts per second, after the first fifth; 1 is the right rate", _off("rate"), _size_of("rate"), mean=True,
+        needs="rate",
+    ),
+    "kinetic": Norm(
+        "kinetic energy in the end; 1 is the right one", _off("kinetic"), _size_of("kinetic"), mean=True,
+        needs="kinetic",
+    ),
+}  # fmt: skip
+
+
+def _rests(right: Seen) -> bool:
+    return right.met and right.speed <= STILL
+
+
+@functools.cache
+def norm_of(name: str, place: bool = False, chaotic: bool = False) -> Norm:
+    """The norm of that name; a name that is not in NORMS is that of something a game compares."""
+    if name in NORMS:
+        return NORMS[name]
+
+    def scale(seen: Seen, right: Seen) -> float:
+        values = [abs(one.values.get(name, [math.nan])[0]) for one in (right, seen)]
+        return _reach(seen, right) if place else next((size for size in values if 0 < size < math.inf), 1.0)
+
+    def limit(seen: Seen, right: Seen) -> float:
+        value = right.values[name][0]
+        return right.tolerance if place else max(SHARE * abs(value), 0.5 if value % 1 == 0 else 0.0)
+
+    def words(value: float, seen: Seen, right: Seen) -> str:
+        should = right.values[name][0]
+        if math.isinf(value):
+            return f"{name}: {'one, and there should be none' if value > 0 else f'none instead of {should:.4g}'}"
+        if math.isnan(should):
+            return f"{name}: none, as it should be"
+        if place:
+            return f"{name} ends {metres(value)} from where it should"
+        if chaotic:
+            spread = right.spread.get(name, 0.0)
+            return f"{name}: {should + value:.4g} on average instead of {should:.4g}, {spread:.2g} from game to game"
+        return f"{name}: {should + value:.4g}{f' instead of {should:.4g}' if value else ', as it should be'}"
+
+    text = f"{name}, {'averaged over the seeds, ' * chaotic}as the game counts it; 1 is the right value"
+    return Norm(text, lambda seen, right: difference(seen, right, name), scale, limit, words, place, chaotic)
+
+
+def norms_for(name: str, facts: Facts, asked: Sequence[str]) -> tuple[dict[str, Norm], tuple[str, ...]]:
+    """All norms of a scene, and the names of those that are shown, the first counts; Problem for one that there is not,
+    or that would measure chance."""
+    values = facts.trial.values
+    known = {**NORMS, **{one: norm_of(one, len(value) > 1, facts.chaotic) for one, value in values.items()}}
+    for one in asked:
+        if one not in known:
+            raise Problem(f"no norm {one!r}{did_you_mean(one, known)}")
+    usual = ("overlap", "speed", "drift") if facts.rests else ("position", "energy", "count")
+    usual = usual if facts.rests or facts.trial.impacts else usual[:2]
+    if facts.chaotic:
+        usual = ("pressure", "rate", "kinetic") if facts.contacts else ()
+        known = {one: norm for one, norm in known.items() if not norm.by_body}
+    chosen = tuple(asked or values or usual)
+    found = tuple(one for one in chosen if one in known)
+    if not found or (asked and found != chosen):
+        raise Problem(
+            f"{name} is chaotic: {facts.why}, so places would measure chance: take a shorter time, statistics "
+            "(pressure, rate, kinetic: they need contacts), or let compared give numbers too: counts, times or scores"
+        )
+    return known, found
+
+
+# -- the reference --------------------------------------------------------------------------------------------------
+
+
+def failure_of(seen: Seen, right: Seen, chaotic: bool) -> str | None:
+    """The reason why the run has no error figure, or None.
+
+    Tunnelled: a body that touches something in the reference has touched nothing.
+    """
+    if seen.failure or not np.isfinite(seen.position).all():
+        return seen.failure or NOT_FINITE
+    if chaotic:
+        return None
+    if seen.reach > FAR * max(right.reach, right.size):
+        return BLEW_UP
+    same = seen.fixed and right.fixed and not right.values  # a game tells itself what went wrong
+    if same and any(should and not did for did, should in zip(seen.struck, right.struck, strict=False)):
+        return TUNNELLED
+    return None
+
+
+def reference_of(
+    name: str, facts: Facts, norms: Mapping[str, Norm], shown: Sequence[str], fine: Sequence[Seen],
+    finest: Sequence[Seen], tolerance: float | None = None,
+) -> tuple[Seen, dict[str, float]]:  # fmt: skip
+    """What is right, and its own error by norm, from the runs with the two finest steps: extrapolated to a step of 0
+    (Richardson), or of a chaotic scene their means. tolerance: how far a body may be elsewhere, m (default: a share of
+    its size). Problem if they have failed, and for a norm that is 0 throughout."""
+    for seen in (*fine, *finest):
+        if seen.failure:
+            raise Problem(f"{name} has no reference: its run {seen.failure}{seen.detail and f': {seen.detail}'}")
+    if facts.chaotic:
+        right = mean_of([*fine, *finest], [one for one, norm in NORMS.items() if norm.mean and norm.needs])
+    else:
+        right = _extrapolated(fine[0], finest[0], facts.order)
+        right = dataclasses.replace(right, doubt=float(distances(finest[0], right)[0].max(initial=0.0)))
+    right = dataclasses.replace(right, tolerance=SHARE * right.size if tolerance is None else tolerance)
+    idle = [one for one in shown if norms[one].needs and not getattr(right, norms[one].needs)]
+    if idle:
+        usable = [one for one, norm in norms.items() if not norm.needs or getattr(right, norm.needs)]
+        raise Problem(f"{name}: {', '.join(idle)} is 0 throughout; what can be measured here: {', '.join(usable)}")
+    agreement = {}
+    for one in shown:
+        norm = norms[one]
+        errors = [norm.measure(seen, right) / norm.scale(seen, right) for seen in (*fine, *finest)]
+        absolute = norm.scale is _one or (one == "energy" and conserves(right))  # what is right is known without it
+        own = float(np.std(errors, ddof=1)) / math.sqrt(len(errors)) if facts.chaotic else abs(errors[-1])
+        agreement[one] = 0.0 if absolute else own
+    return right, agreement
+
+
+def _extrapolated(fine: Seen, finest: Seen, order: int) -> Seen:
+    """The finest run, with its places, heights and energies as they would be with a step of 0."""
+    if fine.entities != finest.entities:
+        return finest
+    share = 1 / (2**order - 1)
+    pairs = {name: (getattr(fine, name), getattr(finest, name)) for name in ("position", "apex", "energy", "kinetic")}
+    return dataclasses.replace(finest, **{name: last + share * (last - first) for name, (first, last) in pairs.items()})
+
+
+def figures_of(
+    seens: Sequence[Seen], right: Seen, norms: Mapping[str, Norm], chaotic: bool = False
+) -> dict[str, Figure]:  # fmt: skip
+    """By norm, of the runs of a setting that have not failed."""
+    found: dict[str, Figure] = {}
+    for name, norm in norms.items() if seens else ():
+        if norm.needs and not getattr(right, norm.needs):
+            continue
+        values = [norm.measure(seen, right) for seen in seens]
+        seen, value, more, limit = seens[0], values[0], 0.0, 0.0
+        if norm.mean and np.isfinite(values).all():
+            value, spread = float(np.mean(values)), float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
+            more = 2 * spread / math.sqrt(len(values))
+            if chaotic:
+                limit = _beyond_chance(max(spread, right.spread.get(name, 0.0)), len(values), right.runs)
+        else:
+            worst = int(np.argmax(np.abs(values)))
+            seen, value = seens[worst], values[worst]
+        limit, scale = max(limit, norm.limit(seen, right)), norm.scale(seen, right)
+        times = abs(value) / limit if limit and math.isfinite(value) else NEVER * (value != 0)
+        times *= not norm.mean or len(values) > 1 or chaotic  # the mean over the start phases is not known from one
+        error = (abs(value) + more) / scale if math.isfinite(value) else 1.0
+        text = norm.words(value, seen, right) if value or name in right.values else ""
+        found[name] = Figure(error, min(times, NEVER), text)
+    return found
+
+
+def _beyond_chance(spread: float, runs: int, known: int) -> float:
+    """The least difference of the means of so many runs that is more than chance, and large beside what one game
+    differs from the next."""
+    freedom = known + runs - 2 if runs > 1 else known - 1
+    chance = CHANCE[freedom - 1] if 0 < freedom <= len(CHANCE) else OF_MANY
+    return spread * max(OF_SPREAD, chance * math.sqrt(1 / runs + 1 / known))
