@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor
-from contextlib import nullcontext, redirect_stdout
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -90,10 +89,9 @@ def _result(key: str, function: Callable[[Any], Any], task: Any) -> Any:
 
 
 def _elsewhere(call: Any, *given: Any) -> Any:
-    """In a worker: it leaves stdout alone, and does not announce that it compiles, as the first process has."""
+    """In a worker, which does not announce that it compiles, as the first process has."""
     log.announced = True
-    with open(os.devnull, "w") as nowhere, redirect_stdout(nowhere):
-        return call(*given)
+    return call(*given)
 
 
 def _client(address: str) -> Any:

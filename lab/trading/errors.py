@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -133,12 +132,18 @@ def _where_any(limit: float) -> Measure:
     return lambda seen, right: limit if seen.times and right.times else math.inf
 
 
-def _off(field: str) -> Measure:
-    return lambda seen, right: getattr(seen, field) - getattr(right, field)
+def _relative(field: str, text: str, **more: Any) -> Norm:
+    """A quantity whose right value is 1."""
+
+    def scale(seen: Seen, right: Seen) -> float:
+        return abs(getattr(right, field)) or abs(getattr(seen, field)) or 1.0
+
+    return Norm(text, lambda seen, right: getattr(seen, field) - getattr(right, field), scale, needs=field, **more)
 
 
-def _size_of(field: str) -> Measure:
-    return lambda seen, right: abs(getattr(right, field)) or abs(getattr(seen, field)) or 1.0
+def _own(field: str, text: str, **more: Any) -> Norm:
+    """A quantity that should be 0."""
+    return Norm(text, lambda seen, right: getattr(seen, field), _one, **more)
 
 
 def _ends(value: float, seen: Seen, right: Seen) -> str:
@@ -151,18 +156,13 @@ def _touching(value: float, seen: Seen, right: Seen) -> str:
     return f"entity {one} {how} entity {other}{f' ({value:.0f} such pairs)' if value > 1 else ''}"
 
 
-def _more(text: str, more: str, less: str, scale: float = 1.0) -> Callable[[float, Seen, Seen], str]:
-    return lambda value, seen, right: text.format(abs(value) * scale, more if value > 0 else less)
-
-
 def _one(seen: Seen, right: Seen) -> float:
     return 1.0
 
 
 NORMS: Mapping[str, Norm] = {
     "position": Norm(
-        "largest distance of a body from where it should be in the end; 1 is the longest way a body gets from its "
-        "start",
+        "largest distance of a body from where it should be in the end; 1 is the longest way of a body from its start",
         lambda seen, right: float(distances(seen, right)[0].max(initial=0.0)), _reach,
         lambda seen, right: max(right.tolerance, right.doubt) if seen.fixed and not _names_places(right) else math.inf,
         _ends, by_body=True,
@@ -179,62 +179,46 @@ NORMS: Mapping[str, Norm] = {
         lambda value, seen, right: f"the energy grows by {100 * value / _energy_scale(seen, right):.2g} % a minute",
         mean=True,
     ),
-    "apex": Norm(
-        "height of the highest point reached, at steps; 1 is the right height", _off("apex"), _size_of("apex"),
-        _judged(lambda seen, right: right.tolerance),
-        lambda value, seen, right: f"the highest point is {metres(value)} {'higher' if value > 0 else 'lower'}",
-        by_body=True, needs="apex",
+    "apex": _relative(
+        "apex", "height of the highest point reached, at steps; 1 is the right height", by_body=True,
+        limit=_judged(lambda seen, right: right.tolerance),
+        words=lambda value, *_: f"the highest point is {metres(value)} {'higher' if value > 0 else 'lower'}",
     ),
     "impact_time": Norm(
         "largest error of an impact's time, a missing one being at the end; 1 is the whole run", _impact_time,
-        _size_of("seconds"), by_body=True, needs="times",
+        lambda seen, right: right.seconds, by_body=True, needs="times",
     ),
     "first_contact": Norm(
         "error of the first impact's time; 1 is the whole run",
         lambda seen, right: (seen.times or [right.seconds])[0] - (right.times or [right.seconds])[0],
-        _size_of("seconds"), _judged(_where_any(LATE)),
-        _more("the first contact is {:.3g} ms {}", "late", "early", 1e3), by_body=True, needs="times",
+        lambda seen, right: right.seconds, _judged(_where_any(LATE)),
+        lambda value, *_: f"the first contact is {1e3 * abs(value):.3g} ms {'late' if value > 0 else 'early'}",
+        by_body=True, needs="times",
     ),
-    "count": Norm(
-        "number of impacts; 1 is the right number", _off("impacts"), _size_of("impacts"), _judged(_where_any(0.5)),
-        _more("{:.0f} impacts {}", "more", "fewer"), by_body=True, needs="impacts",
+    "count": _relative(
+        "impacts", "number of impacts; 1 is the right number", by_body=True, limit=_judged(_where_any(0.5)),
+        words=lambda value, *_: f"{abs(value)} impacts {'more' if value > 0 else 'fewer'}",
     ),
     "order": Norm(
-        "pairs that touch for the first time in another order, or in one of the runs only; 1 is as many as should "
-        "touch",
+        "pairs that first touch in another order, or in one of the runs only; 1 is as many as should touch",
         lambda seen, right: len(other_touches(seen, right)), lambda seen, right: max(len(right.touches), 1),
         _judged(lambda seen, right: math.inf if _rests(right) else 0.5), _touching, by_body=True, needs="touches",
     ),
-    "energy_square": Norm(
-        "mean square of the departure of the energy, in J²: not relative to anything",
-        lambda seen, right: seen.energy_square, _one,
+    "energy_square": _own("energy_square", "mean square of the departure of the energy, in J²: relative to nothing"),
+    "overlap": _own(
+        "overlap", "deepest overlap in the second half, in sizes of the smaller body",
+        limit=lambda seen, right: right.tolerance / seen.size if seen.fixed else math.inf,
+        words=lambda value, seen, _: f"bodies sink {metres(value * seen.size)} into each other",
     ),
-    "overlap": Norm(
-        "deepest overlap in the second half, in sizes of the smaller body", lambda seen, right: seen.overlap, _one,
-        lambda seen, right: right.tolerance / seen.size if seen.fixed else math.inf,
-        lambda value, seen, right: f"bodies sink {metres(value * seen.size)} into each other",
+    "speed": _own(
+        "speed", "largest speed in the end, in sizes of the smallest body per second",
+        limit=lambda seen, right: SPEED if seen.fixed and _rests(right) else math.inf,
+        words=lambda value, seen, _: f"what rests still moves at {metres(value * seen.size)} per second",
     ),
-    "speed": Norm(
-        "largest speed in the end, in sizes of the smallest body per second", lambda seen, right: seen.speed, _one,
-        lambda seen, right: SPEED if seen.fixed and _rests(right) else math.inf,
-        lambda value, seen, right: f"what rests still moves at {metres(value * seen.size)} per second",
-    ),
-    "drift": Norm(
-        "largest distance that a body gets in the second half, in sizes of the smallest body",
-        lambda seen, right: seen.drift, _one,
-    ),
-    "pressure": Norm(
-        "mean force on all that stands still, after the first fifth; 1 is the right one", _off("pressure"),
-        _size_of("pressure"), mean=True, needs="pressure",
-    ),
-    "rate": Norm(
-        "impacts per second, after the first fifth; 1 is the right rate", _off("rate"), _size_of("rate"), mean=True,
-        needs="rate",
-    ),
-    "kinetic": Norm(
-        "kinetic energy in the end; 1 is the right one", _off("kinetic"), _size_of("kinetic"), mean=True,
-        needs="kinetic",
-    ),
+    "drift": _own("drift", "largest distance that a body gets in the second half, in sizes of the smallest body"),
+    "pressure": _relative("pressure", "mean force on all that stands still, after the first fifth", mean=True),
+    "rate": _relative("rate", "impacts per second, after the first fifth; 1 is the right rate", mean=True),
+    "kinetic": _relative("kinetic", "kinetic energy in the end; 1 is the right one", mean=True),
 }  # fmt: skip
 
 
@@ -242,11 +226,8 @@ def _rests(right: Seen) -> bool:
     return right.met and right.speed <= STILL
 
 
-@functools.cache
-def norm_of(name: str, place: bool = False, chaotic: bool = False) -> Norm:
-    """The norm of that name; a name that is not in NORMS is that of something a game compares."""
-    if name in NORMS:
-        return NORMS[name]
+def game_norm(name: str, place: bool = False, chaotic: bool = False) -> Norm:
+    """Of a number, or a place, that a game compares by that name."""
 
     def scale(seen: Seen, right: Seen) -> float:
         values = [abs(one.values.get(name, [math.nan])[0]) for one in (right, seen)]
@@ -277,7 +258,7 @@ def norms_for(name: str, facts: Facts, asked: Sequence[str]) -> tuple[dict[str, 
     """All norms of a scene, and the names of those that are shown, the first counts; Problem for one that there is not,
     or that would measure chance."""
     values = facts.trial.values
-    known = {**NORMS, **{one: norm_of(one, len(value) > 1, facts.chaotic) for one, value in values.items()}}
+    known = {**NORMS, **{one: game_norm(one, len(value) > 1, facts.chaotic) for one, value in values.items()}}
     for one in asked:
         if one not in known:
             raise Problem(f"no norm {one!r}{did_you_mean(one, known)}")

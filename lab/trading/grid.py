@@ -17,6 +17,7 @@ import numpy as np
 
 from ...framework import Settings, World
 from ...framework.settings import COLLISION_MODES
+from ..cli.loading import stdout_kept_clean
 from ..cli.usage_errors import Problem
 from ..engines.adapters import CaromEngine
 from ..inputs import forget_asked, times_asked
@@ -82,10 +83,11 @@ class Task:
 def perform(task: Task) -> Seen:
     """What the run shows; of one that an error ends that it has failed, and why."""
     try:
-        with closing(CaromEngine(task.world())) as engine, task.subject.loaded.attribute_errors():
+        loaded = task.subject.loaded
+        with closing(CaromEngine(task.world())) as engine, loaded.attribute_errors(), stdout_kept_clean():
             seen = observe(
                 engine, task.seconds, task.settings.dt, task.phase, task.whole, task.walled, task.inputs,
-                task.subject.loaded.values_of,
+                loaded.values_of,
             )  # fmt: skip
             if seen.failure and engine.world.physics is not None:
                 engine.world.physics.report_faults("")  # of what no step has looked at yet
@@ -114,7 +116,7 @@ def milliseconds(task: Task) -> float | None:
     passes, total = [], 0.0
     for _ in range(PASSES):
         spent = simulated = 0.0
-        with task.subject.loaded.attribute_errors(), closing(task.world()) as world:
+        with closing(task.world()) as world, task.subject.loaded.attribute_errors(), stdout_kept_clean():
             world.step()  # the first one prepares what all others use
             for _ in range(max(int(task.seconds / task.settings.dt / BLOCK), 1)):
                 seconds, valid, _ = timed(lambda world=world: [world.step() for _ in range(BLOCK)])
@@ -183,7 +185,7 @@ def survey(subject: Subject, seconds: float, jobs: Jobs) -> Facts:
     swept = settings.replace(collision="event_driven" if settings.collision == "event_driven" else "continuous")
     forget_asked()
     other = _obedient(subject, swept.replace(dt=settings.dt / 2, substeps=settings.substeps + 1))
-    with closing(other), subject.loaded.attribute_errors():
+    with closing(other), subject.loaded.attribute_errors(), stdout_kept_clean():
         other.step()
     task = Task(subject, swept, seconds, subject.seed, inputs=times_asked(seconds))
 

@@ -19,7 +19,7 @@ from carom.lab import Trade, trade
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.jobs import Jobs
 from carom.lab.measure.observation import Seen, mean_of, step_lengths
-from carom.lab.trading.errors import NEVER, NORMS, Figure, figures_of, norm_of, other_touches
+from carom.lab.trading.errors import NEVER, NORMS, Figure, figures_of, game_norm, other_touches
 from carom.lab.trading.grid import Facts, grid, perform, survey, tasks_of
 from carom.lab.trading.subject import Subject
 from carom.lab.trading.trade import Point, SceneTrade, next_better, recommended, settings_line
@@ -290,7 +290,7 @@ def seen(values=None, **more):
     ([0.0, 1.0], [0.0, 1.009], 0.009 / 4, ""),
 ])  # fmt: skip
 def test_values_of_a_game_are_compared_by_name(mine, right, error, words):
-    norms = {"x": norm_of("x", len(right) > 1)}
+    norms = {"x": game_norm("x", len(right) > 1)}
     figure = figures_of([seen({"x": mine})], seen({"x": right}), norms)["x"]
     assert figure.error == pytest.approx(error)
     assert figure.text == words if words else figure.times <= 1
@@ -299,7 +299,7 @@ def test_values_of_a_game_are_compared_by_name(mine, right, error, words):
 def test_a_mean_is_noticed_beyond_chance_and_beyond_what_games_differ_by():
     right = mean_of([seen({"kills": [kills]}) for kills in (90.0, 110.0, 100.0, 100.0)], ())
     right.tolerance = 0.01
-    norms = {"kills": norm_of("kills", False, True)}
+    norms = {"kills": game_norm("kills", False, True)}
 
     def times(mean, count):
         return figures_of([seen({"kills": [mean]})] * count, right, norms, True)["kills"].times

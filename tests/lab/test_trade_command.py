@@ -61,6 +61,16 @@ def test_a_newcomers_file_is_measured_and_the_line_keeps_the_error(carom, tmp_pa
         assert world.bodies.dynamic.position[0, 1] == pytest.approx(1.25 - 5 * since_apex**2, abs=1e-3 * 3.0 * 1.7)
 
 
+def test_what_a_game_prints_does_not_go_to_stdout(carom, tmp_path):
+    speaks = "class Speaks(System):\n    def process(self, dt):\n        print('said')\n"
+    world = "world = World(Physics(dimensions=2, gravity=(0.0, -10.0)), settings=settings)"
+    game = BALL.replace(world, f"{world}\n    world.add_system(Speaks())")
+    scene_file(tmp_path, f"from carom.framework import System\n{speaks}{game}")
+    result = carom("mine.py", *SHORT, "--seconds", "0.3", "--json")
+    assert json.loads(result.stdout)["scenes"]
+    assert "said" in result.stderr
+
+
 def test_json_alone_goes_to_stdout_and_nothing_runs_twice(carom, monkeypatch):
     pytest.importorskip("joblib")
     first = carom("jump", *SHORT, "--json")
