@@ -6,7 +6,7 @@ import math
 
 from ..bench.report import machine_line
 from ..reporting.text import NOTHING, TextTable, compact, metres, number
-from .errors import NEVER
+from .errors import NEVER, SHARE
 from .trade import FIELDS, Point, SceneTrade, Trade, seconds_text
 
 FRAME = 1 / 60  # s: the frame of a game whose cost is told
@@ -20,6 +20,8 @@ def answer(case: SceneTrade) -> list[str]:
     if case.refused:
         return [f"{case.scene}: not measured: {case.refused}"]
     name = f"{case.scene}{' (chaotic: means over seeds)' * case.chaotic}"
+    if case.doubt > SHARE * case.size:
+        name += f" (places are known to {metres(case.doubt)} only)"
     own, chosen, more = case.own, case.chosen, case.more
     if chosen is None:
         return [f"{name}: {_none_meets(case)}"]

@@ -117,6 +117,11 @@ def _names_places(right: Seen) -> bool:
     return any(len(value) > 1 for value in right.values.values())
 
 
+def _reliable(right: Seen) -> float:
+    """How far a body may be elsewhere, as far as that is known."""
+    return max(right.tolerance, 2 * right.doubt)
+
+
 def _judged(limit: Measure) -> Measure:
     """That limit where bodies can be compared; else nothing is noticed."""
 
@@ -164,7 +169,7 @@ NORMS: Mapping[str, Norm] = {
     "position": Norm(
         "largest distance of a body from where it should be in the end; 1 is the longest way of a body from its start",
         lambda seen, right: float(distances(seen, right)[0].max(initial=0.0)), _reach,
-        lambda seen, right: max(right.tolerance, right.doubt) if seen.fixed and not _names_places(right) else math.inf,
+        lambda seen, right: math.inf if _names_places(right) or not seen.fixed else _reliable(right),
         _ends, by_body=True,
     ),
     "energy": Norm(
@@ -302,8 +307,8 @@ def reference_of(
     finest: Sequence[Seen], tolerance: float | None = None,
 ) -> tuple[Seen, dict[str, float]]:  # fmt: skip
     """What is right, and its own error by norm, from the runs with the two finest steps: extrapolated to a step of 0
-    (Richardson), or of a chaotic scene their means. tolerance: how far a body may be elsewhere, m (default: a share of
-    its size). Problem if they have failed, and for a norm that is 0 throughout."""
+    (Richardson), beside a run of another method; or of a chaotic scene their means. tolerance: how far a body may be
+    elsewhere, m (default: a share of its size). Problem if they have failed, and if all norms are 0 throughout."""
     for seen in (*fine, *finest):
         if seen.failure:
             raise Problem(f"{name} has no reference: its run {seen.failure}{seen.detail and f': {seen.detail}'}")
@@ -311,18 +316,18 @@ def reference_of(
         right = mean_of([*fine, *finest], [one for one, norm in NORMS.items() if norm.mean and norm.needs])
     else:
         right = _extrapolated(fine[0], finest[0], facts.order)
-        right = dataclasses.replace(right, doubt=float(distances(finest[0], right)[0].max(initial=0.0)))
+        right = dataclasses.replace(right, doubt=max(float(distances(one, right)[0].max(initial=0)) for one in finest))
     right = dataclasses.replace(right, tolerance=SHARE * right.size if tolerance is None else tolerance)
     idle = [one for one in shown if norms[one].needs and not getattr(right, norms[one].needs)]
-    if idle:
+    if len(idle) == len(shown):
         usable = [one for one, norm in norms.items() if not norm.needs or getattr(right, norm.needs)]
         raise Problem(f"{name}: {', '.join(idle)} is 0 throughout; what can be measured here: {', '.join(usable)}")
     agreement = {}
-    for one in shown:
-        norm = norms[one]
+    for one, norm in ((one, norms[one]) for one in shown if one not in idle):
         errors = [norm.measure(seen, right) / norm.scale(seen, right) for seen in (*fine, *finest)]
         absolute = norm.scale is _one or (one == "energy" and conserves(right))  # what is right is known without it
-        own = float(np.std(errors, ddof=1)) / math.sqrt(len(errors)) if facts.chaotic else abs(errors[-1])
+        spread = float(np.std(errors, ddof=1)) / math.sqrt(len(errors))
+        own = spread if facts.chaotic else max(map(abs, errors[1:]))
         agreement[one] = 0.0 if absolute else own
     return right, agreement
 

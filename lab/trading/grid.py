@@ -167,6 +167,13 @@ class Facts:
         return fine.replace(integrator="yoshida4" if self.force_systems else "velocity_verlet")
 
     @property
+    def other(self) -> Settings:
+        """Another method as good, which would not make the same mistake."""
+        if self.contacts:
+            return self.exact.replace(collision="continuous")
+        return self.exact.replace(integrator="rk4" if self.force_systems else "velocity_verlet")
+
+    @property
     def order(self) -> int:
         """Of the reference's method."""
         return 4 if self.exact.integrator == "yoshida4" else 2

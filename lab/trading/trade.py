@@ -68,6 +68,7 @@ class SceneTrade:
     norms: in words, the first counts; game: the names of what the game compares
     reference: in words; agreement: its own error by norm
     scale: what the first norm is relative to, in the scene's units; size: m, of the smallest body
+    doubt: m, how far the reference may have a body elsewhere
     max_error, max_cost: what is asked for, relative to the scale, and ms per simulated second
     own, chosen, more: what it has now, what to use, and one step more; None: there is none
     inputs: what is noticed if inputs act in whole steps, by the length of the step, s
@@ -84,6 +85,7 @@ class SceneTrade:
     agreement: Mapping[str, float] = field(default_factory=dict)
     scale: float = 1.0
     size: float = 1.0
+    doubt: float = 0.0
     max_error: float = math.inf
     max_cost: float = math.inf
     points: list[Point] = field(default_factory=list)
@@ -186,18 +188,21 @@ def measured(
     usual = SEEDS if facts.chaotic else APEX_PHASES if "apex" in norms else 1 if facts.rests else PHASES
     repeats = repeats or usual
 
-    # The two finest steps: of the reference's method, or with half of the seeds each: chance hides what is finer.
+    # The two finest steps, and another method; of chaos half of the seeds each, as chance hides what is finer.
     fine, runs = (own.dt / 2, max(repeats // 2, 2)) if facts.chaotic else (min(cell.dt for cell in cells) / 2, 1)
-    tasks = [tasks_of(subject, facts, facts.exact.replace(dt=dt), range(runs)) for dt in (fine, fine / 2)]
-    found = jobs.all(perform, [*tasks[0], *tasks[1]], f"{subject.name}: reference")
+    exact = [facts.exact.replace(dt=fine), facts.exact.replace(dt=fine / 2)]
+    exact += [] if facts.chaotic else [facts.other.replace(dt=fine / 2)]
+    tasks = [task for cell in dict.fromkeys(exact) for task in tasks_of(subject, facts, cell, range(runs))]
+    found = jobs.all(perform, tasks, f"{subject.name}: reference")
     right, agreement = reference_of(subject.name, facts, known, shown, found[:runs], found[runs:], tolerance)
 
+    shown = tuple(agreement)
     method = facts.exact.collision if facts.contacts else facts.exact.integrator
     scale = known[shown[0]].scale(right, right)
     case = SceneTrade(
         subject.name, facts.chaotic, facts.why, {name: known[name].text for name in shown}, tuple(right.values),
         facts.seconds, f"{method}, steps of {seconds_text(fine)} and {seconds_text(fine / 2)} s", agreement, scale,
-        right.size, math.inf if max_error is None else max_error / (scale if absolute else 1.0),
+        right.size, right.doubt, math.inf if max_error is None else max_error / (scale if absolute else 1.0),
         math.inf if max_cost is None else 60 * max_cost,
     )  # fmt: skip
     seens: dict[Settings, list[Seen]] = {}

@@ -19,7 +19,8 @@ from carom.lab import Trade, trade
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.jobs import Jobs
 from carom.lab.measure.observation import Seen, mean_of, step_lengths
-from carom.lab.trading.errors import NEVER, NORMS, Figure, figures_of, game_norm, other_touches
+from carom.lab.trading.answer import answer
+from carom.lab.trading.errors import NEVER, NORMS, Figure, figures_of, game_norm, norms_for, other_touches, reference_of
 from carom.lab.trading.grid import Facts, grid, perform, survey, tasks_of
 from carom.lab.trading.subject import Subject
 from carom.lab.trading.trade import Point, SceneTrade, next_better, recommended, settings_line
@@ -158,6 +159,23 @@ def test_what_rests_is_judged_by_what_it_sinks(tmp_path):
     for point in case.points:
         assert point.figures["overlap"].error < 0.01
         assert point.severity <= 1
+
+
+def test_two_methods_that_disagree_are_no_reference_for_places():
+    """What one of them has elsewhere is not noticed, and the answer says so."""
+    facts = facts_of("oblique", 3.0)
+    norms, shown = norms_for("oblique", facts, ())
+    one = seen(fixed=True, impacts=1, times=[0.5])
+    other = dataclasses.replace(one, position=np.array([[0.0, 0.3]]))
+    right, agreement = reference_of("oblique", facts, norms, shown, [one], [one, other])
+    assert right.doubt == pytest.approx(0.3)
+    assert agreement["position"] == pytest.approx(0.3 / 4.0)
+    assert figures_of([other], right, norms)["position"].times <= 0.5
+    right, agreement = reference_of("oblique", facts, norms, shown, [other], [one, one])
+    assert right.doubt == pytest.approx(0.1)  # second order: a third of what the step changes
+    own = point(1 / 60, 100.0)
+    case = SceneTrade("a", norms={"position": ""}, points=[own], own=own, chosen=own, doubt=0.3)
+    assert answer(case)[0] == "a (places are known to 30 cm only): use 60 (as it has now)"
 
 
 # -- the choice, in runs of the test --------------------------------------------------------------------------------
