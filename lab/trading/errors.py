@@ -17,6 +17,7 @@ from .grid import STILL, Facts
 AT_ONCE = 0.01  # s: contacts this close have no order
 CONSERVED = 1e-6  # a reference with a relative energy change below this conserves energy
 NO_ENERGY = 1e-3  # relative to the largest kinetic energy: a smaller total is no useful scale
+EXPLAINED = 3.0  # times what half of the step changes: as far as a method of first order may be from what is right
 FAR = 1e3  # times the reach of the reference, or a size: a body farther away has blown up
 TRUSTED = 10.0  # an error counts as measured if it is so many times the reference's own
 
@@ -303,20 +304,20 @@ def failure_of(seen: Seen, right: Seen, chaotic: bool) -> str | None:
 
 
 def reference_of(
-    name: str, facts: Facts, norms: Mapping[str, Norm], shown: Sequence[str], fine: Sequence[Seen],
-    finest: Sequence[Seen], tolerance: float | None = None,
+    name: str, facts: Facts, norms: Mapping[str, Norm], shown: Sequence[str], seens: Sequence[Seen],
+    tolerance: float | None = None,
 ) -> tuple[Seen, dict[str, float]]:  # fmt: skip
-    """What is right, and its own error by norm, from the runs with the two finest steps: extrapolated to a step of 0
-    (Richardson), beside a run of another method; or of a chaotic scene their means. tolerance: how far a body may be
+    """What is right, and its own error by norm. seens: of a chaotic scene runs of several seeds; else two runs with the
+    finest steps, extrapolated to a step of 0 (Richardson), and two of another method. tolerance: how far a body may be
     elsewhere, m (default: a share of its size). Problem if they have failed, and if all norms are 0 throughout."""
-    for seen in (*fine, *finest):
+    for seen in seens:
         if seen.failure:
             raise Problem(f"{name} has no reference: its run {seen.failure}{seen.detail and f': {seen.detail}'}")
     if facts.chaotic:
-        right = mean_of([*fine, *finest], [one for one, norm in NORMS.items() if norm.mean and norm.needs])
+        right = mean_of(seens, [one for one, norm in NORMS.items() if norm.mean and norm.needs])
     else:
-        right = _extrapolated(fine[0], finest[0], facts.order)
-        right = dataclasses.replace(right, doubt=max(float(distances(one, right)[0].max(initial=0)) for one in finest))
+        right = _extrapolated(seens[0], seens[1], facts.order)
+        right = dataclasses.replace(right, doubt=_own_error(NORMS["position"].measure, right, *seens[1:]))
     right = dataclasses.replace(right, tolerance=SHARE * right.size if tolerance is None else tolerance)
     idle = [one for one in shown if norms[one].needs and not getattr(right, norms[one].needs)]
     if len(idle) == len(shown):
@@ -324,12 +325,21 @@ def reference_of(
         raise Problem(f"{name}: {', '.join(idle)} is 0 throughout; what can be measured here: {', '.join(usable)}")
     agreement = {}
     for one, norm in ((one, norms[one]) for one in shown if one not in idle):
-        errors = [norm.measure(seen, right) / norm.scale(seen, right) for seen in (*fine, *finest)]
-        absolute = norm.scale is _one or (one == "energy" and conserves(right))  # what is right is known without it
-        spread = float(np.std(errors, ddof=1)) / math.sqrt(len(errors))
-        own = spread if facts.chaotic else max(map(abs, errors[1:]))
-        agreement[one] = 0.0 if absolute else own
+        if norm.scale is _one or (one == "energy" and conserves(right)):  # what is right is known without it
+            agreement[one] = 0.0
+        elif facts.chaotic:
+            errors = [norm.measure(seen, right) for seen in seens]
+            agreement[one] = float(np.std(errors, ddof=1)) / math.sqrt(len(errors)) / norm.scale(right, right)
+        else:
+            agreement[one] = _own_error(norm.measure, right, *seens[1:]) / norm.scale(right, right)
     return right, agreement
+
+
+def _own_error(measure: Measure, right: Seen, finest: Seen, other: Seen, other_finest: Seen) -> float:
+    """What the extrapolation has changed; or how far another method is, if its own step does not explain that."""
+    apart = abs(measure(other_finest, right))
+    explained = apart <= EXPLAINED * abs(measure(other, other_finest))
+    return float(max(abs(measure(finest, right)), 0.0 if explained else apart))
 
 
 def _extrapolated(fine: Seen, finest: Seen, order: int) -> Seen:

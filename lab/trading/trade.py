@@ -23,6 +23,7 @@ from ..jobs import Jobs
 from ..measure.observation import Seen
 from ..plain import jsonable
 from ..reporting.progress import NO_PROGRESS, Progress
+from ..reporting.text import number
 from .errors import TRUSTED, Figure, failure_of, figures_of, norms_for, reference_of
 from .grid import FEWEST_STEPS, FIELDS, PHASES, SEEDS, Facts, grid, milliseconds, perform, survey, tasks_of
 from .subject import Subject
@@ -190,18 +191,18 @@ def measured(
 
     # The two finest steps, and another method; of chaos half of the seeds each, as chance hides what is finer.
     fine, runs = (own.dt / 2, max(repeats // 2, 2)) if facts.chaotic else (min(cell.dt for cell in cells) / 2, 1)
-    exact = [facts.exact.replace(dt=fine), facts.exact.replace(dt=fine / 2)]
-    exact += [] if facts.chaotic else [facts.other.replace(dt=fine / 2)]
-    tasks = [task for cell in dict.fromkeys(exact) for task in tasks_of(subject, facts, cell, range(runs))]
+    methods = (facts.exact,) if facts.chaotic else (facts.exact, facts.other)
+    exact = [method.replace(dt=dt) for method in methods for dt in (fine, fine / 2)]
+    tasks = [task for cell in exact for task in tasks_of(subject, facts, cell, range(runs))]
     found = jobs.all(perform, tasks, f"{subject.name}: reference")
-    right, agreement = reference_of(subject.name, facts, known, shown, found[:runs], found[runs:], tolerance)
+    right, agreement = reference_of(subject.name, facts, known, shown, found, tolerance)
 
     shown = tuple(agreement)
     method = facts.exact.collision if facts.contacts else facts.exact.integrator
     scale = known[shown[0]].scale(right, right)
     case = SceneTrade(
         subject.name, facts.chaotic, facts.why, {name: known[name].text for name in shown}, tuple(right.values),
-        facts.seconds, f"{method}, steps of {seconds_text(fine)} and {seconds_text(fine / 2)} s", agreement, scale,
+        facts.seconds, f"{method}, steps of {number(fine)} and {number(fine / 2)} s", agreement, scale,
         right.size, right.doubt, math.inf if max_error is None else max_error / (scale if absolute else 1.0),
         math.inf if max_cost is None else 60 * max_cost,
     )  # fmt: skip

@@ -167,12 +167,15 @@ def test_two_methods_that_disagree_are_no_reference_for_places():
     norms, shown = norms_for("oblique", facts, ())
     one = seen(fixed=True, impacts=1, times=[0.5])
     other = dataclasses.replace(one, position=np.array([[0.0, 0.3]]))
-    right, agreement = reference_of("oblique", facts, norms, shown, [one], [one, other])
+    right, agreement = reference_of("oblique", facts, norms, shown, [one, one, other, other])
     assert right.doubt == pytest.approx(0.3)
     assert agreement["position"] == pytest.approx(0.3 / 4.0)
     assert figures_of([other], right, norms)["position"].times <= 0.5
-    right, agreement = reference_of("oblique", facts, norms, shown, [other], [one, one])
+    right, agreement = reference_of("oblique", facts, norms, shown, [other, one, one, one])
     assert right.doubt == pytest.approx(0.1)  # second order: a third of what the step changes
+    near = dataclasses.replace(one, position=np.array([[0.0, 0.15]]))
+    right, agreement = reference_of("oblique", facts, norms, shown, [one, one, other, near])
+    assert right.doubt == 0.0  # the other method is on its way there
     own = point(1 / 60, 100.0)
     case = SceneTrade("a", norms={"position": ""}, points=[own], own=own, chosen=own, doubt=0.3)
     assert answer(case)[0] == "a (places are known to 30 cm only): use 60 (as it has now)"
