@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
+import weakref
 from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import nullcontext
@@ -43,6 +44,8 @@ class Jobs:
             raise ValueError(f"workers must be a whole number of at least 1, not {workers!r}")
         self.workers, self.progress = workers, progress
         self._client = _client(cluster) if cluster else None
+        if self._client is not None:
+            weakref.finalize(self, self._client.close)
         self._kept: Any = None
         if folder is not None and joblib is not None:
             self._kept = joblib.Memory(folder, verbose=0).cache(_result, ignore=["function", "task"])
@@ -97,11 +100,13 @@ def _elsewhere(call: Any, *given: Any) -> Any:
 def _client(address: str) -> Any:
     """A client of the scheduler there; Problem for one that cannot be reached, has no workers, or such that would give
     other results or have several threads: worlds share what a process has."""
+    if joblib is None:
+        raise Problem(f"--cluster: {MISSING}")
     try:
         client = importlib.import_module("distributed").Client(address, timeout=PATIENCE, set_as_default=False)
         threads = [worker["nthreads"] for worker in client.scheduler_info(n_workers=-1)["workers"].values()]
-        if joblib is None or max(threads, default=0) != 1:
-            raise ValueError(f"start workers with --nthreads 1; it has {threads or 'none'}" if joblib else MISSING)
+        if max(threads, default=0) != 1:
+            raise ValueError(f"start workers with --nthreads 1; it has {threads or 'none'}")
         here = _versions()
         for worker, there in client.run(_versions).items():
             if there != here:

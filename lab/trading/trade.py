@@ -24,7 +24,7 @@ from ..measure.observation import Seen
 from ..plain import jsonable
 from ..reporting.progress import NO_PROGRESS, Progress
 from ..reporting.text import number
-from .errors import TRUSTED, Figure, failure_of, figures_of, norms_for, reference_of
+from .errors import SHARE, TRUSTED, Figure, Norm, failure_of, figures_of, norms_for, reference_of
 from .grid import FEWEST_STEPS, FIELDS, PHASES, SEEDS, Facts, grid, milliseconds, perform, survey, tasks_of
 from .subject import Subject
 
@@ -188,22 +188,19 @@ def measured(
     cells, own = grid(facts, vary), facts.settings
     usual = SEEDS if facts.chaotic else APEX_PHASES if "apex" in norms else 1 if facts.rests else PHASES
     repeats = repeats or usual
-
-    # The two finest steps, and another method; of chaos half of the seeds each, as chance hides what is finer.
+    # Of the reference: the two finest steps; of chaos half of the seeds each, as chance hides what is finer.
     fine, runs = (own.dt / 2, max(repeats // 2, 2)) if facts.chaotic else (min(cell.dt for cell in cells) / 2, 1)
     methods = (facts.exact,) if facts.chaotic else (facts.exact, facts.other)
     exact = [method.replace(dt=dt) for method in methods for dt in (fine, fine / 2)]
     tasks = [task for cell in exact for task in tasks_of(subject, facts, cell, range(runs))]
     found = jobs.all(perform, tasks, f"{subject.name}: reference")
     right, agreement = reference_of(subject.name, facts, known, shown, found, tolerance)
-
-    shown = tuple(agreement)
-    method = facts.exact.collision if facts.contacts else facts.exact.integrator
-    scale = known[shown[0]].scale(right, right)
+    scale, method = known[next(iter(agreement))].scale(right, right), facts.exact
     case = SceneTrade(
-        subject.name, facts.chaotic, facts.why, {name: known[name].text for name in shown}, tuple(right.values),
-        facts.seconds, f"{method}, steps of {number(fine)} and {number(fine / 2)} s", agreement, scale,
-        right.size, right.doubt, math.inf if max_error is None else max_error / (scale if absolute else 1.0),
+        subject.name, facts.chaotic, facts.why, {name: known[name].text for name in agreement}, tuple(right.values),
+        facts.seconds, f"{method.collision if facts.contacts else method.integrator}, steps of {number(fine)} and "
+        f"{number(fine / 2)} s", agreement, scale, right.size, right.doubt,
+        math.inf if max_error is None else max_error / (scale if absolute else 1.0),
         math.inf if max_cost is None else 60 * max_cost,
     )  # fmt: skip
     seens: dict[Settings, list[Seen]] = {}
@@ -220,21 +217,16 @@ def measured(
     first = [cell for cell in cells if cell.dt not in later]
     run([*first, *[own] * (own not in first and FEWEST_STEPS * own.dt <= facts.seconds)], repeats if thorough else 1)
     while True:
-        case.points = []
-        for cell, found in seens.items():
-            failures = [failure_of(seen, right, facts.chaotic) for seen in found]
-            good = [seen for seen, failure in zip(found, failures, strict=True) if failure is None]
-            words = [f"{failures.count(one)} of {len(found)} {one}" for one in dict.fromkeys(filter(None, failures))]
-            case.points.append(Point(
-                cell, settings_line(cell), cell in cells, len(found), figures_of(good, right, known, facts.chaotic),
-                ", ".join(words), _work(found), times.get(cell),
-            ))  # fmt: skip
+        case.points = [
+            _point(cell, cell in cells, found, right, known, facts.chaotic, times.get(cell))
+            for cell, found in seens.items()
+        ]
         case.own = next((point for point in case.points if point.settings == own), None)
         case.chosen = recommended(case)
         case.more = next_better(case)
         answers = [point for point in (case.own, case.chosen) if point is not None]
-        if few := {point.settings: 0 for point in answers if point.repeats < repeats and not point.failed}:
-            run(list(few), repeats)
+        if few := [point.settings for point in answers if point.repeats < repeats and not point.failed]:
+            run(list(dict.fromkeys(few)), repeats)
         elif later and (case.chosen is None or (case.max_error == math.inf and case.chosen.severity > 1)):
             run([cell for cell in cells if cell.dt == later[-1]], 1)
             later.pop()
@@ -248,10 +240,19 @@ def measured(
     return case
 
 
-def _work(seens: Sequence[Seen]) -> float:
-    """Per simulated second, the mean of the runs."""
-    known = [work_of(seen.counts) / (seen.simulated or seen.seconds) for seen in seens if seen.counts]
-    return sum(known) / max(len(known), 1)
+def _point(
+    cell: Settings, asked: bool, seens: Sequence[Seen], right: Seen, norms: Mapping[str, Norm], chaotic: bool,
+    milliseconds: float | None,
+) -> Point:  # fmt: skip
+    """What the runs of a setting have shown, against what is right."""
+    failures = [failure_of(seen, right, chaotic) for seen in seens]
+    good = [seen for seen, failure in zip(seens, failures, strict=True) if failure is None]
+    words = [f"{failures.count(one)} of {len(seens)} {one}" for one in dict.fromkeys(filter(None, failures))]
+    works = [work_of(seen.counts) / (seen.simulated or seen.seconds) for seen in seens if seen.counts]
+    return Point(
+        cell, settings_line(cell), asked, len(seens), figures_of(good, right, norms, chaotic), ", ".join(words),
+        sum(works) / max(len(works), 1), milliseconds,
+    )  # fmt: skip
 
 
 def _inputs_late(subject: Subject, facts: Facts, cell: Settings, repeats: int, jobs: Jobs) -> list[str]:
@@ -263,7 +264,7 @@ def _inputs_late(subject: Subject, facts: Facts, cell: Settings, repeats: int, j
     worst: dict[str, Figure] = {}
     for right, seen in zip(seens[:repeats], seens[repeats:], strict=True):
         if not (right.failure or seen.failure):
-            right = dataclasses.replace(right, tolerance=right.size / 100)
+            right = dataclasses.replace(right, tolerance=SHARE * right.size)
             for name, figure in figures_of([seen], right, norms_for(subject.name, facts, ())[0]).items():
                 worst[name] = max(worst.get(name, figure), figure, key=lambda figure: figure.times)
     return [figure.text for figure in sorted(worst.values(), key=lambda figure: -figure.times) if figure.times > 1]

@@ -114,6 +114,7 @@ def test_without_joblib_one_process_does_it_and_says_so_once(carom, tmp_path, mo
     assert without.stdout == with_it.stdout
     refused = carom("trade", "jump", "--cluster", "tcp://127.0.0.1:1")
     assert refused.exit_code == 2
+    assert "joblib is missing" in refused.stderr
 
 
 @pytest.mark.slow
