@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -98,20 +97,6 @@ def one_impact(world: World, seconds: float) -> Seen:
     return _seen(path, seconds, world, True, [when])
 
 
-@dataclass(frozen=True)
-class Form:
-    """``options``: keywords of the scene that the closed form supports."""
-
-    text: str
-    function: Callable[[World, float], Seen]
-    options: tuple[str, ...] = ()
-
-
-FORMS: Mapping[str, Form] = {
-    "jump": Form("the parabola, apex v²/2g", flight),
-    "freefall": Form("parabolas", flight, ("n",)),
-    "spring": Form("x(t) = cos(ωt)", swinging, ("stiffness",)),
-    "orbit": Form("Kepler's ellipse", kepler, ("eccentricity",)),
-    "bouncing": Form("parabolas between elastic bounces", bounces, ("n", "height")),
-    "oblique": Form("momentum and energy of one oblique impact", one_impact, ("mass",)),
-}
+FORMS: Mapping[str, Callable[[World, float], Seen]] = {
+    "jump": flight, "spring": swinging, "orbit": kepler, "bouncing": bounces, "oblique": one_impact,
+}  # fmt: skip

@@ -216,6 +216,7 @@ NORMS: Mapping[str, Norm] = {
         limit=lambda seen, right: right.tolerance / seen.size if seen.fixed else math.inf,
         words=lambda value, seen, _: f"bodies sink {metres(value * seen.size)} into each other",
     ),
+    "overlap_mean": _own("overlap_mean", "overlap per body in the second half, in sizes of the smaller body"),
     "speed": _own(
         "speed", "largest speed in the end, in sizes of the smallest body per second",
         limit=lambda seen, right: SPEED if seen.fixed and _rests(right) else math.inf,

@@ -75,7 +75,7 @@ def orbit(make: Make, seconds: float) -> Errors:
 
 def _closed_form(name: str, make: Make, seconds: float) -> Seen:
     with make() as world:
-        return FORMS[name].function(world, seconds)
+        return FORMS[name](world, seconds)
 
 
 def rest(make: Make, seconds: float) -> Errors:

@@ -68,7 +68,7 @@ def test_errors_against_the_own_reference_are_those_against_the_closed_form(name
         name, seconds=seconds, options=options, repeats=1, vary={"dt": (cell.dt,), "integrator": (cell.integrator,)}
     )
     with subject.world(cell) as world:
-        right = FORMS[name].function(world, seconds)
+        right = FORMS[name](world, seconds)
     (task,) = tasks_of(subject, facts, cell, [0])
     true = figures_of([perform(task)], dataclasses.replace(right, tolerance=1.0), NORMS)
     for norm in ("position", "energy"):
