@@ -177,14 +177,14 @@ def outcome_of_steps(scene: Subject, seconds: float, jobs: Jobs, way: float | No
         vary: dict[str, Any] = {name: (getattr(own, name),) for name in FIELDS}
         vary["dt"] = [own.dt * factor for factor in STEPS if factor <= 1 or own.dt * factor <= longest]
         case = measured(scene, jobs, vary=vary, seconds=seconds, thorough=True, tolerance=way)
-        return _outcome(case, scene, way)
+        return _outcome(case, way)
     except Problem as problem:
         return StepOutcome(refused=problem.message)
 
 
-def _outcome(case: SceneTrade, scene: Subject, way: float | None) -> StepOutcome:
+def _outcome(case: SceneTrade, way: float | None) -> StepOutcome:
     points = sorted(case.points, key=lambda point: point.settings.dt)
-    found = StepOutcome(0.0, points[0].settings.dt, case.size, way, compared=scene.names)
+    found = StepOutcome(0.0, points[0].settings.dt, case.size, way, compared=case.game)
     runs = sum(point.repeats for point in points)
     found.known = f"from {counted(runs, 'run')} of {number(case.seconds)} s with {counted(len(points), 'step')}"
     for point in points:

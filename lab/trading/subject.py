@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import functools
 import hashlib
@@ -64,14 +63,6 @@ class Subject:
         if not self.options:
             return loaded
         return dataclasses.replace(loaded, function=functools.partial(loaded.function, **dict(self.options)))
-
-    @functools.cached_property
-    def names(self) -> tuple[str, ...]:
-        """The names of what the game says is compared; none for a scene."""
-        if self.loaded.compared is None:
-            return ()
-        with contextlib.closing(self.world(None)) as world:
-            return tuple(self.loaded.values_of(world))
 
     @property
     def seconds(self) -> float:

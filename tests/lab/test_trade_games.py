@@ -200,7 +200,7 @@ def test_what_cannot_be_compared_is_refused(returned, words):
 
     game.compared = lambda world: returned
     with pytest.raises(Problem, match=words):
-        print(Subject.of(game).names)
+        trade(game, seconds=0.2, vary={"dt": (1 / 30,)}, **FEW)
     if isinstance(returned, dict):
         game.compared = lambda world: {"where": world.bodies.position[0]}
         with pytest.raises(Problem, match="let compared give numbers too"):
@@ -216,6 +216,6 @@ def test_the_games_of_the_examples_play(name, options):
         before = game.loaded.values_of(world)
         for _ in range(90):
             world.step()
-        assert game.loaded.values_of(world).keys() == before.keys() == set(game.names)
+        assert game.loaded.values_of(world).keys() == before.keys()
         assert game.loaded.values_of(world) != before
         assert world.faults == [] or name == "survivors"
