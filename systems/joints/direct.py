@@ -20,7 +20,7 @@ from ..contacts.constants import MOST_RIGID, RIGID
 from ..integration.turning import change_of_spin, cross_spin, twist
 from .given import speed_of_given
 from .order import NO_BLOCK, block_of, freedoms
-from .records import GIVEN, POINT, TURN
+from .records import GIVEN, HELD, LIMITED, POINT, TURN
 
 PUSHES, RELAXES, RESULT_OF, ERRORS = 0, 1, 2, -2  # what is asked of rows; even: errors are pushed out
 
@@ -197,7 +197,7 @@ def factorise(solver, pushes):
     direct.stiffer, direct.mixed = 1.0 if pushes else RIGID, False
     for e in range(joints.begin, joints.end):
         j = joints.order[e]
-        if joints.at_once[j]:
+        if joints.at_once[j] == HELD:
             add_row(solver, j, weight_of(solver, j))
         else:
             direct.mixed = True
@@ -243,7 +243,7 @@ def note_rows(solver, what):
         direct.push[direct.body[q]] = direct.twist[direct.body[q]] = scale(solver.velocity[solver.bodies], 0.0)
     for e in range(joints.begin, joints.end):
         j = joints.order[e]
-        if not joints.at_once[j]:
+        if joints.at_once[j] != HELD:
             continue
         a, b, weight = joints.first[j], joints.second[j], weight_of(solver, j)
         if joints.kind[j] == POINT:
@@ -319,7 +319,7 @@ def bound_push(solver, h):
         _, direct.twist[q] = from_measure(solver, q, zero)
     for e in range(joints.begin, joints.end):
         j = joints.order[e]
-        if not joints.at_once[j]:
+        if joints.at_once[j] != HELD:
             continue
         point = joints.kind[j] == POINT
         error = max(error, h * (joints.push_rate[j] * length(joints.gap[j]) if point else abs(joints.pushing[j])))
@@ -347,3 +347,72 @@ def solve_direct(solver, pushes):
         v = sub(scale(direct.push[q], solver.inverse_mass[q]), v)
         spin = sub(change_of_spin(solver, q, direct.twist[q]), spin)
         solver.velocity[q], solver.spin[q] = add(solver.velocity[q], v), add(solver.spin[q], spin)
+
+
+@inlined
+def change_at(solver, j, k):
+    """How fast the value of row j, of a POINT along axis k, changes by the motion that is in push and twist."""
+    joints, direct = solver.joints, solver.direct
+    a, b = joints.first[j], joints.second[j]
+    push_a, turn_a, push_b, turn_b = pushes_at(joints, j, k)
+    change = 0.0
+    if solver.island[a] >= 0:
+        change += dot(push_a, direct.push[a]) + dot(turn_a, direct.twist[a])
+    if solver.island[b] >= 0:
+        change += dot(push_b, direct.push[b]) + dot(turn_b, direct.twist[b])
+    return change
+
+
+@part
+def give_to_bodies(solver, j, k, impulse):
+    """Let a row act, of a POINT along axis k."""
+    joints = solver.joints
+    push_a, turn_a, push_b, turn_b = pushes_at(joints, j, k)
+    for q, push, turn in ((joints.first[j], push_a, turn_a), (joints.second[j], push_b, turn_b)):
+        if solver.island[q] >= 0:
+            solver.velocity[q] = add_scaled(solver.velocity[q], push, impulse * solver.inverse_mass[q])
+            solver.spin[q] = add(solver.spin[q], change_of_spin(solver, q, scale(turn, impulse)))
+
+
+@part
+def solve_limited(solver, j, pushes):
+    """A limit, a motor or a servo whose joint, and all that hang on it, are solved at once: these answer it."""
+    joints, direct, zero = solver.joints, solver.direct, scale(solver.velocity[solver.bodies], 0.0)
+    old, missing = joints.impulse[j], (joints.pushing[j] if pushes else joints.opening[j]) - speed_of(solver, j)
+    if old == 0.0 and min(joints.greatest[j], max(joints.least[j], missing)) == 0.0:
+        return
+    for e in range(direct.begin, direct.end):
+        direct.push[direct.body[e]] = direct.twist[direct.body[e]] = zero
+    push_a, turn_a, push_b, turn_b = pushes_at(joints, j, 0)
+    note_push(direct, joints.first[j], push_a, turn_a, 1.0)
+    note_push(direct, joints.second[j], push_b, turn_b, 1.0)
+    divide(solver, freedoms(zero))
+    for e in range(direct.begin, direct.end):
+        q = direct.body[e]
+        direct.push[q], direct.twist[q] = from_measure(solver, q, zero)
+    moved = change_at(solver, j, 0)
+    new = min(joints.greatest[j], max(joints.least[j], old + missing / moved if moved > 0.0 else old))
+    joints.impulse[j] = new
+    if new == old:
+        return
+    give_to_bodies(solver, j, 0, new - old)
+    for e in range(joints.begin, joints.end):
+        i = joints.order[e]
+        if joints.at_once[i] == HELD:
+            share = (old - new) * weight_of(solver, i)
+            for k in range(len(zero) if joints.kind[i] == POINT else 1):
+                answer = share * change_at(solver, i, k)
+                if joints.kind[i] == POINT:
+                    joints.push[i] = replace(joints.push[i], k, item(joints.push[i], k) + answer)
+                else:
+                    joints.impulse[i] += answer
+                give_to_bodies(solver, i, k, answer)
+
+
+@part
+def solve_all_limited(solver, pushes):
+    """One pass over the limits, motors and servos of joints that are solved at once."""
+    joints = solver.joints
+    for e in range(joints.begin, joints.end):
+        if joints.at_once[joints.order[e]] == LIMITED:
+            solve_limited(solver, joints.order[e], pushes)

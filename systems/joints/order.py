@@ -10,7 +10,7 @@ from ...framework.vectors import length
 from ..compounds.rows import place_of
 from ..contacts.constants import BEND, MOST_RATIO, STIFF
 from ..islands import root_of
-from .records import HOLD, LIMIT, LINE, MOST, POINT, TURN
+from .records import DRIVE, HELD, HOLD, LIMIT, LIMITED, LINE, MOST, PASSED, POINT, SERVO, TURN
 
 NO_BLOCK = -1
 
@@ -67,9 +67,13 @@ def choose_direct(state):
         g, t = root_of(solver.group, q), island[q]
         light, heavy, bend = direct.light[g], direct.heavy[g], max(1.0, BEND * direct.welds[g] ** 2)
         chosen = light > MOST_RATIO * heavy or direct.welds[g] > 1 or direct.freedom[g] < 0
-        joints.at_once[j] = chosen and is_rigid(joints, j)
+        joints.at_once[j] = PASSED
+        if chosen and is_rigid(joints, j):
+            joints.at_once[j] = HELD
+        elif chosen and joints.rule[j] in (LIMIT, DRIVE, SERVO) and joints.kind[j] != POINT:
+            joints.at_once[j] = LIMITED
         joints.bears[j] = STIFF / heavy * (bend if joints.kind[j] >= TURN else 1.0)
-        solver.at_once[t] |= joints.at_once[j]
+        solver.at_once[t] |= joints.at_once[j] == HELD
         solver.sway[t] = max(solver.sway[t], direct.swing[g] / heavy)
 
 
@@ -135,12 +139,13 @@ def order_island(solver, begin, end, rows_begin, rows_end):
         direct.degree[q] = direct.place[q] = -1
     for e in range(rows_begin, rows_end):
         j = joints.order[e]
-        if joints.at_once[j]:
+        if joints.at_once[j] != PASSED:
             a, b = joints.first[j], joints.second[j]
             for q in (a, b):
                 if island[q] >= 0:
                     direct.degree[q] = max(0, direct.degree[q])
-            if island[a] >= 0 and island[b] >= 0 and not join_pair(direct, a, b):
+            both = island[a] >= 0 and island[b] >= 0 and joints.at_once[j] == HELD
+            if both and not join_pair(direct, a, b):
                 return False
     for least in range(MOST + 1):
         for one in range(begin, end):
@@ -166,5 +171,5 @@ def order_direct(solver):
         if s > 0 and solver.at_once[solver.special[s]] and not order_island(solver, begin, end, rows_begin, rows_end):
             direct.bodies, direct.blocks = first, blocks
             for e in range(rows_begin, rows_end):
-                joints.at_once[joints.order[e]] = False
+                joints.at_once[joints.order[e]] = PASSED
         direct.body_ends[s], begin, rows_begin = direct.bodies, end, rows_end

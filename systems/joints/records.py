@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from ...framework.jit.records.schema import Column, Schema, flag, flags, floats, integer, ints, number, table, vectors
+from ...framework.jit.records.schema import Column, Schema, flag, floats, integer, ints, number, table, vectors
 
 POINT, LINE, SLIDE, TURN, ALIGN, CONE, TWIST, GIVEN = range(8)
 HOLD, LIMIT, DRIVE, SPRING, SERVO, FREE = range(6)
+PASSED, HELD, LIMITED = range(3)
 MOST = 32  # neighbours of a body where joints are solved at once
 
 JOINTS = Schema(
@@ -57,7 +58,7 @@ JOINTS = Schema(
     active=integer(),  # rows that take part, in the order of their ranges:
     order=ints("int32"),
     stream=ints("int32"),  # of each place: what holds points of an island, or all else of it
-    at_once=flags(),  # solved with all such of its island, see direct,
+    at_once=ints("int8"),  # PASSED, or solved with all such of its island: HELD, LIMITED; see direct
     bears=floats(),  # and kg that it may have to bear, of angles times how far they bend
     open_row=ints("int32"),  # of these, those that further passes go over: so many
     opened=integer(),

@@ -23,10 +23,10 @@ from ...framework.vectors import add, add_scaled, dot, item, length, replace, sc
 from ..contacts.constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY, SPRING_FREQUENCY
 from ..integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
 from .coupling import answer_at, couple, first_of, giving_of, holds, is_answered, multiplied, swings
-from .direct import bound_push, factorise, solve_direct
+from .direct import bound_push, factorise, solve_all_limited, solve_direct
 from .given import measure_given, push_given, speed_of_given
 from .order import is_rigid
-from .records import ALIGN, DRIVE, GIVEN, LIMIT, POINT, SERVO, SLIDE, TURN, TWIST
+from .records import ALIGN, DRIVE, GIVEN, LIMIT, PASSED, POINT, SERVO, SLIDE, TURN, TWIST
 
 FULL_TURN = 2.0 * math.pi
 FOLDED = 1e-2  # 1 + cosine of a swing: beyond it a twist is nearly any angle
@@ -374,7 +374,7 @@ def pass_over_joints(solver, pushes):
     rate, mass_scale, impulse_scale = joints.push_rate, joints.mass_scale, joints.impulse_scale
     for e in range(joints.begin, joints.end):
         j = order[e]
-        if (not pushes and swings(joints, j)) or joints.at_once[j]:
+        if (not pushes and swings(joints, j)) or joints.at_once[j] != PASSED:
             continue
         if kind[j] != POINT:
             solve_row(solver, j, pushes)
@@ -407,8 +407,10 @@ def solve_joints(solver, pushes):
             bound_push(solver, solver.joints.step)
         solve_direct(solver, pushes)
         if solver.direct.mixed:
+            solve_all_limited(solver, pushes)
             pass_over_joints(solver, pushes)
             solve_direct(solver, pushes)
+            solve_all_limited(solver, pushes)
 
 
 @part
@@ -418,7 +420,7 @@ def relax_open(solver):
     for e in range(joints.opened):
         j = joints.open_row[e]
         a, b = joints.first[j], joints.second[j]
-        if swings(joints, j) or joints.at_once[j]:
+        if swings(joints, j) or joints.at_once[j] != PASSED:
             continue
         if joints.kind[j] != POINT:
             solve_row(solver, j, False)
@@ -432,6 +434,7 @@ def relax_open(solver):
         push_apart(columns, (a, b), (joints.arm_a[j], joints.arm_b[j]), sub(new, old))
     if solver.direct.begin < solver.direct.end:
         solve_direct(solver, False)
+        solve_all_limited(solver, False)
 
 
 @part
