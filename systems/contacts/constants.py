@@ -34,6 +34,7 @@ REFINED_PASSES = 8  # of each substep of an island with more: columns under heav
 FURTHER_PASSES = 1000  # at most, over rows that are not solved and islands that have gained energy,
 FURTHER_WORK = 20_000  # rows of the island in all of these,
 LEAST_FURTHER_PASSES = 8  # if they are not these,
+AT_ONCE_WORK = 8  # rows: so much is a joint that is solved at once
 SWEEPS = 4  # between two looks at which rows these are
 EXCESS = 0.01  # extents per step: where the speed of a row is wrong by more, its island is struck, and solved until
 FINER_PASSES = 32  # less is; an island that may have more passes than these is solved as much better

@@ -12,7 +12,7 @@ from ..contacts.constants import BEND, MOST_RATIO, STIFF
 from ..islands import root_of
 from .records import DRIVE, HELD, HOLD, LIMIT, LIMITED, LINE, MOST, PASSED, POINT, SERVO, TURN
 
-NO_BLOCK = -1
+NO_BLOCK = NO_BODY = -1
 
 
 @inlined
@@ -67,7 +67,7 @@ def choose_direct(state):
         g, t = root_of(solver.group, q), island[q]
         light, heavy, bend = direct.light[g], direct.heavy[g], max(1.0, BEND * direct.welds[g] ** 2)
         chosen = light > MOST_RATIO * heavy or direct.welds[g] > 1 or direct.freedom[g] < 0
-        joints.at_once[j] = PASSED
+        joints.at_once[j], joints.group[j] = PASSED, g
         if chosen and is_rigid(joints, j):
             joints.at_once[j] = HELD
         elif chosen and joints.rule[j] in (LIMIT, DRIVE, SERVO) and joints.kind[j] != POINT:
@@ -133,7 +133,8 @@ def eliminate(direct, q):
 
 @part
 def order_island(solver, begin, end, rows_begin, rows_end):
-    """The order in which the bodies of a range go, those with few neighbours first; returns whether there is one."""
+    """The order in which the bodies of a range go, those with few neighbours first; returns a body that would have too
+    many, or NO_BODY."""
     joints, direct, island = solver.joints, solver.direct, solver.island
     for q in range(begin, end):
         direct.degree[q] = direct.place[q] = -1
@@ -146,30 +147,46 @@ def order_island(solver, begin, end, rows_begin, rows_end):
                     direct.degree[q] = max(0, direct.degree[q])
             both = island[a] >= 0 and island[b] >= 0 and joints.at_once[j] == HELD
             if both and not join_pair(direct, a, b):
-                return False
+                return a
     for least in range(MOST + 1):
         for one in range(begin, end):
             q = one
             while q >= 0 and direct.place[q] < 0 and 0 <= direct.degree[q] <= least:
                 if not eliminate(direct, q):
-                    return False
+                    return q
                 following = -1
                 for k in range(direct.degree[q]):  # chains go on from their ends
                     if direct.degree[direct.near[q, k]] <= least:
                         following = direct.near[q, k]
                 q = following
-    return True
+    return NO_BODY
+
+
+@part
+def pass_group(solver, q, rows_begin, rows_end):
+    """The joints of the group of body q are solved by passes."""
+    joints, group = solver.joints, -1
+    for e in range(rows_begin, rows_end):
+        j = joints.order[e]
+        if joints.at_once[j] != PASSED and (joints.first[j] == q or joints.second[j] == q):
+            group = joints.group[j]
+    for e in range(rows_begin, rows_end):
+        if joints.group[joints.order[e]] == group:
+            joints.at_once[joints.order[e]] = PASSED
 
 
 @part
 def order_direct(solver):
-    """The order of the bodies of all islands with joints that are solved at once; by passes, where there is none."""
-    joints, direct, begin, rows_begin = solver.joints, solver.direct, 0, 0
+    """The order of the bodies of all islands with joints that are solved at once; by passes, where a body has
+    too many neighbours."""
+    direct, begin, rows_begin = solver.direct, 0, 0
     direct.bodies = direct.blocks = 0
     for s in range(solver.ranges):
         end, rows_end, first, blocks = solver.body_ends[s], solver.joint_ends[s], direct.bodies, direct.blocks
-        if s > 0 and solver.at_once[solver.special[s]] and not order_island(solver, begin, end, rows_begin, rows_end):
+        while s > 0 and solver.at_once[solver.special[s]]:
+            full = order_island(solver, begin, end, rows_begin, rows_end)
+            if full == NO_BODY:
+                break
             direct.bodies, direct.blocks = first, blocks
-            for e in range(rows_begin, rows_end):
-                joints.at_once[joints.order[e]] = PASSED
+            pass_group(solver, full, rows_begin, rows_end)
         direct.body_ends[s], begin, rows_begin = direct.bodies, end, rows_end

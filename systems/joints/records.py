@@ -7,7 +7,7 @@ from ...framework.jit.records.schema import Column, Schema, flag, floats, intege
 POINT, LINE, SLIDE, TURN, ALIGN, CONE, TWIST, GIVEN = range(8)
 HOLD, LIMIT, DRIVE, SPRING, SERVO, FREE = range(6)
 PASSED, HELD, LIMITED = range(3)
-MOST = 32  # neighbours of a body where joints are solved at once
+MOST = 64  # neighbours of a body where joints are solved at once
 
 JOINTS = Schema(
     "Joints",
@@ -59,6 +59,7 @@ JOINTS = Schema(
     order=ints("int32"),
     stream=ints("int32"),  # of each place: what holds points of an island, or all else of it
     at_once=ints("int8"),  # PASSED, or solved with all such of its island: HELD, LIMITED; see direct
+    group=ints("int32"),  # of its bodies, as that was numbered first,
     bears=floats(),  # and kg that it may have to bear, of angles times how far they bend
     open_row=ints("int32"),  # of these, those that further passes go over: so many
     opened=integer(),

@@ -26,7 +26,7 @@ from .coupling import answer_at, couple, first_of, giving_of, holds, is_answered
 from .direct import bound_push, factorise, solve_all_limited, solve_direct
 from .given import measure_given, push_given, speed_of_given
 from .order import is_rigid
-from .records import ALIGN, DRIVE, GIVEN, LIMIT, PASSED, POINT, SERVO, SLIDE, TURN, TWIST
+from .records import ALIGN, DRIVE, GIVEN, HELD, LIMIT, PASSED, POINT, SERVO, SLIDE, TURN, TWIST
 
 FULL_TURN = 2.0 * math.pi
 FOLDED = 1e-2  # 1 + cosine of a swing: beyond it a twist is nearly any angle
@@ -234,6 +234,8 @@ def measure_joints(solver):
         arm_a, arm_b = turned_with(solver, a, base_a[j]), turned_with(solver, b, base_b[j])
         way = add(between[j], sub(add(shift[b], arm_b), add(shift[a], arm_a)))
         if kind == POINT:
+            if joints.at_once[j] == HELD:  # both ends where b's is: great forces that are a gap apart would turn them
+                arm_a = add(arm_a, way)
             arms_a[j], arms_b[j], gap[j] = arm_a, arm_b, way
             weigh_point(solver, j, scale(way, 0.0))
             if holds(joints, j):
@@ -451,12 +453,11 @@ def add_joints(solver):
 @inlined
 def is_torn(solver, j):
     """Whether a joint is wide open where the step ends, against the size of its smaller body."""
-    joints = solver.joints
-    a, b, reach = joints.first[j], joints.second[j], math.inf
-    for q in (a, b):
-        if solver.inverse_mass[q] > 0.0 and solver.reach[q] > 0.0:
-            reach = min(reach, solver.reach[q])
-    return is_rigid(joints, j) and length(joints.gap[j]) > TORN * reach
+    joints, reach = solver.joints, math.inf
+    for q, arm in ((joints.first[j], joints.arm_a[j]), (joints.second[j], joints.arm_b[j])):
+        if solver.inverse_mass[q] > 0.0:  # what has no collider reaches to where it is held
+            reach = min(reach, max(solver.reach[q], length(arm)))
+    return is_rigid(joints, j) and length(joints.gap[j]) > TORN * reach > 0.0
 
 
 @part
