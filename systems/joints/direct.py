@@ -101,6 +101,15 @@ def weight_of(solver, j):
     return share / moved if moved > 0.0 else 0.0
 
 
+@inlined
+def add_square(direct, q, of, weight, n):
+    """What a row adds to the diagonal block of body q."""
+    for i in range(n):
+        by = weight * of[i]
+        for k in range(i + 1):
+            direct.diagonal[q, n * i + k] += by * of[k]
+
+
 @part
 def add_row(solver, j, weight):
     """J' W J of row j."""
@@ -116,16 +125,10 @@ def add_row(solver, j, weight):
         push_a, turn_a, push_b, turn_b = pushes_at(joints, j, axis)
         if moves_a:
             to_measure(solver, a, push_a, turn_a, of_a)
-            for i in range(n):
-                by = weight * of_a[i]
-                for k in range(i + 1):
-                    direct.diagonal[a, n * i + k] += by * of_a[k]
+            add_square(direct, a, of_a, weight, n)
         if moves_b:
             to_measure(solver, b, push_b, turn_b, of_b)
-            for i in range(n):
-                by = weight * of_b[i]
-                for k in range(i + 1):
-                    direct.diagonal[b, n * i + k] += by * of_b[k]
+            add_square(direct, b, of_b, weight, n)
         if block != NO_BLOCK:
             for i in range(n):
                 for k in range(n):
