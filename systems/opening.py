@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from ..framework.compilation import part
 from .codes import NEED_SWEEPS, OK, ROTATE
-from .compounds.stages import share_masses
+from .compounds.stages import add_masses_of_parts
 
 DISCRETE = 0
 OPENED, KEEPS_VELOCITY, KEEPS_START, KEEPS_FORCE, KEEPS_WRITTEN = 1, 2, 4, 8, 16  # bits of state.kept
 NOTHING_TESTED = -1  # in place of a row: no pair has been tested yet
-LARGEST = 1.7976931348623157e308  # of all finite numbers
+LARGEST_FLOAT = 1.7976931348623157e308  # of all finite numbers
 
 
 @part
@@ -88,7 +88,7 @@ def read_bodies(state, dt):
     every = state.read_version != state.statics_version or state.inverse_masses_exposed
     for i in range(state.dynamic, state.count if every else state.moving):
         inverse_mass[i] = 0.0
-    share_masses(state)
+    add_masses_of_parts(state)
     state.limits_speed, state.spinning = limited, False
     state.sweeping = state.collides and (state.mode != DISCRETE or any_ccd(state))
     if state.sweeping and not state.sweeps_ready:

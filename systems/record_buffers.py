@@ -17,10 +17,10 @@ from .contacts.solving.records import WARM_START_ROWS
 from .records import CONTACT_ROWS
 from .scene import Scene
 
-SPARE = 1 << 16  # rows at most that are reserved beyond what is asked for
+SPARE_ROWS = 1 << 16  # rows at most that are reserved beyond what is asked for
 
 
-class Room:
+class RecordBuffers:
     """Gives the records of one world the rows that stages need; MemoryError names what needs how many."""
 
     def __init__(self, state: Record, scene: Scene, search: CandidateSearch) -> None:
@@ -96,4 +96,4 @@ def make_room(stage: Stage, state: Record, own: Record | None, make: Callable[..
 
 def with_spare(rows: int) -> int:
     """So many rows and half as many again, up to a limit: numbers of pairs change from step to step."""
-    return rows + min(rows // 2, SPARE) + 16
+    return rows + min(rows // 2, SPARE_ROWS) + 16

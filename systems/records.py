@@ -15,7 +15,7 @@ from ..framework.jit.records.schema import Schema, Section, flag, flags, floats,
 from ..framework.schedule.stages import PROGRAM_FIELDS
 from .broad_phase.records import GRID
 from .compounds.records import COMPOUNDS, PARTS
-from .contacts.solving.records import ARMS, RESTED, SOLVER, TURNS, WARM_START
+from .contacts.solving.records import ARM_COLUMNS, RESTED, SOLVER, TURN_COLUMNS, WARM_START
 from .impacts.records import IMPACTS
 
 
@@ -49,7 +49,7 @@ TABLE_COLUMNS = tuple(name for section in TABLE_SECTIONS for name in section)
 # Columns of the table too, which has them under names that begin with _ and are not shown.
 SLEEP_COLUMNS = Section(
     "body", "the table", "bodies may sleep: which do, since when, and their state then",
-    still=ints("int8", default=0),  # AWAKE and the like, see sleeping.stages
+    sleep_state=ints("int8", default=0),  # AWAKE and the like, see sleeping.stages
     rest_steps=ints("int32"),  # for how many steps it has been at rest
     island=ints(),  # entity id of the first body of those that sleep together; 0: none
     rest_position=vectors(),
@@ -59,7 +59,7 @@ SLEEP_COLUMNS = Section(
 )  # fmt: skip
 
 # Columns of the bodies that are made within a step or when rows have moved.
-START = Section(
+START_COLUMNS = Section(
     "body", "the step", "velocity at the start of the step, for the path",
     start_velocity=vectors(),
 )  # fmt: skip
@@ -88,7 +88,7 @@ PREDICTED = Section(
     warm_start_velocity=vectors(),
     to_hold=vectors(),  # m/s, at which it closes on what pushes it
 )  # fmt: skip
-HELD = Section(
+REST_COLUMNS = Section(
     "body", "collisions", RESTED,
     held=flags(default=False),  # a contact at rest has pushed it
     place=ints("int32", default=-1),  # among the bodies of the solver; -1 between steps
@@ -99,12 +99,12 @@ CURVES = Section(
     path_second=vectors(),
     path_third=vectors(),
 )  # fmt: skip
-SWEEPS = Section(
+SWEEP_COLUMNS = Section(
     "body", "swept bodies", "bodies are swept along their paths: how far impacts may send them",
     search_margin=floats(),
     search_lower=vectors(),  # where the centre may be while all neighbours are known
     search_upper=vectors(),
-    caught=ints("int32"),  # impacts one after the other with what cannot be moved
+    trapped_impacts=ints("int32"),  # impacts one after the other with what cannot be moved
     last_impact=floats(),  # s since the start of the step
 )  # fmt: skip
 EVALUATIONS = Section(
@@ -130,7 +130,7 @@ SPINS = Section(
     joined=flags(default=False),  # by joints, if any are active
 )  # fmt: skip
 FAILS = "the start of the step, for one that fails"
-UNDO = Section("body", "going back", FAILS, kept_previous=vectors(), kept_velocity=vectors())
+UNDO_COLUMNS = Section("body", "going back", FAILS, kept_previous=vectors(), kept_velocity=vectors())
 UNDO_FORCE = Section("body", "going back", FAILS, kept_step_force=vectors())
 SLEEPING = Section(
     "body", "sleeping", "bodies may sleep: islands, and whether anything has changed them",
@@ -140,7 +140,8 @@ SLEEPING = Section(
 
 # Columns of the records alone: no rows, or one for each of the table from when something asks for them.
 BODY_SECTIONS = (
-    START, QUARANTINE, COLLISIONS, PREDICTED, HELD, CURVES, SWEEPS, EVALUATIONS, SPINS, COMPOUNDS, UNDO, UNDO_FORCE,
+    START_COLUMNS, QUARANTINE, COLLISIONS, PREDICTED, REST_COLUMNS, CURVES, SWEEP_COLUMNS, EVALUATIONS, SPINS,
+    COMPOUNDS, UNDO_COLUMNS, UNDO_FORCE,
     SLEEPING,
 )  # fmt: skip
 
@@ -224,25 +225,25 @@ SHAPES = Schema(
     mixing=ints(),  # rules of plugins
 )
 
-NEAR = "bodies have come near each other"
-FOUND = Section("pair", "pairs", NEAR, first=ints("int32"), second=ints("int32"))
-HALVES = Section("pair", "pairs", NEAR, half_a=ints("int32"), half_b=ints("int32"))
+CAME_NEAR = "bodies have come near each other"
+FOUND = Section("pair", "pairs", CAME_NEAR, first=ints("int32"), second=ints("int32"))
+HALVES = Section("pair", "pairs", CAME_NEAR, half_a=ints("int32"), half_b=ints("int32"))
 SORTED = Section(
-    "pair", "pairs", NEAR,
+    "pair", "pairs", CAME_NEAR,
     sorted_a=ints("int32"),
     sorted_b=ints("int32"),
     kind=ints("int32"),  # pair of shapes
     bucket=ints("int32"),  # candidates by pair of shapes
 )  # fmt: skip
 CANDIDATES = Schema(
-    "Candidates", FOUND, HALVES, Section("pair", "pairs", NEAR, starts=ints("int32")), SORTED,
+    "Candidates", FOUND, HALVES, Section("pair", "pairs", CAME_NEAR, starts=ints("int32")), SORTED,
     count=integer(),
     bucket_starts=ints("int32"),
 )  # fmt: skip
 
 # Pairs whose layers meet, a's entity id the smaller, in canonical order.
 PAIR_COLUMNS = Section(
-    "pair", "pairs", NEAR,
+    "pair", "pairs", CAME_NEAR,
     a=ints("int32"),
     b=ints("int32"),
     is_solid=flags(),  # they push each other
@@ -304,8 +305,8 @@ _fields = dict(SOLVER.fields)
 _fields.pop("starts")
 _fields.pop("joints")
 _fields.pop("direct")
-SOLVER_ARMS = Section("contact", "rotation", "bodies spin", **{name: _fields.pop(name) for name in ARMS})
-SOLVER_SPINS = Section("body at rest", "rotation", "bodies spin", **{name: _fields.pop(name) for name in TURNS})
+SOLVER_ARMS = Section("contact", "rotation", "bodies spin", **{name: _fields.pop(name) for name in ARM_COLUMNS})
+SOLVER_SPINS = Section("body at rest", "rotation", "bodies spin", **{name: _fields.pop(name) for name in TURN_COLUMNS})
 _split = list(_fields).index("bodies")
 SOLVER_CONTACTS = Section("contact", "contacts at rest", RESTED, **dict(list(_fields.items())[:_split]))
 SOLVER_BODIES = Section("body at rest", "contacts at rest", RESTED, **dict(list(_fields.items())[_split:]))

@@ -19,9 +19,9 @@ from .records import (
     COLLIDERS,
     COLLISIONS,
     SLEEP_COLUMNS,
-    START,
+    START_COLUMNS,
     TABLE_COLUMNS,
-    UNDO,
+    UNDO_COLUMNS,
 )
 from .shapes.geometry_levels import arrange, in_order
 from .shapes.linking.linked_shapes import LinkedShapes, ParameterRecords, linked_shapes
@@ -58,7 +58,7 @@ class Scene:
         self.parameters: ParameterRecords | None = None
         self.levels = np.empty((1, 0), np.int8)
         self._masks: list[np.ndarray] = []  # of the linked shapes: which bodies have them
-        self._taken_out = np.empty(0, np.int64), self.levels  # rows without their shapes, and these
+        self._excluded = np.empty(0, np.int64), self.levels  # rows without their shapes, and these
         self.stretches = np.zeros(0, bool)  # bodies whose box is stretched by rotation inside of a cheaper level
         self.rotated = False
         self.structure = self.static_version = -1  # of the table and the registry, when they were followed last
@@ -128,7 +128,7 @@ class Scene:
         """Make everything that depends on which colliders there are."""
         table, bodies, count, moving = self.table, self.state.bodies, self.table.count, self.table.stops[1]
         self.state.slot_count = len(table.stacked_types(Collider.stack))
-        self.reserve(*START, *UNDO, *(name for name in BODY_COLUMNS if len(getattr(bodies, name))))
+        self.reserve(*START_COLUMNS, *UNDO_COLUMNS, *(name for name in BODY_COLUMNS if len(getattr(bodies, name))))
         if present:
             self.reserve(*COLLISIONS)
             if len(bodies.static_position) < count - moving:
@@ -172,7 +172,7 @@ class Scene:
         """Find the shapes of the bodies that have come since the last time; False if all has to be made again."""
         state, table, count, moving = self.state, self.table, self.table.count, self.table.stops[1]
         bodies, linked = state.bodies, self.linked
-        if len(self._taken_out[0]) or (linked and count - moving > len(bodies.static_position)):
+        if len(self._excluded[0]) or (linked and count - moving > len(bodies.static_position)):
             return False
         if linked and self._shapes_version != table.columns_version:
             self._bind_shapes()
@@ -278,7 +278,7 @@ class Scene:
         self._columns_made += 1
         self.levels = np.full((len(levels), capacity), -1, np.int8)
         self.levels[:, : levels.shape[1]] = levels
-        self._taken_out = np.empty(0, np.int64), self.levels[:, :0]
+        self._excluded = np.empty(0, np.int64), self.levels[:, :0]
         offsets = np.zeros((len(levels), rows, state.dimensions))
         bodies.levels, bodies.level_offsets = self.levels, offsets
         bodies.shape, bodies.offset = self.levels[-1], offsets[-1]
@@ -286,17 +286,17 @@ class Scene:
         self.stretches = np.zeros(levels.shape[1] if several else 0, bool)
         state.several_levels, state.level_count = several, len(levels)
 
-    def take_out(self, out: np.ndarray) -> None:
+    def exclude(self, out: np.ndarray) -> None:
         """Bodies (count,) that take no part: they have no shape as long as that is so, and no say in what all share."""
         count, moving, bodies = self.table.count, self.table.stops[1], self.state.bodies
         if not len(bodies.quarantined):
             self.reserve("quarantined")
         self.state.statics_version += int((bodies.quarantined[moving:count] != out[moving:]).any())
         bodies.quarantined[:count] = out
-        rows, shapes = self._taken_out
+        rows, shapes = self._excluded
         self.levels[:, rows] = shapes
         rows = np.flatnonzero(out)
-        self._taken_out = rows, self.levels[:, rows]
+        self._excluded = rows, self.levels[:, rows]
         self.levels[:, rows] = -1
 
     def _bind_shapes(self) -> None:
@@ -373,7 +373,7 @@ class Scene:
 
     def _sound_rotation(self) -> np.ndarray:
         """The column, none for bodies that are taken out."""
-        rotation, rows = self.table.column("rotation"), self._taken_out[0]
+        rotation, rows = self.table.column("rotation"), self._excluded[0]
         if len(rows):
             rotation = rotation.copy()
             rotation[rows] = self.table.default_of("rotation") if rotation.ndim == 1 else (1.0, 0.0, 0.0, 0.0)

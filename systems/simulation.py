@@ -42,7 +42,7 @@ from .narrow_phase.system import NarrowPhase
 from .opening import KEEPS_WRITTEN
 from .quarantine.quarantine import Quarantine
 from .queries.system import Queries
-from .record_buffers import Room
+from .record_buffers import RecordBuffers
 from .records import CONTACT_ROWS, STATE
 from .scene import Scene, make_table
 from .settings import check_settings, gravity_vector, write_settings
@@ -51,7 +51,7 @@ from .shapes.geometry_levels import LevelCheck, check_sensors
 from .shapes.pair_coverage import check_pairs
 from .sleeping.sleepers import Sleepers
 from .stage_list import CLOSING, KEPT, OPENING, STAGES, SYSTEM_OF_STAGE
-from .tracking import CONTACTS, WARM_START, put_joints_back, put_rows_back, saved_rows
+from .tracking import CONTACT_NUMBERS, WARM_START_NUMBERS, put_joints_back, put_rows_back, saved_rows
 
 
 class Simulation:
@@ -80,9 +80,9 @@ class Simulation:
             self.state, world.registry, lambda: world.settings, self._box_now,
             lambda name: self.program.run_one(name, 0.0),
         )  # fmt: skip
-        room = Room(self.state, self.scene, self.search)
+        room = RecordBuffers(self.state, self.scene, self.search)
         self.quarantine = Quarantine(self.state, self.table, self.scene, world.report_fault)
-        self.table.on_make, self.table.on_lend = self._follow_columns, self._follow_lent
+        self.table.on_make, self.table.on_expose = self._follow_columns, self._follow_exposed
         self.table.on_arrays_changed = self._follow_arrays
         handlers = {
             **room.handlers(self),
@@ -97,7 +97,7 @@ class Simulation:
         source.finish_found = lambda: self.program.run_one("finish_found", world.clock.dt)
         source.stored, source.disturb = self.sleepers.contacts, self.sleepers.disturb
         self.wake, self.notice_written = self.sleepers.wake, self.sleepers.notice_written
-        self.taken_out = self.quarantine.out_now
+        self.excluded = self.quarantine.excluded_now
         self.attribute_errors = ErrorAttribution(
             world.registry, self.state, lambda: self.scene.linked.shapes if self.scene.linked else ()
         )
@@ -106,7 +106,7 @@ class Simulation:
         self.queries = Queries(
             self.state, self.table, world.registry, self.scene, self.search, self.refresh_for_queries
         )
-        self.forces = ForceAccumulation(self.program, self.state, self.table, self.bodies, self.quarantine.tell)
+        self.forces = ForceAccumulation(self.program, self.state, self.table, self.bodies, self.quarantine.report)
         self.table.writable_while = {
             "force": lambda: (
                 self.table.adding_forces or self.state.forces_summed or not world.has_system(self.forces)
@@ -240,13 +240,13 @@ class Simulation:
         """Rows have other arrays."""
         self.scene.follow_arrays()
 
-    def _follow_lent(self, key: str) -> None:
+    def _follow_exposed(self, key: str) -> None:
         """Code of the game may write one more column in place."""
         self.sleepers.watch(key)
-        lent = self.table.lent
+        lent = self.table.exposed
         self.state.positions_exposed = lent.get("position", False)
         self.state.inverse_masses_exposed = lent.get("inverse_mass", False)
-        self.quarantine.follow_lent()
+        self.quarantine.follow_exposed()
 
     def _check(self) -> None:
         """Errors of colliders that changes of their columns may bring about in any step."""
@@ -341,7 +341,7 @@ class Simulation:
         for name in ("position", "linear_velocity"):
             column = arrays[name][:moving]
             for row in np.flatnonzero(~np.isfinite(column).all(axis=1)).tolist():
-                self.quarantine.tell(row, name, column[row].tolist(), prefix)
+                self.quarantine.report(row, name, column[row].tolist(), prefix)
 
     def end_window(self) -> None:
         """The last step of a ``step()`` or ``advance()`` is over: forces applied from outside have done their work."""
@@ -369,8 +369,8 @@ class Simulation:
             self.contacts.columns_now()
         return {
             "gravity": self.gravity,
-            "warm_start": saved_rows(state.warm_start, WARM_START),
-            "contacts": saved_rows(state.contacts, CONTACTS),
+            "warm_start": saved_rows(state.warm_start, WARM_START_NUMBERS),
+            "contacts": saved_rows(state.contacts, CONTACT_NUMBERS),
             "followed": self._structure() == self.scene.structure,
             "ids_changed": state.ids_changed or self.table.generation != self._generation,
             "quarantine": self.quarantine.saved(),

@@ -45,7 +45,7 @@ OPENING = (
 CLOSING = (
     Stage(
         update_sleep, "how long bodies have been at rest; islands fall asleep",
-        ("pairs", "position", "linear_velocity"), ("still", "rest_steps", "linear_velocity"), "sleeping",
+        ("pairs", "position", "linear_velocity"), ("sleep_state", "rest_steps", "linear_velocity"), "sleeping",
     ),
     Stage(close_step, "the step is over: nothing is put back any more", writes=("kept",)),
 )  # fmt: skip

@@ -11,7 +11,7 @@ from carom.framework.schedule.stages import Program, Rows, Stage
 from carom.framework.settings import Settings
 from carom.systems import codes
 from carom.systems.broad_phase import stages
-from carom.systems.broad_phase.records import FRAME_SIZE, GRID_BOXES, GRID_STATICS, HIGHEST, LARGEST, LOWEST
+from carom.systems.broad_phase.records import FRAME_SIZE, GRID_BOXES, GRID_STATICS, HIGHEST, LARGEST_EXTENT, LOWEST
 from carom.systems.broad_phase.search import CandidateSearch
 from carom.systems.record_buffers import make_room
 from carom.systems.records import STATE
@@ -91,12 +91,12 @@ class Boxes:
         state.dynamic = stop = moving - kinematic
         state.statics_version += statics_changed
         state.frame[LOWEST : LOWEST + 3], state.frame[HIGHEST : HIGHEST + 3] = np.inf, -np.inf
-        state.frame[LARGEST] = 0.0
+        state.frame[LARGEST_EXTENT] = 0.0
         with warnings.catch_warnings(), np.errstate(invalid="ignore"):
             warnings.simplefilter("ignore")  # all of a column may be nan
             state.frame[LOWEST : LOWEST + d] = np.fmin.reduce(lower[first:stop], axis=0, initial=np.inf)
             state.frame[HIGHEST : HIGHEST + d] = np.fmax.reduce(upper[first:stop], axis=0, initial=-np.inf)
-            state.frame[LARGEST] = np.fmax.reduce(upper[first:stop] - lower[first:stop], axis=None, initial=0.0)
+            state.frame[LARGEST_EXTENT] = np.fmax.reduce(upper[first:stop] - lower[first:stop], axis=None, initial=0.0)
 
     def find(self):
         """Rows (first, second) of the candidates."""

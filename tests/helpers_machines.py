@@ -10,7 +10,7 @@ from helpers_joints import G, joint_world
 from carom import Physics, Plugin, RigidBody, Transform, World, column
 from carom.framework.typing import Vector
 from carom.framework.vectors import add, divided, dot, length, replace, scale, sub
-from carom.plugins.joints import GIVEN, HOLD, LIMIT, Driven, Joint, Joints, Row, arm_of, moment
+from carom.plugins.joints import CUSTOM, HOLD, LIMIT, Driven, Joint, Joints, Row, arm_of, moment
 from carom.plugins.rotation import Rotation, Spin
 
 machines = Plugin("machines", version="1.0")
@@ -86,7 +86,7 @@ class Stop(Joint):
         return None, nothing, scale(axis, -1.0), nothing, axis
 
     def rows(self, dimensions):
-        return [Row(GIVEN, LIMIT, low=-math.inf, high=self.most)]
+        return [Row(CUSTOM, LIMIT, low=-math.inf, high=self.most)]
 
 
 @machines.joint
@@ -108,8 +108,8 @@ class Rail(Driven):
         )
 
     def rows(self, dimensions):
-        along = Row(GIVEN, HOLD, 0.0, most=50.0)
-        across = Row(GIVEN, HOLD, 0.0, part=1)
+        along = Row(CUSTOM, HOLD, 0.0, most=50.0)
+        across = Row(CUSTOM, HOLD, 0.0, part=1)
         if self.rule >= 0:
             rule = along._replace(rule=self.rule, low=self.to, high=self.to + 1.0, target=self.to)
             return [rule._replace(frequency=1.0, damping_ratio=0.0), across]

@@ -246,7 +246,7 @@ class Table(TableColumns):
         another row may be written to."""
         if row >= self.stops[1]:
             return True
-        if key not in self.lent:
+        if key not in self.exposed:
             self.lend(key, False)
         return False
 

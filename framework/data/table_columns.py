@@ -33,8 +33,8 @@ class TableColumns:
         self.on_demand: dict[str, Column] = {}  # all of these, whether they have an array or not
         self.columns_version = 0  # changes whenever a column gets another array
         self.on_make: Callable[[], None] = lambda: None  # called when one has got its array
-        self.lent: dict[str, bool] = {}  # columns that code of the game may write in place; whether static rows, too
-        self.on_lend: Callable[[str], None] = lambda key: None  # called with one more
+        self.exposed: dict[str, bool] = {}  # columns that code of the game may write in place; whether static rows, too
+        self.on_expose: Callable[[str], None] = lambda key: None  # called with one more
         self.read_only = {"entity", "kind"}  # columns
         self.writable_while: dict[str, Callable[[], bool]] = {}  # columns in which a value counts only at times
         self.stacks: dict[str, np.ndarray] = {}  # (types, capacity, ...): the same field of several component types
@@ -192,9 +192,9 @@ class TableColumns:
     def lend(self, key: str, statics: bool) -> None:
         """A writable view of that column is given away. Other columns change by writes of handles alone, and so do, but
         for ``statics``, static rows: with a new ``static_version``."""
-        if key not in self.lent or statics > self.lent[key]:
-            self.lent[key] = statics
-            self.on_lend(key)
+        if key not in self.exposed or statics > self.exposed[key]:
+            self.exposed[key] = statics
+            self.on_expose(key)
 
     def write(self, key: str, rows: Any, values: np.ndarray) -> None:
         """Values for those rows, a slice or indices; defaults need no array."""

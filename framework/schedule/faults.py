@@ -63,7 +63,7 @@ class Faults:
         """Whether there is something to raise."""
         return bool(self.pending) and self._settings().on_fault == "raise"
 
-    def tell(self, where: str) -> None:
+    def flush(self, where: str) -> None:
         """Warn of what is pending, or raise it; between two steps."""
         texts, self.pending = self.pending, []
         if len(texts) > TOLD_AT_ONCE:

@@ -261,7 +261,7 @@ class Pipeline(esper.Processor):
             self.tell_faults()
 
     def tell_faults(self) -> None:
-        self.faults.tell(f"step {self.clock.step_count - 1} of world {self.world.name!r}")
+        self.faults.flush(f"step {self.clock.step_count - 1} of world {self.world.name!r}")
 
     def synchronize(self) -> None:
         """Bring the table in step with esper, unless a step is running: its rows stand still."""

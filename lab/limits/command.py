@@ -79,7 +79,7 @@ def _watched(loaded: Loaded, world: World, seconds: float, progress: Progress) -
             while world.step_count < look:
                 world.step()
             moving = world.bodies.dynamic
-            out = world.physics is not None and world.physics.taken_out().any()
+            out = world.physics is not None and world.physics.excluded().any()
             if out or not (np.isfinite(moving.position).all() and np.isfinite(moving.linear_velocity).all()):
                 if world.physics is not None:
                     world.physics.report_faults("")  # of what no step has looked at yet

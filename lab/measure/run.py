@@ -178,7 +178,7 @@ class Meter:
         positions = np.asarray(bodies.dynamic.position)
         finite = np.isfinite(positions).all(axis=1) & np.isfinite(bodies.dynamic.linear_velocity).all(axis=1)
         if world.physics is not None:
-            finite &= ~world.physics.taken_out()[bodies.dynamic.rows]
+            finite &= ~world.physics.excluded()[bodies.dynamic.rows]
         outside = self.engine.enclosure.outside(positions[finite])
         report.escaped = {"outside": outside, "non_finite": int((~finite).sum())}
         report.counters = dict(world.stats().counters)

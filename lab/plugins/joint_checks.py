@@ -14,7 +14,7 @@ from ...framework.plugins.checks import shown
 from ...systems.contacts.solving.records import SOLVER
 from ...systems.joints.given import call_given
 from ...systems.joints.linked import linked_joint
-from ...systems.joints.own import OwnJoint, Placed, numbers_of, parameters_of, rows_of, sample_of
+from ...systems.joints.own import OwnJoint, Placed, custom_numbers, custom_parameters, rows_of, sample_of
 from ...systems.shapes.rotation import axes_of
 from .samples import Finding, Subject
 
@@ -39,8 +39,8 @@ def check_joint(subject: Subject, joint: OwnJoint, dimensions: int) -> None:
     """The function of a joint, with bodies at random places."""
     rng = np.random.default_rng((5, dimensions))
     sample, address = sample_of(joint.component, dimensions), linked_joint(joint, dimensions).address
-    fields = shown(parameters_of(sample, dimensions))
-    record = _solver(numbers_of(sample, dimensions), dimensions)
+    fields = shown(custom_parameters(sample, dimensions))
+    record = _solver(custom_numbers(sample, dimensions), dimensions)
     subject.inputs, rows, differs, wrong = PLACES, (), [], []
     for _ in range(PLACES):
         places = rng.uniform(-3.0, 3.0, (2, dimensions))

@@ -14,9 +14,9 @@ from ...components.spin import Spin
 from ...framework import NoPhysicsError, Plugin, World
 from ...systems.joints.own import Placed, rows_of
 from ...systems.joints.records import (
+    CUSTOM,
     DRIVE,
     FREE,
-    GIVEN,
     HOLD,
     JOINTS,
     LIMIT,
@@ -161,7 +161,7 @@ class Joints(Plugin):
     def _given(self, rows: Any) -> tuple[np.ndarray, np.ndarray]:
         """The impulses and the torques of some rows, (k, d) each."""
         record, kind, total = self._record, self._record.kind[rows, None], self._record.total[rows, None]
-        along, given = total * record.normal[rows], kind == GIVEN
+        along, given = total * record.normal[rows], kind == CUSTOM
         impulse = np.where(kind == POINT, record.thrust[rows], np.where((kind < TURN) | given, along, 0.0))
         turned = np.where(given, total * record.turn_b[rows], along)
         return impulse, np.where(kind >= TURN, turned, 0.0)
@@ -184,7 +184,7 @@ class Joints(Plugin):
     def saved(self, world: Any) -> Any:
         """What the rows have done in the last step, with the entities of the joints and of their bodies."""
         record, count = self._record, self._record.count
-        own = OF_PLUGINS if (record.kind[:count] == GIVEN).any() else ()
+        own = OF_PLUGINS if (record.kind[:count] == CUSTOM).any() else ()
         rows = {name: getattr(record, name)[:count].copy() for name in (*KEY, *KEPT, *own)}
         return rows | {"released": sorted(self._released)}
 
@@ -290,7 +290,7 @@ class Joints(Plugin):
             self._joints[entity], self._holds = joint, None
             if entity < last:
                 self._joints = dict(sorted(self._joints.items()))
-        if other and any(TURN <= row.kind < GIVEN and row.rule not in (HOLD, FREE) for row in rows):
+        if other and any(TURN <= row.kind < CUSTOM and row.rule not in (HOLD, FREE) for row in rows):
             self._tell_if_nothing_turns(joint)
         return bodies
 
@@ -389,7 +389,7 @@ class Joints(Plugin):
         if not np.isfinite([*values, *(x for row in rows for vector in row[1:] for x in vector)]).all():
             raise ValueError(f"{name}: where it takes hold its constraint returns what is not finite: {rows}")
         joint.keep(start=float(values[0]))
-        parts = [row.part for row in joint.rows(self._physics.dimensions) if row.kind == GIVEN]
+        parts = [row.part for row in joint.rows(self._physics.dimensions) if row.kind == CUSTOM]
         if parts and not 0 <= min(parts) <= max(parts) < len(values):
             raise ValueError(f"{name}: its rows speak of part {max(parts)}, but its constraint returns {len(values)}")
 
@@ -437,7 +437,27 @@ def _matrix(q: Any) -> np.ndarray:
 
 
 __all__ = [
-    "DRIVE", "GIVEN", "HOLD", "KINDS", "LIMIT", "SERVO", "SPRING", "Ball", "Cone", "Distance", "Driven", "Hinge",
-    "Joint", "JointState", "Joints", "Motor", "MousePull", "Row", "Slider", "Weld", "Wheel", "arm_of",
+    "CUSTOM",
+    "DRIVE",
+    "HOLD",
+    "KINDS",
+    "LIMIT",
+    "SERVO",
+    "SPRING",
+    "Ball",
+    "Cone",
+    "Distance",
+    "Driven",
+    "Hinge",
+    "Joint",
+    "JointState",
+    "Joints",
+    "Motor",
+    "MousePull",
+    "Row",
+    "Slider",
+    "Weld",
+    "Wheel",
+    "arm_of",
     "moment",
 ]  # fmt: skip

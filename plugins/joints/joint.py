@@ -14,7 +14,7 @@ from ...framework.data.columns import Column, special_column
 from ...framework.data.component import Component
 from ...framework.typing import Vector
 from ...systems.joints.own import OwnJoint, own_joint
-from ...systems.joints.records import ALIGN, DRIVE, FREE, GIVEN, HOLD, LIMIT, SPRING, TURN
+from ...systems.joints.records import ALIGN, CUSTOM, DRIVE, FREE, HOLD, LIMIT, SPRING, TURN
 
 WORLD = 0  # in place of a body
 UNLIMITED = -math.inf, math.inf
@@ -264,7 +264,7 @@ class Joint(Component, abstract=True):
 
     def rows(self, dimensions: int) -> list[Row]:
         """The rows that it is now. A joint of a plugin keeps the value of its first row, unless it says otherwise."""
-        return [Row(GIVEN, HOLD, self.start)]
+        return [Row(CUSTOM, HOLD, self.start)]
 
     def hold(self, a: Place, b: Place, anchor: Any) -> None:
         """Anchors at a point of the world."""

@@ -16,8 +16,8 @@ from ...systems.joints.records import (
     DRIVE,
     HOLD,
     LIMIT,
-    LINE,
     POINT,
+    ROD,
     SERVO,
     SLIDE,
     SPRING,
@@ -105,8 +105,8 @@ class Distance(Joint):
         if self.least is None and self.most is None:
             low = high = self.start
         if self.frequency is not None:
-            return [Row(LINE, SPRING, low, frequency=self.frequency, damping_ratio=self.damping_ratio)]
-        return [Row(LINE, HOLD, low)] if low == high else [Row(LINE, LIMIT, max(low, 0.0), high)]
+            return [Row(ROD, SPRING, low, frequency=self.frequency, damping_ratio=self.damping_ratio)]
+        return [Row(ROD, HOLD, low)] if low == high else [Row(ROD, LIMIT, max(low, 0.0), high)]
 
 
 class Hinge(Driven):

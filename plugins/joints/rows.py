@@ -12,8 +12,8 @@ from ...framework import PluginError
 from ...framework.jit.lazy import errors
 from ...framework.jit.records.schema import Column
 from ...systems.joints.linked import linked_joint
-from ...systems.joints.own import numbers_of
-from ...systems.joints.records import GIVEN, JOINTS
+from ...systems.joints.own import custom_numbers
+from ...systems.joints.records import CUSTOM, JOINTS
 from .joint import WORLD, Joint, Row
 
 # What rows are known by, what they are made of, and what they keep from step to step, those of plugins more.
@@ -62,7 +62,7 @@ class JointRows:
             had = by_row({name: getattr(record, name)[span].copy() for name in (*KEY, *KEPT, *OF_PLUGINS)})
             span = self.lay(joint, now)
             put_kept(record, span, had)
-        if fresh and rows and rows[0].kind != GIVEN:
+        if fresh and rows and rows[0].kind != CUSTOM:
             record.value[span.start] = 0.0
         if address:
             self._put_own(joint, span, rows, address)
@@ -139,7 +139,7 @@ class JointRows:
 
     def _put_own(self, joint: Joint, span: slice, rows: list[Row], address: int) -> None:
         """What rows of a plugin's joint call, and its fields."""
-        record, entity, given = self._record, joint.entity, numbers_of(joint, self._dimensions)
+        record, entity, given = self._record, joint.entity, custom_numbers(joint, self._dimensions)
         if entity not in self._places:
             free = next((place for place in self._free if place.stop - place.start == len(given)), None)
             end = max((place.stop for place in (*self._places.values(), *self._free)), default=0)
@@ -150,7 +150,7 @@ class JointRows:
         record.reserve(self._dimensions * len(record.joint), "axes_a", "axes_b")
         record.numbers[self._places[entity]] = given
         for j, row in enumerate(rows, span.start):
-            if row.kind == GIVEN:
+            if row.kind == CUSTOM:
                 record.function[j], record.part[j], record.numbers_at[j] = address, row.part, self._places[entity].start
 
     # -- bodies that joints keep from touching ----------------------------------------------------
@@ -207,7 +207,7 @@ def put_kept(record: Any, span: slice, had: dict[tuple[int, ...], tuple[Any, ...
     keys = list(by_row({name: getattr(record, name)[span] for name in KEY}))
     angles = {key[0]: kept[KEPT.index("value")] for key, kept in reversed(had.items())}
     for j, key in enumerate(keys, span.start):  # whatever rows it has now: the angle stays with the joint
-        if key[1] != GIVEN and (j == span.start or key[0] != record.joint[j - 1]):
+        if key[1] != CUSTOM and (j == span.start or key[0] != record.joint[j - 1]):
             record.value[j] = angles.get(key[0], 0.0)
     for j, key in enumerate(keys, span.start):
         for name, value in zip((*KEPT, *OF_PLUGINS), had.get(key, ()), strict=False):

@@ -123,7 +123,7 @@ class Parts(Plugin):
     def _now(self) -> Any:
         """Another value whenever bodies have come or gone, or a field was set."""
         table = self._table
-        inside = tuple(table.column(key).tobytes() for name in FIELDS if (key := f"part_of.{name}") in table.lent)
+        inside = tuple(table.column(key).tobytes() for name in FIELDS if (key := f"part_of.{name}") in table.exposed)
         statics = table.static_version if self._any_static else 0
         rows = self._rows[0] if self._rows_version == table.version else ()
         derived = tuple(column.tobytes() for column in self._derived(rows)) if len(rows) else ()

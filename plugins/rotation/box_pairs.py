@@ -7,7 +7,7 @@ import math
 
 from ...components import AABBCollider, SphereCollider
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, scale
-from ...systems.shapes.convex.pair import TILT, convex_convex, middle_of_overlap
+from ...systems.shapes.convex.pair import SUPPORT_TILT, convex_convex, middle_of_overlap
 from ..standard_shapes import sphere_box
 from .box import BoxCollider, boxes
 
@@ -80,7 +80,7 @@ def nearest_edge(other, at, turn, axis, side):
         out_0, out_1, on_0, on_1, half_0, half_1 = out_1, out_0, on_1, on_0, half_1, half_0
     middle = item(at, 1 - axis) - side * math.copysign(half_0, out_0) * on_0
     reach = half_1 * on_1
-    if abs(out_1) > TILT:
+    if abs(out_1) > SUPPORT_TILT:
         corner = middle - side * math.copysign(reach, out_1 * on_1)
         return corner, corner
     return middle - abs(reach), middle + abs(reach)

@@ -15,8 +15,8 @@ from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import item, length, replace, scale
 from ...systems.forces.stages import is_zero
-from ...systems.integration.turns import DRIFT, KICK, TURNS
-from ...systems.shapes.poses import tumbles
+from ...systems.integration.turns import ROTATION_DRIFT, ROTATION_KICK, TURNS
+from ...systems.shapes.poses import has_unequal_moments
 from ...systems.shapes.quaternions import (
     product,
     read_axes,
@@ -58,7 +58,7 @@ def spin_of(state, spin, i):
 
 
 TURNS_BY = (
-    "mass", "quarantined", "still", "levels", "shapes", "spin.inertia", "spin.angular_damping",
+    "mass", "quarantined", "sleep_state", "levels", "shapes", "spin.inertia", "spin.angular_damping",
     "spin.max_angular_speed", "spin.constant_torque", "spin.applied_torque", "spin.gyration", "spin.gyration_products",
 )  # fmt: skip
 
@@ -74,12 +74,12 @@ def turn_on_way(state, dt, spin, turns):
             continue
         if turns.begins:
             begin_turn(state, spin, turns, i)
-        if state.bodies.still[i] > 0 or state.bodies.quarantined[i]:
+        if state.bodies.sleep_state[i] > 0 or state.bodies.quarantined[i]:
             continue
         h = dt if spin.angular_damping[i] <= state.heavy_damping else state.heavy_step
-        if turns.part == DRIFT:
+        if turns.part == ROTATION_DRIFT:
             drift_of_turn(state, spin, turns, i, h)
-        elif turns.part == KICK:
+        elif turns.part == ROTATION_KICK:
             kick_of_turn(state, spin, turns, i, h)
         else:
             runge_kutta_turn(state, spin, turns, i, dt)
@@ -93,7 +93,7 @@ def turn_bodies(state, dt, spin, turns):
     """bodies turn"""
     bodies, parts = state.bodies, 1 if len(zero_of(state)) == 2 else 3
     for i in range(state.first, state.moving):
-        if not spin.present[i] or bodies.still[i] > 0:
+        if not spin.present[i] or bodies.sleep_state[i] > 0:
             continue
         within = turns.within and i < state.dynamic
         if bodies.quarantined[i]:
@@ -231,7 +231,7 @@ def take_spins(state, dt, spin):
         if not changed:
             continue
         struck = state.impacts.logged > 0 and bodies.impact_count[i] > 0
-        if struck and tumbles(state, i):
+        if struck and has_unequal_moments(state, i):
             read_axes(state, i)  # as impacts have turned it
         if state.solver.joints.active > 0 and not struck:  # its spin is that of its inertia as it is turned now
             turn_about(state, i, further)
@@ -260,11 +260,11 @@ def keep_spinning_awake(state, dt, spin, turns):
 
 
 @spinning.stage(
-    after="update_sleep", records=(Spin,), reads=("still",), writes=("spin.angular_velocity",), needed="sleeping",
+    after="update_sleep", records=(Spin,), reads=("sleep_state",), writes=("spin.angular_velocity",), needed="sleeping",
 )  # fmt: skip
 def stop_sleepers(state, dt, spin):
     """what falls asleep turns no more"""
     for i in range(state.first, state.dynamic):
-        if spin.present[i] and state.bodies.still[i] > 0:
+        if spin.present[i] and state.bodies.sleep_state[i] > 0:
             for k in range(1 if len(zero_of(state)) == 2 else 3):
                 spin.angular_velocity[i, k] = 0.0

@@ -14,11 +14,11 @@ from ..linking.parts import BOUND_SEARCHES, call_bound_searches
 from ..shapes.dispatch import half_extents, write_rotated
 from ..shapes.tolerances import driven_travel, reach_of
 from .brute_force import BRUTE_FORCE_MAX
-from .records import HIGHEST, LARGEST, LOWEST
+from .records import HIGHEST, LARGEST_EXTENT, LOWEST
 from .uniform_grid import OUTSIDE_MAX, move_in_grid
 
 # Of the body's smallest half extent, on each side: bodies deflected within the step still meet their neighbours.
-MARGIN = 0.1
+BOX_MARGIN = 0.1
 
 
 @inlined
@@ -84,7 +84,7 @@ def find_extents(state, level, start, stop):
 def box_level(state, level, i, before, after):
     """The box of one level of a body that moves from ``before`` to ``after``; of nan if it has no shape."""
     at, half = state.bodies.level_offsets[level, i], state.bodies.half_extents[i]
-    margin = MARGIN * smallest_of(half)
+    margin = BOX_MARGIN * smallest_of(half)
     first, last, low, high = add(before, at), add(after, at), at, at
     for k in range(len(at)):
         low = replace(low, k, min(item(first, k), item(last, k)) - item(half, k) - margin)
@@ -126,7 +126,7 @@ def measure_frame(state):
         largest = longest if longest > largest else largest  # one comparison a body waits for the one before
     for k in range(len(lowest)):
         frame[LOWEST + k], frame[HIGHEST + k] = item(lowest, k), item(highest, k)
-    frame[LARGEST] = largest
+    frame[LARGEST_EXTENT] = largest
 
 
 @part
@@ -176,7 +176,7 @@ def box_rows(state, start, stop, motion):
     thinnest = find_extents(state, 0, start, stop)
     for i in range(start, stop):
         low, high = box_level(state, 0, i, starts[i], ends[i])
-        if motion == STAYING and not holds(bodies.lower[i], bodies.upper[i], low, high):
+        if motion == STAYING and not contains_box(bodies.lower[i], bodies.upper[i], low, high):
             move_in_grid(state.grid, i, low, high)
         bodies.lower[i], bodies.upper[i] = low, high
     for level in range(1, state.level_count):
@@ -194,7 +194,7 @@ def box_rows(state, start, stop, motion):
 
 
 @part
-def holds(lower, upper, low, high):
+def contains_box(lower, upper, low, high):
     """Whether lower..upper holds the box low..high, or this is of nan."""
     held = True
     for k in range(len(low)):

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 from ...framework.schedule.plan import PlannedKernel
 from .brute_force import BRUTE_FORCE_MAX
-from .stages import TREE, UNIFORM_GRID, has_many_static
+from .stages import SPATIAL_TREE, UNIFORM_GRID, has_many_static
 
 
 def reason_of(search: int, moving: int, static: int, dimensions: int) -> str:
     """How the candidates of so many bodies are found; search: a value of ``state.pair_search``."""
     tree = "quadtree" if dimensions == 2 else "octree"
-    if search == TREE:
+    if search == SPATIAL_TREE:
         beside = f" and against that of {static} static ones" if static else ""
         return f"{tree} of {moving} moving bodies against itself{beside}"
     if has_many_static(moving, static):

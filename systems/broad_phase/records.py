@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...framework.jit.records.schema import Schema, Section, flag, floats, integer, ints, number, table, vectors
 
 # Places in ``state.frame``, apart by 3: one value per axis. The largest is the longest edge of any box of what moves.
-LOWEST, HIGHEST, LARGEST = 0, 3, 6
+LOWEST, HIGHEST, LARGEST_EXTENT = 0, 3, 6
 FRAME_SIZE = 7
 
 # A uniform grid of boxes, see :mod:`.uniform_grid`; one of what moves, one of what does not.

@@ -17,7 +17,7 @@ from .records import FRAME_SIZE
 from .stages import BRUTE_FORCE, NO_SEARCH, PLUGIN, UNIFORM_GRID, UNIFORM_GRID_MIN
 from .static_grid import NEVER_BUILT
 from .tree.tree import SpatialTree
-from .uniform_grid import CHUNK, LONGEST, OUTSIDE_MAX
+from .uniform_grid import LONGEST, NOTE_CHUNK, OUTSIDE_MAX
 
 
 class CandidateSearch:
@@ -40,7 +40,7 @@ class CandidateSearch:
         for grid in (state.grid, state.static_grid):
             grid.reserve(FRAME_SIZE, "frame")
             grid.reserve(1, "scale")
-            grid.reserve(CHUNK + LONGEST, "notes")
+            grid.reserve(NOTE_CHUNK + LONGEST, "notes")
             grid.reserve(OUTSIDE_MAX + 1, "longest", "outside")
         state.static_grid.version = NEVER_BUILT
         state.pair_search = NO_SEARCH

@@ -45,10 +45,10 @@ CANDIDATE_LIMIT = 1 << 23
 # sooner if its kernels need not be compiled.
 UNIFORM_GRID_MIN = BRUTE_FORCE_MAX + 1
 
-BLOCK = 64  # boxes that are ruled out together
+SEARCH_BLOCK = 64  # boxes that are ruled out together
 
 # Values of ``state.pair_search``: what finds the candidates of this step.
-NO_SEARCH, BRUTE_FORCE, UNIFORM_GRID, TREE, PLUGIN = range(5)
+NO_SEARCH, BRUTE_FORCE, UNIFORM_GRID, SPATIAL_TREE, PLUGIN = range(5)
 
 
 @part
@@ -74,7 +74,7 @@ def looks_into_statics(state):
 def leave_to_trees(state):
     """No grid suits, or there are more pairs than allowed: the tree counts them. The stages that follow do nothing."""
     state.candidates.count = 0
-    state.pair_search = TREE
+    state.pair_search = SPATIAL_TREE
     return FIND_IN_PYTHON
 
 
@@ -264,8 +264,8 @@ def test_blocks(state, i, start, stop, found):
     """The same for many rows, of which few overlap: a block in which none does is ruled out without writing a pair."""
     lower, upper = state.bodies.lower, state.bodies.upper
     low, high = lower[i], upper[i]
-    for begin in range(start, stop, BLOCK):
-        end, any_meets = min(begin + BLOCK, stop), False
+    for begin in range(start, stop, SEARCH_BLOCK):
+        end, any_meets = min(begin + SEARCH_BLOCK, stop), False
         for k in range(begin, end):
             any_meets |= boxes_overlap(low, high, lower[k], upper[k])
         if any_meets and found != FULL:

@@ -12,7 +12,7 @@ from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import item
 from .boxes import fixed_count, fixed_row
-from .records import HIGHEST, LARGEST, LOWEST
+from .records import HIGHEST, LARGEST_EXTENT, LOWEST
 from .uniform_grid import OUTSIDE_MAX, build_grid
 
 NEVER_BUILT = -1  # in place of a version
@@ -59,7 +59,7 @@ def divide_boxes(state, grid):
     zero = zero_of(grid)
     for q in range(len(zero)):
         frame[LOWEST + q], frame[HIGHEST + q] = math.inf, -math.inf
-    frame[LARGEST] = limit
+    frame[LARGEST_EXTENT] = limit
     for k in range(fixed_count(state)):
         i = fixed_row(state, k)
         low, high = bodies.lower[i], bodies.upper[i]

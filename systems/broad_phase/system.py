@@ -19,7 +19,7 @@ from .stages import (
     ROOM_FOR_CANDIDATES,
     ROOM_FOR_MOVING,
     ROOM_FOR_STATICS,
-    TREE,
+    SPATIAL_TREE,
     UNIFORM_GRID_MIN,
     choose_search,
     place_moving,
@@ -73,7 +73,8 @@ class BroadPhase(StagedSystem):
             ("candidates",), MANY, "more bodies are static than move", ROOM_FOR_CANDIDATES,
         ),
         Stage(
-            leave_out_still, "pairs of two bodies that are still", ("candidates", "still"), ("candidates",), "sleeping",
+            leave_out_still, "pairs of two bodies that sleep or stay", ("candidates", "sleep_state"), ("candidates",),
+            "sleeping",
             "bodies sleep",
         ),
         Stage(
@@ -90,7 +91,7 @@ class BroadPhase(StagedSystem):
     def kernels(self) -> Iterator[PlannedKernel]:
         """The stages, and the passes of trees where the last step needed them."""
         yield from super().kernels()
-        if self._state.collides and self._search.last == TREE:
+        if self._state.collides and self._search.last == SPATIAL_TREE:
             yield from planned_passes(fixed_count(self._state))
 
     def reason(self) -> str:

@@ -27,18 +27,18 @@ from ...framework.vectors import item, replace
 from ..bits import lowest_bit
 from .brute_force import boxes_overlap
 from .lanes import eight_at, four_at
-from .records import HIGHEST, LARGEST, LOWEST
+from .records import HIGHEST, LARGEST_EXTENT, LOWEST
 
 CELLS_PER_BOX = 2.0  # at most; cells grow where there is more room than that
 SPARE_CELLS = 64
 CROWDED = 8.0  # mean number of boxes in a box's cell from which the tree is faster
 LOOSE = 1.0 + 2.0**-16  # cells exceed the largest box by this factor, which covers all rounding
-SLACK = 2.0**-16  # the same for boxes that are not in the grid, in cells
-LARGEST_EDGE = 1.0 - SLACK  # of a box that is not in the grid and for which the cells around its own are enough
+CELL_SLACK = 2.0**-16  # the same for boxes that are not in the grid, in cells
+LARGEST_EDGE = 1.0 - CELL_SLACK  # of a box that is not in the grid and for which the cells around its own are enough
 FARTHEST = 2.0**28  # distance from the origin, in boxes, up to which LOOSE and SLACK cover rounding
 FULLEST = 64  # most boxes in one cell
 CODE_BITS = 60
-CHUNK = 1024  # notes tested at a time; they stay in the first-level cache
+NOTE_CHUNK = 1024  # notes tested at a time; they stay in the first-level cache
 OUTSIDE_MAX = 64  # boxes that may stay outside a grid
 LONGEST = 128  # notes of one box: 2 and 4 * 3 cells, all of them full, by eights, with some to spare
 LANES = 8  # codes that may be read past the last one
@@ -51,7 +51,7 @@ FULL = -1  # in place of a number of pairs: there may not be room for all
 def choose_cells(grid, count):
     """Size and number of cells, with one empty cell around; returns whether a grid may suit so many boxes."""
     frame, zero = grid.frame, zero_of(grid)
-    largest, farthest = frame[LARGEST], 0.0
+    largest, farthest = frame[LARGEST_EXTENT], 0.0
     for q in range(len(zero)):
         farthest = max(farthest, max(abs(frame[LOWEST + q]), abs(frame[HIGHEST + q])))
     if not farthest < largest * FARTHEST:  # also if a box is infinite, if none has a size, or if there is none
@@ -145,7 +145,7 @@ def code_of(grid, low, high):
 
 
 @part
-def place_boxes(grid, lower, upper, start, count):
+def place_in_grid(grid, lower, upper, start, count):
     """The counting sort's last pass; afterwards directory[key] is where cell ``key`` begins."""
     total, keys, directory, order, cells = grid.total, grid.keys, grid.directory, grid.order, grid.cells
     for i in range(count):
@@ -165,7 +165,7 @@ def build_grid(grid, lower, upper, start, count):
     grid.suits = choose_cells(grid, count) and find_cells(grid, lower, upper, start, count)
     if grid.suits:
         choose_codes(grid)
-        place_boxes(grid, lower, upper, start, count)
+        place_in_grid(grid, lower, upper, start, count)
 
 
 @inlined
@@ -352,8 +352,8 @@ def cells_around(grid, low, high):
     for q in range(len(low)):
         origin = frame[LOWEST + q]
         end = np.int64((frame[HIGHEST + q] - origin) * inverse) + 1.0
-        start = np.int64(min(max((item(low, q) - origin) * inverse - 0.5 - SLACK, 0.0), end))
-        stop = np.int64(min(max((item(high, q) - origin) * inverse + 0.5 + SLACK, -1.0), end - 1.0))
+        start = np.int64(min(max((item(low, q) - origin) * inverse - 0.5 - CELL_SLACK, 0.0), end))
+        stop = np.int64(min(max((item(high, q) - origin) * inverse + 0.5 + CELL_SLACK, -1.0), end - 1.0))
         length = max(stop - start + 1, 0)
         first += (start + 1) * (1 if q == 0 else grid.row if q == 1 else grid.layer)
         width = length if q == 0 else width

@@ -13,7 +13,7 @@ from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.schedule.stages import Rows
 from ..codes import OK
-from ..impacts.heap import heap_push, holds
+from ..impacts.heap import heap_push, is_current
 from ..impacts.records import EVENTS
 from ..impacts.worklist import list_pair, most_listed
 from ..narrow_phase.manifolds import forget_manifold
@@ -80,7 +80,7 @@ def keep_events(state):
     for k in range(waiting):
         event = impacts.heap[k]
         c = impacts.event_pair[event]
-        if holds(state, event) and old.place[c] >= 0:
+        if is_current(state, event) and old.place[c] >= 0:
             impacts.event_pair[event] = old.place[c]
             heap_push(impacts, k)
 

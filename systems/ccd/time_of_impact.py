@@ -24,11 +24,11 @@ from ...framework.vectors import absolute, add, add_scaled, dot, item, length, s
 from ..integration.trajectory import ROUNDING, along, bend_of, first_root, is_straight, rate_along
 from ..integration.turning import is_turned, turn_of_arm
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, sweep
-from ..shapes.poses import lead_on, motion_of, set_motion
+from ..shapes.poses import advance_pose, motion_of, set_motion
 from ..shapes.tolerances import is_turning, smaller_extent
-from .turning_touch import MOST_STRIDES, NEAR, SHORTER, closing_point, touch_of_turning
+from .turning_touch import MOST_STRIDES, NEAR_EXTENTS, SHORTER, closing_point, touch_of_turning
 
-LOOKS = 100  # a graze takes about 30; whatever is still closing in after that counts as touching
+MOST_ADVANCES = 100  # a graze takes about 30; whatever is still closing in after that counts as touching
 SAFETY_FACTOR, FAR_ROUNDING = 1.001, 1e-12  # more than all rounding: of an extent, of a distance
 CLEAR = 64.0 * ROUNDING  # of the distances in a path: farther off a touch rounding does not turn its normal round
 DEPTH = 0.25  # of the extent: what is deeper in is there, however coarse the numbers are
@@ -60,7 +60,7 @@ def bounds_stay_disjoint(state, a, b, path, since, until):
 def shift_of_offset(state, i, h):
     """How the collider of body i is shifted beside it, h seconds from where it is."""
     motion = motion_of(state, i)
-    turn = lead_on(state, i, state.bodies.spin[i], h)
+    turn = advance_pose(state, i, state.bodies.spin[i], h)
     set_motion(state, i, motion)
     return turn_of_arm(turn, state.bodies.offset[i])
 
@@ -75,7 +75,7 @@ def first_touch(state, a, b, path, since, until, limits):
     """
     shape_a, shape_b = state.bodies.shape[a], state.bodies.shape[b]
     if state.spinning and is_turning(state, until, a, b):
-        spins, near = (state.bodies.spin[a], state.bodies.spin[b]), NEAR * smaller_extent(state.bodies, a, b)
+        spins, near = (state.bodies.spin[a], state.bodies.spin[b]), NEAR_EXTENTS * smaller_extent(state.bodies, a, b)
         near_limits = limits[0], near, limits[2], limits[3], SHORTER * limits[1]
         found, (t, normal, point, at), _ = touch_of_turning(state, a, b, path, spins, (since, until), near_limits)
         # Offsets of colliders stand as where the step ends: seen from there, so that arms are right.
@@ -92,9 +92,11 @@ def first_touch(state, a, b, path, since, until, limits):
     if known and not met:  # most pairs
         zero = zero_of(state)
         return APART, t, zero, zero, zero
-    found, t, normal, point, at = advance(state, a, b, path, (straight, known), (since, t), until, limits[0])
+    found, t, normal, point, at = advance_conservatively(
+        state, a, b, path, (straight, known), (since, t), until, limits[0]
+    )
     if state.spinning and found == TOUCHES and (is_turned(state.bodies, a) or is_turned(state.bodies, b)):
-        near = NEAR * smaller_extent(state.bodies, a, b)
+        near = NEAR_EXTENTS * smaller_extent(state.bodies, a, b)
         _, point = closing_point(state, a, b, at, (0.0, normal, point), near, rate_along(path, t))
     return found, t, normal, point, at
 
@@ -146,14 +148,14 @@ def normal_beside(state, a, b, path, t, since, normal):
 
 
 @part
-def advance(state, a, b, path, kind, times, until, slop):
+def advance_conservatively(state, a, b, path, kind, times, until, slop):
     """Conservative advancement; kind: (the path is straight, the first touch is known); times: (since when the pair is
     looked at, the time to begin with: that of the touch if it is known)."""
     (straight, known), (since, t) = kind, times
     shape_a, shape_b = state.bodies.shape[a], state.bodies.shape[b]
     normal, point, at = zero_of(state), zero_of(state), zero_of(state)
     found, cornered, time = False, False, t
-    for look in range(LOOKS):
+    for look in range(MOST_ADVANCES):
         d = along(path, t)
         hit, depth, n, p = evaluate(state, shape_a, a, shape_b, b, d)
         w = rate_along(path, t)
@@ -162,7 +164,7 @@ def advance(state, a, b, path, kind, times, until, slop):
             if not hit or is_corner_touch(state, shape_a, a, shape_b, b, d, slop):
                 return AT_CORNER, time, normal, point, at
             return TOUCHES, time, n, point, at
-        touches = known or hit or abs(depth) <= ROUNDING * length(d) or look == LOOKS - 1
+        touches = known or hit or abs(depth) <= ROUNDING * length(d) or look == MOST_ADVANCES - 1
         if look > 0 and rate > 0.0 and dot(n, normal) < 0.0 and -depth <= clear_of_rounding(state, a, b, path, t):
             n, rate, touches = normal, dot(w, normal), True
         elif look == 0 and touches and (rate > 0.0 if t > since else rate < 0.0 and depth == 0.0):

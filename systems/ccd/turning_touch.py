@@ -19,17 +19,17 @@ from ..integration.turning import arms_to, closing_by_spin, is_turned, size_of_t
 from ..shapes.convex.points import MOST_POINTS, contact_points
 from ..shapes.dispatch import both_convex, evaluate, has_corner_rule, is_corner_touch
 from ..shapes.linking.convex_by_address import convex_at, rounding_by_address, support_by_address
-from ..shapes.poses import pose_of, tumbles, turn_to
+from ..shapes.poses import has_unequal_moments, pose_of, turn_to
 from ..shapes.tolerances import slop_of, smaller_extent, way_of_turning
 
-LOOKS, EXACT_LOOKS = 250, 60
-NEAR = 1e-6  # of the extent: a smaller gap is a touch; of bodies at rest,
-BESIDE = 0.5  # of the slop
-TILT = 0.1  # rad, between faces that may touch in several points
+TURNING_LOOKS, EXACT_LOOKS = 250, 60
+NEAR_EXTENTS = 1e-6  # of the extent: a smaller gap is a touch; of bodies at rest,
+TOUCH_SLOP = 0.5  # of the slop
+TURNING_TILT = 0.1  # rad, between faces that may touch in several points
 MOST_STRIDES = 4096  # looks at shapes whose gap does not tell the next one;
 STRIDE, SHORTER = 0.02, 0.1  # extents between these; of the stride of others: that of a thin box which is turned is
 # the extent of the box around it
-FOLLOWED = 0.5  # rad in a step: up to that the end of the step tells where what turns touches
+FOLLOWED_TURN = 0.5  # rad in a step: up to that the end of the step tells where what turns touches
 MOST_SUNK = 0.5  # slops, or a graze: deeper nothing sinks in before a touch
 GRAZE = 0.125  # slops: as far as points move between looks at a pair that touches and parts, or after EXACT_LOOKS
 
@@ -42,7 +42,7 @@ def closing_point(state, a, b, d, met, near, velocity):
     bodies, (_, normal, point) = state.bodies, met
     places, gaps = stack_array(MOST_POINTS, d), stack_array(MOST_POINTS, 0.0)
     speed, middle, closing = dot(velocity, normal), scale(d, 0.0), 0
-    count = contact_points(state, (a, b), d, met, (near, TILT), places, gaps)
+    count = contact_points(state, (a, b), d, met, (near, TURNING_TILT), places, gaps)
     for k in range(count):
         place = row(places, k, d)
         if speed + closing_by_spin(bodies, a, b, arms_to(bodies, a, b, normal, place, d), normal) < 0.0:
@@ -85,13 +85,13 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
     convex, ends = both_convex(state, shape_a, shape_b), sub(bodies.offset[b], bodies.offset[a])
     turning = way_of_turning(bodies, a, spin_a) + way_of_turning(bodies, b, spin_b)
     way = turning * (until - since) + travel_of(path, until)
-    graze = max(GRAZE * slop, way / (LOOKS - EXACT_LOOKS + strides))
+    graze = max(GRAZE * slop, way / (TURNING_LOOKS - EXACT_LOOKS + strides))
     bend = 2.0 * length(path[2]) + 6.0 * length(path[3]) * until
     corners = threshold < 0.0 or (is_turned(bodies, a) and is_turned(bodies, b))  # of others, too
     poses = pose_of(state, a), pose_of(state, b)
     touch, found, gap = (until, zero_of(state), zero_of(state), zero_of(state)), False, 0.0
     t, least, low, high = since, 0.0, since, math.inf
-    for look in range(LOOKS + strides):
+    for look in range(TURNING_LOOKS + strides):
         turn_to(state, a, poses[0], spin_a, until, t)
         turn_to(state, b, poses[1], spin_b, until, t)
         d = add(along(path, t), sub(sub(bodies.offset[b], bodies.offset[a]), ends))
@@ -134,7 +134,7 @@ def is_struck(state, i):
 @part
 def turn_of_path(state, i, dt):
     """By how much body i turns in the step, as seen from what the last impact has made of its spin."""
-    led = state.impacts.logged > 0 and state.bodies.impact_count[i] > 0 and tumbles(state, i)  # by its new spin
+    led = state.impacts.logged > 0 and state.bodies.impact_count[i] > 0 and has_unequal_moments(state, i)
     struck = is_struck(state, i) or led
     return scale(state.bodies.spin[i], dt) if struck else state.bodies.turn[i]
 
@@ -145,7 +145,7 @@ def is_followed(state, a, b, dt):
     turn = 0.0
     for i in (a, b):
         turn += size_of_turn(turn_of_path(state, i, dt)) if state.bodies.rolling_radius[i] == 0.0 else 0.0
-    return turn <= FOLLOWED
+    return turn <= FOLLOWED_TURN
 
 
 @part
@@ -173,6 +173,6 @@ def first_touch_of_turn(state, dt, a, b):
     spins = scale(turn_of_path(state, a, dt), left), scale(turn_of_path(state, b, dt), left)
     way = length(travel) + way_of_turning(bodies, a, spins[0]) + way_of_turning(bodies, b, spins[1])
     stride = STRIDE * smaller_extent(bodies, a, b) / way if way > 0.0 else 1.0
-    limits = (slop, BESIDE * slop, -math.inf, -math.inf, stride)
+    limits = (slop, TOUCH_SLOP * slop, -math.inf, -math.inf, stride)
     found, (share, normal, point, _), gap = touch_of_turning(state, a, b, path, spins, (0.0, 1.0), limits)
     return found, since + left * share, gap, normal, point, start, scale(travel, share)

@@ -12,7 +12,7 @@ OF_PART = "its PartOf has a mass, and it has no collider that tells its inertia:
 
 
 @part
-def tells_inertia(state, i):
+def has_own_inertia(state, i):
     """Whether row i has a shape with second moments."""
     shape = state.bodies.levels[state.level_count - 1, i] if state.collides else -1
     return shape >= 0 and state.shapes.moments[shape] != 0
@@ -21,7 +21,7 @@ def tells_inertia(state, i):
 @part
 def inertia_of_row(state, i, mass):
     """(xx, yy, zz, xy, xz, yz) of a shape of that mass about the body's position, along the axes of its own row."""
-    if not tells_inertia(state, i):
+    if not has_own_inertia(state, i):
         state.blamed = i + 1
         raise ValueError(UNKNOWN)
     shape = state.bodies.levels[state.level_count - 1, i]
@@ -53,7 +53,7 @@ def inertia_of_compound(state, i, gyration):
             lost = not (state.collides and bodies.levels[state.level_count - 1, k] >= 0) and kept[p, 2] == kept[p, 2]
             if lost:  # its collider, for a moment: as it was
                 tensor = m * kept[p, 0], m * kept[p, 1], m * kept[p, 2], m * kept[p, 3], m * kept[p, 4], m * kept[p, 5]
-            elif tells_inertia(state, k):
+            elif has_own_inertia(state, k):
                 tensor = inertia_of_row(state, k, m)
             else:
                 state.blamed = k + 1

@@ -12,7 +12,7 @@ from .rows import owner_of
 
 
 @part
-def find_rows(state):
+def find_part_rows(state):
     """The rows of parts and of their bodies, chained in the order of the parts."""
     parts, bodies = state.parts, state.bodies
     for i in range(state.count):
@@ -51,7 +51,7 @@ def begin_parts(state, dt):
     """Which rows belong together; the game may have moved the bodies."""
     parts = state.parts
     if parts.rows_version != state.version:
-        find_rows(state)
+        find_part_rows(state)
     state.compound = True
     for k in range(parts.count):
         if takes_part(state, k):
@@ -60,7 +60,7 @@ def begin_parts(state, dt):
 
 
 @part
-def share_masses(state):
+def add_masses_of_parts(state):
     """Rows of parts are moved as their bodies are."""
     bodies, parts = state.bodies, state.parts
     for k in range(parts.count if state.compound else 0):
@@ -116,7 +116,7 @@ def leave_out_parts(state, dt):
 
 
 @part
-def share_prediction(state):
+def copy_prediction_to_parts(state):
     """What was done to bodies before anything is known of the step was done to their parts."""
     bodies, parts = state.bodies, state.parts
     for k in range(parts.count if state.compound else 0):
@@ -131,7 +131,7 @@ def share_prediction(state):
 
 
 @part
-def share_places(state):
+def copy_to_parts(state):
     """Parts are where their bodies are, and as fast, and have turned as far."""
     bodies, parts = state.bodies, state.parts
     for k in range(parts.count if state.compound else 0):
@@ -142,7 +142,7 @@ def share_places(state):
                 bodies.spin[i], bodies.turn[i] = bodies.spin[body], bodies.turn[body]
 
 
-def carry_parts(state, dt):
+def place_parts(state, dt):
     """Parts go where contacts have sent and turned their bodies."""
     for k in range(state.parts.count):
         if takes_part(state, k):

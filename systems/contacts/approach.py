@@ -11,12 +11,12 @@ from ..narrow_phase.manifolds import centre_offset, centre_offset_at_start, eval
 from ..shapes.dispatch import both_convex, both_sharp, has_corner_rule, is_corner_touch
 from ..shapes.tolerances import slop_of
 
-LOOKS = 24
+APPROACH_LOOKS = 24
 STAYS_SLOPS = 1e-3  # slops: two bodies that go less far past each other in a step stay where they are
 
 
 @inlined
-def stays(travel, slop):
+def is_stationary(travel, slop):
     """Whether two bodies that go so far past each other stay where they are; false for nan."""
     return dot(travel, travel) < STAYS_SLOPS * STAYS_SLOPS * slop * slop
 
@@ -31,7 +31,7 @@ def meets_at_corner(state, a, b, d, slop):
     if not has_corner_rule(state, shape[a], shape[b]):
         if not both_sharp(state, shape[a], shape[b]):
             return False
-        if stays(sub(centre_offset(bodies, a, b), centre_offset_at_start(bodies, a, b)), slop):
+        if is_stationary(sub(centre_offset(bodies, a, b), centre_offset_at_start(bodies, a, b)), slop):
             return False
     return is_corner_touch(state, shape[a], a, shape[b], b, d, slop)
 
@@ -61,7 +61,7 @@ def first_touch_on_segment(state, a, b, d, travel, edge):
     way, slop = length(travel), slop_of(state, a, b)
     convex = both_convex(state, shape[a], shape[b])
     _, depth, normal, _ = evaluate_pair(state, a, b, d)
-    for _ in range(LOOKS):
+    for _ in range(APPROACH_LOOKS):
         rate = dot(travel, normal)
         if convex and not rate < 0.0:
             break

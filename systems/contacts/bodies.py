@@ -9,18 +9,18 @@ from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..ccd.turning_touch import turn_of_path
 from ..codes import OK
 from ..compounds.rows import has_parts, next_row, owner_of, place_of
-from ..compounds.stages import share_places
+from ..compounds.stages import copy_to_parts
 from ..integration.trajectory import along, path_of
 from ..integration.turning import size_of_turn
-from ..joints.bodies import lay_joints
+from ..joints.bodies import build_joint_rows
 from ..joints.records import DIRECT_BODIES
-from ..records import HELD, SOLVER_ARMS, SOLVER_BODIES, SOLVER_CONTACTS, SOLVER_SPINS
+from ..records import REST_COLUMNS, SOLVER_ARMS, SOLVER_BODIES, SOLVER_CONTACTS, SOLVER_SPINS
 from .constants import FREQUENCY, SAG, TIPPING_FREQUENCY, TIPPING_SAG
 from .points import points_of
 from .solving.islands import order_rows
 from .solving.prediction import drop_support
-from .solving.rows import turn_body
-from .solving.turning import NOT_TUMBLING, note_frame, turn_joined
+from .solving.rows import rotate_body
+from .solving.turning import NOT_TUMBLING, integrate_rotation_of_joined, note_frame
 
 
 @part
@@ -79,7 +79,7 @@ def bodies_at_rest(state):
 
 
 ROOM_AT_REST = (
-    Rows("bodies", HELD, lambda s: s.count if rows_at_rest(s) > 0 else 0),
+    Rows("bodies", REST_COLUMNS, lambda s: s.count if rows_at_rest(s) > 0 else 0),
     Rows("solver", SOLVER_CONTACTS, rows_at_rest),
     Rows("solver", SOLVER_BODIES, bodies_at_rest),
     Rows("solver", SOLVER_ARMS, lambda s: rows_at_rest(s) if s.spinning else 0),
@@ -111,7 +111,7 @@ def gather(state, dt):
     for q in range(solver.bodies):
         i = solver.body_row[q]
         w = inverse_mass[i]
-        solver.inverse_mass[q], solver.heft[q] = w, 1.0 / w if w > 0.0 else 0.0
+        solver.inverse_mass[q], solver.solver_mass[q] = w, 1.0 / w if w > 0.0 else 0.0
         v, x, a = nothing, nothing, nothing
         if i < state.moving:
             v = bodies.start_velocity[i]
@@ -131,7 +131,7 @@ def gather(state, dt):
     for q in range(solver.bodies if state.spinning else 0):
         i = solver.body_row[q]
         solver.spin[q] = bodies.spin[i]
-        turn_body(solver, q, scale(turn_of_path(state, i, dt), -1.0))  # to where the step starts
+        rotate_body(solver, q, scale(turn_of_path(state, i, dt), -1.0))  # to where the step starts
         solver.reach[q] = reach_from_centre(state, i) if state.collides else 0.0
         solver.inverse_inertia[q] = bodies.inverse_inertia[i]
         solver.inverse_products[q] = bodies.inverse_products[i]
@@ -139,10 +139,10 @@ def gather(state, dt):
             note_frame(state, q)
             solver.spin_before[q] = nothing
             if solver.frame[q, 0] != NOT_TUMBLING:
-                turn_body(solver, q, nothing)
-                turn_joined(solver, q, q + 1, -dt)
+                rotate_body(solver, q, nothing)
+                integrate_rotation_of_joined(solver, q, q + 1, -dt)
     if solver.joints.active > 0:
-        lay_joints(state)
+        build_joint_rows(state)
     return OK
 
 
@@ -172,5 +172,5 @@ def put_back(state, dt):
                 bodies.spin[i], bodies.turn[i] = solver.spin[q], add(bodies.turn[i], solver.turn[q])
     if state.any_warm_started:
         drop_support(state, dt)
-    share_places(state)
+    copy_to_parts(state)
     return OK

@@ -233,8 +233,8 @@ class ContactEvents(StagedSystem):
         state = self._state
         if not state.others_write:  # nor has any event a handler
             return [self.segment()]
-        tell = Check(state.words, state.word_of("event_count"), PythonPart(self.name, self._tell))
-        return [PythonPart(self.name, self._take_disabled), self.segment(), tell]
+        report = Check(state.words, state.word_of("event_count"), PythonPart(self.name, self._report))
+        return [PythonPart(self.name, self._take_disabled), self.segment(), report]
 
     def closing(self) -> list[Any]:
         """What follows the last stage of all, so that the step is one call where no code of the game runs in it."""
@@ -323,7 +323,7 @@ class ContactEvents(StagedSystem):
         if self._touching.ends:
             self._contacts.record("end", source.ended())
 
-    def _tell(self, dt: float) -> None:
+    def _report(self, dt: float) -> None:
         """Note it and call the handlers."""
         self._report_faults()
         self._record()

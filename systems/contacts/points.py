@@ -9,7 +9,7 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, length, row, scale, store, sub
 from ..ccd.search_bounds import FAST
-from ..ccd.turning_touch import FOLLOWED, first_touch_of_turn, turn_of_path
+from ..ccd.turning_touch import FOLLOWED_TURN, first_touch_of_turn, turn_of_path
 from ..integration.turning import cross_spin, is_turned, size_of_turn, turn_of_arm
 from ..narrow_phase.manifolds import centre_offset_at_start, evaluate_pair, forget_manifold, has_manifold
 from ..shapes.convex.points import MOST_POINTS, contact_points, is_same
@@ -32,14 +32,14 @@ def points_of(state, c):
 
 
 @inlined
-def rounding_of(state, i):
+def point_rounding(state, i):
     """How far the shape of body i reaches beyond its core."""
     shape = convex_at(state.shapes.parameters[state.bodies.shape[i]], i)
     return rounding_by_address(shape) if shape[1] != 0 else 0.0
 
 
 @part
-def lay_arms(state, dt, r, gap):
+def build_arms(state, dt, r, gap):
     """The points of the pair whose first row is r: gaps, and the arms to both bodies. Shapes stand as they are turned
     where the step ends; rows that the pair does not need are never reached."""
     solver, pairs, bodies = state.solver, state.pairs, state.bodies
@@ -58,7 +58,7 @@ def lay_arms(state, dt, r, gap):
         tilt += max(0.0, -gap) / extent  # no end of a face that overlaps is left out
         margin = turning_margin(state, dt, a, b)
         count = contact_points(state, (a, b), d, (-gap, normal, point), (margin, tilt), places, gaps)
-    round_a, round_b = rounding_of(state, a), rounding_of(state, b)
+    round_a, round_b = point_rounding(state, a), point_rounding(state, b)
     rolling = max(bodies.rolling_friction[a], bodies.rolling_friction[b])
     solver.has_rolling |= rolling > 0.0
     for e in range(rows):
@@ -93,7 +93,7 @@ def slides_past(state, a, b, normal, arm_a, arm_b):
 def is_ball(state, i, way):
     """Whether the shape of body i is a point with a rounding."""
     shape = convex_at(state.shapes.parameters[state.bodies.shape[i]], i)
-    if shape[0] == 0 or not rounding_of(state, i) > 0.0:
+    if shape[0] == 0 or not point_rounding(state, i) > 0.0:
         return False
     return is_same(support_by_address(shape, way), support_by_address(shape, scale(way, -1.0)))
 
@@ -103,7 +103,7 @@ def lies_on_face(state, sides, d, turn, normal):
     """Whether of two bodies, of which one is a ball, the other is touched on a face that turns on by little.
     d: from a to b at the touch; turn: of the other body, from then to the end of the step, where its shape stands."""
     bodies, (a, b) = state.bodies, sides
-    if length(turn) > FOLLOWED:
+    if length(turn) > FOLLOWED_TURN:
         return False
     face = add(normal, turn_of_arm(turn, normal))
     ends = add(add(d, turn_of_arm(turn, d)), sub(bodies.offset[b], bodies.offset[a]))
@@ -153,14 +153,15 @@ def lay_first_touch(state, dt, r):
         normal = add(normal, turn_of_arm(onwards, normal))
         left_a, left_b = scale(left_a, 0.0), scale(left_b, 0.0)
     if led and ball_a:
-        arm_a = add_scaled(bodies.offset[a], normal, rounding_of(state, a))
+        arm_a = add_scaled(bodies.offset[a], normal, point_rounding(state, a))
     if led and ball_b:
-        arm_b = add_scaled(bodies.offset[b], normal, -rounding_of(state, b))
+        arm_b = add_scaled(bodies.offset[b], normal, -point_rounding(state, b))
     if bodies.rolling_radius[a] > 0.0:
         arm_a = scale(normal, bodies.rolling_radius[a])
     if bodies.rolling_radius[b] > 0.0:
         arm_b = scale(normal, -bodies.rolling_radius[b])
-    core_a, core_b = add_scaled(arm_a, normal, -rounding_of(state, a)), add_scaled(arm_b, normal, rounding_of(state, b))
+    core_a = add_scaled(arm_a, normal, -point_rounding(state, a))
+    core_b = add_scaled(arm_b, normal, point_rounding(state, b))
     core_a = add(core_a, turn_of_arm(scale(left_a, -1.0), core_a))
     core_b = add(core_b, turn_of_arm(scale(left_b, -1.0), core_b))
     before = add(add(way, sub(begin, start)), sub(turn_of_arm(left_b, core_b), turn_of_arm(left_a, core_a)))

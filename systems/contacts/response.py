@@ -11,7 +11,7 @@ from ...framework.schedule.phases import Phase
 from ...framework.schedule.stages import Program, PythonPart, Rows, Stage
 from ...framework.settings import Settings
 from ...framework.world.contacts import Contacts
-from ..compounds.stages import carry_parts
+from ..compounds.stages import place_parts
 from ..impacts.stages import ROOM_FOR_IMPACTS, begin_impacts, resolve_impacts
 from ..joints.bodies import count_turns
 from ..staged import StagedSystem
@@ -25,9 +25,9 @@ from .solving.solver import solve_contacts, solve_joined_contacts, solve_turning
 from .solving.warm_start import ROOM_TO_STORE, match_warm_start, store_warm_start
 from .static_penetration import resolve_static_penetration
 
-MOTION = ("position", "linear_velocity", "path_velocity")
+MOVED_COLUMNS = ("position", "linear_velocity", "path_velocity")
 EITHER = "colliders or joints"
-NEAR, REST, RESTED = "bodies are near each other", "contacts rest", "contacts rested in the step before"
+BODIES_NEAR, REST, RESTED = "bodies are near each other", "contacts rest", "contacts rested in the step before"
 
 
 class Response(StagedSystem):
@@ -43,21 +43,24 @@ class Response(StagedSystem):
         Stage(begin_response, "where the paths begin", ("pairs",), ("path_velocity",), EITHER),
         Stage(
             predict_rest, "the impulses of the last step act on the prediction, as far as there is something to hold",
-            ("warm_start",), MOTION, EITHER, RESTED, ROOM_FOR_SUPPORT,
+            ("warm_start",), MOVED_COLUMNS, EITHER, RESTED, ROOM_FOR_SUPPORT,
         ),
         Stage(begin_impacts, "no impact yet", ("pairs", "restitution"), ("impacts",), "colliders"),
         Stage(
             resolve_impacts, "impacts at their time on the path, in order", ("pairs", "restitution", "friction"),
-            (*MOTION, "impacts"), "colliders", NEAR, ROOM_FOR_IMPACTS,
+            (*MOVED_COLUMNS, "impacts"), "colliders", BODIES_NEAR, ROOM_FOR_IMPACTS,
         ),
         Stage(
-            find_resting, "which pairs neither bounce nor are apart", ("pairs", *MOTION), ("pairs",), "colliders", NEAR
+            find_resting, "which pairs neither bounce nor are apart", ("pairs", *MOVED_COLUMNS), ("pairs",),
+            "colliders", BODIES_NEAR,
         ),
         Stage(
-            gather, "the resting bodies and their contacts, by island and colour; substeps of each island", MOTION,
-            ("solver",), EITHER, REST, ROOM_AT_REST,
+            gather, "the resting bodies and their contacts, by island and colour; substeps of each island",
+            MOVED_COLUMNS, ("solver",), EITHER, REST, ROOM_AT_REST,
         ),
-        Stage(linearise, "normal and gap of each contact at rest", MOTION, ("solver", "pairs"), "colliders", REST),
+        Stage(
+            linearise, "normal and gap of each contact at rest", MOVED_COLUMNS, ("solver", "pairs"), "colliders", REST
+        ),
         Stage(
             match_warm_start, "the impulses of the step before, to start with", ("warm_start",), ("solver",),
             "colliders", REST,
@@ -74,21 +77,21 @@ class Response(StagedSystem):
             solve_joined_contacts, "the same, with joints before the contacts", ("solver",), ("solver",),
             "joints", room=(Rows("solver.direct", ("values",), lambda s: s.solver.direct.blocks),),
         ),
-        Stage(put_back, "where the resting bodies are at the end", ("solver",), MOTION, EITHER, REST),
+        Stage(put_back, "where the resting bodies are at the end", ("solver",), MOVED_COLUMNS, EITHER, REST),
         Stage(
-            carry_parts, "parts go where contacts have sent and turned their bodies", MOTION, (*MOTION, "rotation"),
-            "parts",
+            place_parts, "parts go where contacts have sent and turned their bodies", MOVED_COLUMNS,
+            (*MOVED_COLUMNS, "rotation"), "parts",
         ),
         Stage(count_turns, "how far joints in space have turned", ("rotation",), ("solver",), "joints"),
         Stage(
-            resolve_static_penetration, "what is in what cannot be moved, or through it, as that turns or the solver "
-            "has pushed, is put back", ("pairs",), MOTION, "colliders", NEAR,
+            resolve_static_penetration, "pushes bodies out of static and kinematic bodies", ("pairs",), MOVED_COLUMNS,
+            "colliders", BODIES_NEAR,
         ),
         Stage(
             store_warm_start, "the impulses, for the next step", ("solver",), ("warm_start",), "colliders", REST,
             ROOM_TO_STORE,
         ),
-        Stage(find_touching, "which pairs touch in the end", MOTION, ("pairs",), "colliders", NEAR),
+        Stage(find_touching, "which pairs touch in the end", MOVED_COLUMNS, ("pairs",), "colliders", BODIES_NEAR),
         Stage(
             publish_contacts, "the contacts of the step", ("pairs",), ("contacts",), "contacts",
             room=ROOM_FOR_CONTACTS,

@@ -11,14 +11,14 @@ from ..ccd.search_bounds import FAST, is_swept, turns_far
 from ..ccd.turning_touch import first_touch_of_turn, is_followed
 from ..codes import OK
 from ..compounds.rows import owner_of
-from ..impacts.impulses import STOPPED, is_beyond_cap, is_rattling
+from ..impacts.impulses import STOPPED, is_beyond_cap, is_trapped
 from ..integration.turning import arms_to, closing_by_spin, size_of_turn
 from ..narrow_phase.manifolds import (
     centre_offset,
     centre_offset_at_start,
-    deepest_on_way,
-    deepest_possible,
     depth_at,
+    depth_bound,
+    depth_bound_on_path,
     depth_by_plane,
     evaluate_pair,
     forget_manifold,
@@ -38,13 +38,13 @@ from ..shapes.tolerances import (
     turning_margin,
     turning_travel,
 )  # fmt: skip
-from .approach import STAYS_SLOPS, first_touch_on_segment, meets_at_corner, segment_start, stays
-from .points import is_ball, lay_arms, lay_first_touch, points_of
+from .approach import STAYS_SLOPS, first_touch_on_segment, is_stationary, meets_at_corner, segment_start
+from .points import build_arms, is_ball, lay_first_touch, points_of
 
 ENTRY_ITERATIONS = 24
-APART = 1e-11  # of the extent: a smaller gap is none, not even as seen past a round corner
-BESIDE, EVEN = 1e-6, 1e-9  # of the extent: so near the normal is another one, by this much of its cosine
-STAYS, PARTS_SLOWLY, PARTS = range(3)  # what an elastic pair does at the end of the step
+REST_GAP = 1e-11  # of the extent: a smaller gap is none, not even as seen past a round corner
+NORMAL_PROBE, NORMAL_VARIATION = 1e-6, 1e-9  # of the extent: so near the normal differs, by this much of its cosine
+STATIONARY, SEPARATES_SLOWLY, SEPARATES = range(3)  # what an elastic pair does at the end of the step
 
 
 @part
@@ -77,7 +77,7 @@ def deepest(state, dt, c, d):
     way there; else by its manifold or its function."""
     pairs, bodies = state.pairs, state.bodies
     a, b = pairs.a[c], pairs.b[c]
-    if state.spinning and turns_far(state, a, b) and deepest_on_way(state, c) >= -slop_of(state, a, b):
+    if state.spinning and turns_far(state, a, b) and depth_bound_on_path(state, c) >= -slop_of(state, a, b):
         touches, _, _, normal, _, _, _ = first_touch_of_turn(state, dt, a, b)
         if touches or not is_followed(state, a, b, dt):
             return 2.0 * slop_of(state, a, b) if touches else -math.inf, normal, touches
@@ -99,7 +99,7 @@ def still_bounces(state, dt, c, depth, normal):
     velocity, e = bodies.linear_velocity, restitution_of(state, a, b)
     if not e > 0.0:
         return False
-    if e == 1.0 and state.impacts.sweeps and is_rattling(state, a, b):
+    if e == 1.0 and state.impacts.sweeps and is_trapped(state, a, b):
         return True
     slop, fixed, extent = slop_of(state, a, b), state.restitution_threshold, smaller_extent(bodies, a, b)
     threshold = fixed if fixed >= 0.0 else (contact_margin(state, dt, a, b) - slop) / dt
@@ -116,7 +116,7 @@ def still_bounces(state, dt, c, depth, normal):
     if not touches and speed < -threshold and not (driven > 0.0 and depth >= -driven):
         return True  # the next step's impact
     if speed > 0.0:
-        pairs.parting[c] = PARTS if speed > threshold and speed * dt > slop else PARTS_SLOWLY
+        pairs.parting[c] = SEPARATES if speed > threshold and speed * dt > slop else SEPARATES_SLOWLY
     if pairs.impulse[c] > 0.0 and speed > threshold:
         before, _ = depth_at(state, c, centre_offset_at_start(bodies, a, b), extent, True)
         return before < 0.0  # on its way out
@@ -155,7 +155,7 @@ def is_resting(state, dt, c):
         return False
     if depth >= 0.0:
         pairs.near_contact[c] = True
-    pairs.parting[c] = STAYS
+    pairs.parting[c] = STATIONARY
     if state.impacts.active and still_bounces(state, dt, c, depth, normal):
         return False
     return far or not meets_at_corner(state, a, b, d, slop_of(state, a, b))
@@ -212,10 +212,10 @@ def entry(state, a, b, d, travel, at_end, slop):
 @part
 def normal_varies(state, a, b, d, normal):
     """Whether the normal is another one a little beside, so that it stands for several faces of a concave shape."""
-    near, varies = BESIDE * smaller_extent(state.bodies, a, b), False
+    near, varies = NORMAL_PROBE * smaller_extent(state.bodies, a, b), False
     for k in range(len(d)):
         _, _, beside, _ = evaluate_pair(state, a, b, replace(d, k, item(d, k) + near))
-        varies |= dot(beside, normal) < 1.0 - EVEN
+        varies |= dot(beside, normal) < 1.0 - NORMAL_VARIATION
     return varies
 
 
@@ -241,13 +241,13 @@ def linearise(state, dt):
         if not is_at_manifold(pairs, c, d, extent):
             make_manifold(state, c, d)
         gap, normal = -depth_by_plane(pairs, c, d), pairs.normal[c]
-        apart, convex = gap > APART * extent, both_convex(state, bodies.shape[a], bodies.shape[b])
+        apart, convex = gap > REST_GAP * extent, both_convex(state, bodies.shape[a], bodies.shape[b])
         solver.varies[k] = not convex and normal_varies(state, a, b, d, normal)
-        moves = not stays(sub(end, d), slop)
-        if moves and (apart or parting != STAYS or meets_at_corner(state, a, b, d, slop)):
+        moves = not is_stationary(sub(end, d), slop)
+        if moves and (apart or parting != STATIONARY or meets_at_corner(state, a, b, d, slop)):
             far, gap, normal = touch_of_long_way(state, dt, a, b, end)
-            if not far or parting != STAYS:
-                gap, normal = entry(state, a, b, d, sub(end, d), parting != STAYS, slop)
+            if not far or parting != STATIONARY:
+                gap, normal = entry(state, a, b, d, sub(end, d), parting != STATIONARY, slop)
             forget_manifold(pairs, c)
         if pairs.impulse[c] > 0.0 and dot(normal, struck_along) <= 0.0:
             normal = struck_along  # coincident centres have parted: not back again
@@ -257,7 +257,7 @@ def linearise(state, dt):
             apart = False  # neither has a corner to slide past
         solver.gap[k], solver.apart[k] = gap, apart
         # After an impact at time t the body seems to come from dv t behind: no overlap to be pushed out.
-        solver.parting[k] = parting == PARTS or (pairs.impulse[c] > 0.0 and gap > 0.0)
+        solver.parting[k] = parting == SEPARATES or (pairs.impulse[c] > 0.0 and gap > 0.0)
         solver.extent[k] = extent
         mu = friction_of(state, a, b)
         solver.friction[k] = mu
@@ -266,7 +266,7 @@ def linearise(state, dt):
     solver.has_rolling = False
     for r in range(solver.contacts if state.spinning else 0):
         if solver.point[r] == 0:
-            lay_arms(state, dt, r, solver.gap[solver.slot[r]])
+            build_arms(state, dt, r, solver.gap[solver.slot[r]])
             if turns_far(state, pairs.a[solver.pair[r]], pairs.b[solver.pair[r]]):
                 lay_first_touch(state, dt, r)
     return OK
@@ -299,10 +299,10 @@ def find_touching(state, dt):
         a, b, pushed, normal = pairs.a[c], pairs.b[c], pairs.impulse[c] > 0.0, pairs.normal[c]
         d, extent = centre_offset(bodies, a, b), smaller_extent(bodies, a, b)
         slop = slop_for(state, extent)
-        known = pushed and pairs.rests[c] and stays(sub(d, pairs.at[c]), slop)
+        known = pushed and pairs.rests[c] and is_stationary(sub(d, pairs.at[c]), slop)
         known = known and contact_travel(state, a) + contact_travel(state, b) < STAYS_SLOPS * slop
         if not (known or is_at_manifold(pairs, c, d, extent)):
-            if solid and not pushed and not crossed and deepest_possible(pairs, c, d) < -SAME_PLACE * extent:
+            if solid and not pushed and not crossed and depth_bound(pairs, c, d) < -SAME_PLACE * extent:
                 continue
             make_manifold(state, c, d)
         depth = depth_by_plane(pairs, c, d)

@@ -26,8 +26,8 @@ from ..integration.turning import turn_of_arm
 from ..narrow_phase.manifolds import (
     centre_offset,
     centre_offset_at_start,
-    deepest_on_way,
-    deepest_possible,
+    depth_bound,
+    depth_bound_on_path,
     evaluate_pair,
 )  # fmt: skip
 from ..narrow_phase.stages import is_solid_pair, layers_meet
@@ -63,7 +63,7 @@ def depth_on_side_of_touch(state, dt, a, b, d):
 
 
 @part
-def how_deep(state, dt, c, a, b):
+def penetration_of(state, dt, c, a, b):
     """(by how much they overlap more than they may, normal) at the end of the step; c: the pair, or NO_PAIR."""
     bodies, extent = state.bodies, smaller_extent(state.bodies, a, b)
     d, start = centre_offset(bodies, a, b), segment_start(state, a, b)
@@ -73,14 +73,14 @@ def how_deep(state, dt, c, a, b):
     allowed = (JOINED if joined else ALLOWED) * extent
     found, depth, normal = False, 0.0, travel
     if state.spinning and turns_far(state, a, b):  # where it started says nothing of the shapes at the end
-        if c != NO_PAIR and deepest_on_way(state, c) <= allowed:  # usual
+        if c != NO_PAIR and depth_bound_on_path(state, c) <= allowed:  # usual
             return 0.0, normal
         depth, normal = depth_on_side_of_touch(state, dt, a, b, d)
         return depth - allowed, normal
     if way > FAST * extent:
         found, gap, normal = first_touch_on_segment(state, a, b, start, travel, FAST * extent)
         depth = -gap - dot(travel, normal)
-    elif c != NO_PAIR and deepest_possible(state.pairs, c, d) <= allowed:  # usual
+    elif c != NO_PAIR and depth_bound(state.pairs, c, d) <= allowed:  # usual
         return 0.0, normal
     if not found:
         _, depth, normal, _ = evaluate_pair(state, a, b, d)
@@ -90,11 +90,11 @@ def how_deep(state, dt, c, a, b):
 
 
 @part
-def keep_out(state, dt, c, a, b):
+def push_out(state, dt, c, a, b):
     """Move the one of a and b that can be moved out of the other, where it is deeper than it may, and take the speed
     that leads there; returns how far it was moved."""
     bodies = state.bodies
-    far, normal = how_deep(state, dt, c, a, b)
+    far, normal = penetration_of(state, dt, c, a, b)
     if not far > 0.0:
         return 0.0
     i, fixed, sign = (b, a, 1.0) if bodies.inverse_mass[b] > 0.0 else (a, b, -1.0)
@@ -121,7 +121,7 @@ def is_moved_by_solver(state, i):
 
 
 @part
-def may_have_sunk(state, c, i):
+def may_penetrate(state, c, i):
     """Whether body i of pair c may be deeper than it may: the solver has moved it, or has left it on its path, which is
     not quite that of the substeps; what has struck it turns on, or so many impacts in which it turns have stopped it:
     from one to the next it sinks in a little."""
@@ -135,7 +135,7 @@ def may_have_sunk(state, c, i):
 
 
 @part
-def is_astray(state, i, dt):
+def is_displaced(state, i, dt):
     """Whether body i is where its neighbours are not known."""
     bodies = state.bodies
     at, start, end = bodies.position[i], bodies.previous_position[i], along(path_of(state, i), dt)
@@ -149,12 +149,12 @@ def is_astray(state, i, dt):
 
 
 @part
-def keep_out_of_all(state, dt, i):
+def push_out_of_all(state, dt, i):
     """Body i against everything that cannot be moved."""
     bodies, moved = state.bodies, False
     for k in range(state.dynamic, state.count):
         if bodies.shape[k] >= 0 and layers_meet(state, i, k) and is_solid_pair(state, i, k):
-            moved |= keep_out(state, dt, NO_PAIR, i, k) > 0.0
+            moved |= push_out(state, dt, NO_PAIR, i, k) > 0.0
     return moved
 
 
@@ -180,19 +180,19 @@ def resolve_static_penetration(state, dt):
         for c in range(pairs.count):
             a, b = pairs.a[c], pairs.b[c]
             fixed, i = max(a, b), min(a, b)  # dynamic rows come first
-            if not (fixed >= first and i < state.dynamic and pairs.is_solid[c] and may_have_sunk(state, c, i)):
+            if not (fixed >= first and i < state.dynamic and pairs.is_solid[c] and may_penetrate(state, c, i)):
                 continue
             measure_turned(state, i)
-            far = keep_out(state, dt, c, a, b)
+            far = push_out(state, dt, c, a, b)
             moved |= far > 0.0
             if turn == ROUNDS - 1 and far > SAME_PLACE * smaller_extent(bodies, a, b):  # more than rounding
                 note_squeezed(state.solver, i)
         if not moved:
             break
     for i in range(state.first, state.dynamic if not state.pairs_filtered else 0):
-        if bodies.shape[i] >= 0 and is_moved_by_solver(state, i) and is_astray(state, i, dt):
+        if bodies.shape[i] >= 0 and is_moved_by_solver(state, i) and is_displaced(state, i, dt):
             measure_turned(state, i)
             for _ in range(ROUNDS):
-                if not keep_out_of_all(state, dt, i):
+                if not push_out_of_all(state, dt, i):
                     break
     return OK

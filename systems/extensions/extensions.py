@@ -22,7 +22,7 @@ from ..records import BODY_COLUMNS
 from ..scene import Scene
 from ..stage_list import MADE_AGAIN
 from .compiled import PRESENT, own_schema, visible_columns
-from .placement import OF_TABLE, check_stages, placed
+from .placement import OF_TABLE, check_plugin_stages, placed
 
 NEEDED = "stages of plugins"  # the condition of what all of them need
 
@@ -48,8 +48,8 @@ class Extensions:
         self.adopters: list[Callable[[Any], None]] = []  # whenever the table is brought up to date,
         self.finishers: list[Callable[[Any], None]] = []  # after it,
         self.waiting: list[Callable[[], bool]] = []  # and whether they have something to do
-        check_stages(registry.stages.values())
-        registry.check_stages = check_stages
+        check_plugin_stages(registry.stages.values())
+        registry.check_stages = check_plugin_stages
 
     def unsettled(self) -> bool:
         """Whether a plugin has something to do before or after this step."""

@@ -14,7 +14,7 @@ from ...framework.schedule.stages import Rows, Stage, asked
 from ..broad_phase.system import BroadPhase
 from ..integration.system import ON_WAY, Integration
 from ..narrow_phase.system import NarrowPhase
-from ..records import BODIES, COLLIDERS, QUARANTINE, SLEEP_COLUMNS, STATE, TABLE_COLUMNS, UNDO, UNDO_FORCE
+from ..records import BODIES, COLLIDERS, QUARANTINE, SLEEP_COLUMNS, STATE, TABLE_COLUMNS, UNDO_COLUMNS, UNDO_FORCE
 from ..stage_list import CONDITIONS, ON_DEMAND, STAGES, SYSTEM_OF_STAGE
 from .compiled import compiled_stage, own_columns, visible_columns
 
@@ -22,7 +22,8 @@ INTEGRATORS = {stage.name for stage in Integration.STAGES if stage.needed in ("s
 REPEATED = (BroadPhase.__name__, NarrowPhase.__name__)  # their stages may run several times in a step
 RECORDS = {name for name, field in STATE.fields.items() if isinstance(field, Schema)} - {"bodies", "colliders"}
 # What others rely on in ways that no stage of a plugin can keep to, or what no failed step would put back.
-FIXED = {"entity", "shape", "rank", "collider_slot", *SLEEP_COLUMNS, *QUARANTINE, *UNDO, *UNDO_FORCE, *COLLIDERS.fields}
+UNDONE = (*SLEEP_COLUMNS, *QUARANTINE, *UNDO_COLUMNS, *UNDO_FORCE)
+FIXED = {"entity", "shape", "rank", "collider_slot", *UNDONE, *COLLIDERS.fields}
 FIXED -= {"rest_steps"}  # of what is not at rest, whatever its velocity says
 OF_TABLE = {*TABLE_COLUMNS, "rotation"} - {"entity"}
 FIRST_AND_LAST = "the first place is before='check_columns', the last before='close_step'"
@@ -49,7 +50,7 @@ def made(stage: PluginStage, dimensions: int) -> Stage:
     )
 
 
-def check_stages(stages: Iterable[PluginStage]) -> None:
+def check_plugin_stages(stages: Iterable[PluginStage]) -> None:
     """PluginError for a stage that no step can have."""
     for stage in stages:
         fault = _fault_of_place(stage) or _fault_of_columns(stage)

@@ -69,7 +69,7 @@ class ForceAccumulation(StagedSystem):
         bodies, rows = self._state.bodies, slice(self._state.dynamic)
         torque = self._table.column("torque")[rows]
         turned = torque.any(axis=1) if torque.ndim > 1 else torque != 0.0
-        bodies.rest_force[rows][turned & (bodies.still[rows] > AWAKE)] = np.nan
+        bodies.rest_force[rows][turned & (bodies.sleep_state[rows] > AWAKE)] = np.nan
 
     def evaluate(self, time: float) -> None:
         """Sum all forces at the state in the columns; ``time`` in seconds."""

@@ -27,29 +27,29 @@ from ..linking.parts import FIRST_TOUCH, call_first_touch
 from ..narrow_phase.manifolds import is_at_manifold
 from ..narrow_phase.stages import rank_rows
 from ..shapes.dispatch import both_convex, evaluate, friction_of, has_corner_rule, is_corner_touch, restitution_of
-from ..shapes.poses import lead_on, motion_of, set_motion
+from ..shapes.poses import advance_pose, motion_of, set_motion
 from ..shapes.tolerances import is_turning, slop_of, smaller_extent, turning_travel
 from .heap import heap_push
 from .impulses import (
     CROSSING,
     HAND_OVER,
     IMPACT,
-    NONE,
+    NO_EVENT,
     STOPPED,
     count_capped,
     is_beyond_cap,
     is_deflected,
-    is_rattling,
+    is_trapped,
 )
-from .turning import respond
+from .turning import respond_at_arms
 
 QUICK = 1e-3  # of the step: inelastic impacts closer than this in time are treated as inelastic collapse
-GRAZES = 4  # impacts of two bodies in a step after which they sink in before the next one,
+REGRAZE_IMPACTS = 4  # impacts of two bodies in a step after which they sink in before the next one,
 SINKS, PLASTIC_SINKS = math.inf, 1.0  # by so many grazes, up to MOST_SUNK: elastic ones at 8, 16, ... impacts, others
 # at each
 MOST_PLASTIC = 1000  # impacts of a body in a step after which those beyond the cap are none any more
 
-NO_TOUCH, OVERLAPS_AT_END, SWEPT = range(3)
+NO_TOUCH, OVERLAPS_AT_END, FOUND_BY_SWEEP = range(3)
 
 
 @part
@@ -74,7 +74,7 @@ def leaves_touch_at(state, c, path, since, t):
 
 
 @part
-def sinks_before_touch(state, a, b, restitution):
+def regraze_depth(state, a, b, restitution):
     """By how many grazes two bodies that turn are deeper at their next touch; -inf: at any depth. After GRAZES
     impacts of both in a step it is one of those that follow each other at once: a corner that slides along a face parts
     slowly, and is turned back into it. Where they may sink in first elastic ones part faster, fly for
@@ -82,7 +82,7 @@ def sinks_before_touch(state, a, b, restitution):
     """
     count, inverse_mass = state.bodies.impact_count, state.bodies.inverse_mass
     fewest = min(count[a] if inverse_mass[a] > 0.0 else STOPPED, count[b] if inverse_mass[b] > 0.0 else STOPPED)
-    if fewest < GRAZES:
+    if fewest < REGRAZE_IMPACTS:
         return -math.inf
     if restitution < 1.0:
         return PLASTIC_SINKS
@@ -106,7 +106,7 @@ def find_touch(state, c, a, b, path, since, restitution, dt):
         if swept:
             limits = limits_of_sweep(state, a, b, travel, bounce_threshold(state, a, b), dt)
     if turning:
-        limits = limits[0], limits[1], limits[2], sinks_before_touch(state, a, b, restitution)
+        limits = limits[0], limits[1], limits[2], regraze_depth(state, a, b, restitution)
     if not swept:
         if state.spinning and turns_far(state, a, b):  # contacts at rest know what a mill meets on its way
             return NO_TOUCH, nothing
@@ -127,7 +127,7 @@ def find_touch(state, c, a, b, path, since, restitution, dt):
     if found == APART:
         return NO_TOUCH, nothing
     if found != AT_CORNER:
-        return SWEPT if swept else OVERLAPS_AT_END, (t, normal, point, apart)
+        return FOUND_BY_SWEEP if swept else OVERLAPS_AT_END, (t, normal, point, apart)
     if swept:
         overlaps, end_normal = overlap_at_end(state, a, b, path, dt)
         if not overlaps:
@@ -156,7 +156,7 @@ def is_held_by_edge(state, a, b, path, touch, speed, dt):
 
 
 @part
-def passes_unseen(state, a, b, path, touch, dt):
+def is_missed_by_discrete(state, a, b, path, touch, dt):
     """Whether so slow an approach leads far in before or after an impact, or while the two turn: contacts at rest know
     only the way after the last one, with shapes that stay as they are."""
     bodies, touchdown_time = state.bodies, state.impacts.touchdown_time
@@ -186,7 +186,7 @@ def is_held(state, a, b):
 
 
 @part
-def closing_speed(state, c, path, touch, kind, dt):
+def approach_speed(state, c, path, touch, kind, dt):
     """Of a solid pair: (NONE, HAND_OVER if it lands, too slow to bounce, or IMPACT; speed along the normal)."""
     bodies, impacts, (t, normal, point, apart) = state.bodies, state.impacts, touch
     a, b = state.pairs.a[c], state.pairs.b[c]
@@ -198,10 +198,10 @@ def closing_speed(state, c, path, touch, kind, dt):
         rounding = ROUNDING * (length(bodies.path_velocity[a]) + length(bodies.path_velocity[b]))
     if is_held(state, a, b) or not speed < -(threshold + rounding):  # a contact at rest
         if state.spinning and not speed < -ROUNDING * turning_travel(state, 1.0, a, b):  # it has landed
-            return NONE, speed
-        return HAND_OVER if passes_unseen(state, a, b, path, touch, dt) else NONE, speed
+            return NO_EVENT, speed
+        return HAND_OVER if is_missed_by_discrete(state, a, b, path, touch, dt) else NO_EVENT, speed
     turns = turning_travel(state, dt, a, b) > slop_of(state, a, b)
-    slides = kind == SWEPT and (bodies.warm_started[a] or bodies.warm_started[b])
+    slides = kind == FOUND_BY_SWEEP and (bodies.warm_started[a] or bodies.warm_started[b])
     if has_corner_rule(state, bodies.shape[a], bodies.shape[b]):  # what turns reaches the edge by that as well
         slides &= not turns
     if slides and turns:  # what tips over on another body lands on its next corner while the one before holds it
@@ -210,7 +210,7 @@ def closing_speed(state, c, path, touch, kind, dt):
     elif slides:
         slides = is_held_by_edge(state, a, b, path, touch, speed, dt)
     if slides:
-        return NONE, speed
+        return NO_EVENT, speed
     return IMPACT, speed
 
 
@@ -237,11 +237,11 @@ def kind_beyond_cap(state, a, b, path, t, speed, restitution, dt):
     still = (count[a] >= STOPPED or inverse_mass[a] == 0.0) and (count[b] >= STOPPED or inverse_mass[b] == 0.0)
     sinks = -speed * (dt - t) > slop_of(state, a, b)
     if still or not sinks:
-        return NONE
+        return NO_EVENT
     far = travel_of(path, dt - t) > FAST * smaller_extent(bodies, a, b)
     if not (far or is_deflected(state, a) or is_deflected(state, b)):
-        return NONE
-    if restitution == 1.0 and is_rattling(state, a, b):
+        return NO_EVENT
+    if restitution == 1.0 and is_trapped(state, a, b):
         return HAND_OVER
     since_last = t - max(bodies.last_impact[a], bodies.last_impact[b])
     collapse = restitution <= 0.0 or (restitution < 1.0 and since_last <= QUICK * dt)
@@ -256,7 +256,7 @@ def queue_event(state, c, kind, path, touch, speed, restitution):
     a, b = pairs.a[c], pairs.b[c]
     change, pull, mu = -(1.0 + restitution) * speed, zero_of(state), friction_of(state, a, b)
     if state.spinning and kind != CROSSING:
-        change, pull = respond(state, (a, b), touch, (rate_along(path, t), speed), restitution, mu)
+        change, pull = respond_at_arms(state, (a, b), touch, (rate_along(path, t), speed), restitution, mu)
     elif mu > 0.0:  # Coulomb: stops what slides, with at most mu times the normal impulse
         w = rate_along(path, t)
         sliding = add_scaled(w, normal, -dot(w, normal))
@@ -298,8 +298,8 @@ def queue_next_impact(state, c, since, dt):
         queue_touch(state, c, path, found, touch, e, dt)
         return
     motions = motion_of(state, a), motion_of(state, b)  # of the end of the step
-    lead_on(state, a, bodies.spin[a], touch[0] - dt)
-    lead_on(state, b, bodies.spin[b], touch[0] - dt)
+    advance_pose(state, a, bodies.spin[a], touch[0] - dt)
+    advance_pose(state, b, bodies.spin[b], touch[0] - dt)
     queue_touch(state, c, path, found, touch, e, dt)
     set_motion(state, a, motions[0])
     set_motion(state, b, motions[1])
@@ -319,7 +319,7 @@ def queue_touch(state, c, path, found, touch, e, dt):
     touch = (t, normal, point, apart)
     speed, kind = dot(w, normal), CROSSING
     if not passive:
-        kind, speed = closing_speed(state, c, path, touch, found, dt)
+        kind, speed = approach_speed(state, c, path, touch, found, dt)
         e = 0.0 if kind == HAND_OVER else e
     if state.path_degree == 1 and e != 1.0 and kind == IMPACT:
         speed = correct_speed(state, a, b, touch, speed, dt)
@@ -327,10 +327,10 @@ def queue_touch(state, c, path, found, touch, e, dt):
             rounding = ROUNDING * (length(bodies.path_velocity[a]) + length(bodies.path_velocity[b]))
             if not speed < -rounding:  # not in the flight
                 return
-    if kind not in (CROSSING, NONE) and is_beyond_cap(state, a, b):
-        kind = kind_beyond_cap(state, a, b, path, t, speed, e, dt) if impacts.sweeps else NONE
+    if kind not in (CROSSING, NO_EVENT) and is_beyond_cap(state, a, b):
+        kind = kind_beyond_cap(state, a, b, path, t, speed, e, dt) if impacts.sweeps else NO_EVENT
         if kind != HAND_OVER and e > 0.0:  # else it is what it would have been
             count_capped(state, a, b)
         e = 0.0 if kind == IMPACT else e
-    if kind != NONE:
+    if kind != NO_EVENT:
         queue_event(state, c, kind, path, touch, speed, e)

@@ -21,13 +21,13 @@ from ..integration.trajectory import rate_along, relative_path
 from ..integration.turning import compliance, is_turned, velocity_by_spin
 from ..shapes.dispatch import friction_of
 from .exact_sum import exact_sum
-from .impulses import count_impact, deflect, is_counted, log_impact, note_caught, stands_still
+from .impulses import count_impact, deflect, is_counted, is_immovable, log_impact, note_trapped
 from .turning import arms_of, turn_by_impact
 
 PASSES, LEAST_PASSES = 1000, 8  # over the impacts of a group
 WORK = 1 << 16  # impacts in all passes of a step: a heap of bodies that overlap is not worth more
-AGREED = 8e-16  # of the largest speed
-SAME = 2e-15  # of a sum of energies
+GROUP_CONVERGED = 8e-16  # of the largest speed
+SAME_ENERGY = 2e-15  # of a sum of energies
 CANCELLED = 1e-6  # of what impulses would do if none worked against another: less is none
 ORTHOGONAL = 1e-12  # cosine of the angle between normals that have nothing to do with each other
 SHOT = 2.0  # times the fastest change of speed that its impacts ask for: a body that gains more is shot out
@@ -108,8 +108,8 @@ def solve_group(state, count):
     for _ in range(min(PASSES, (WORK - impacts.group_visits) // count)):
         impacts.group_visits += count
         push_bodies(state, count, False)
-        worst, largest, back = improve(state, count)
-        if worst <= AGREED * largest:
+        worst, largest, back = improve_impulses(state, count)
+        if worst <= GROUP_CONVERGED * largest:
             break
         inertia = 1.0 if back else inertia
         following = 0.5 * (1.0 + math.sqrt(1.0 + 4.0 * inertia * inertia))
@@ -124,7 +124,7 @@ def solve_group(state, count):
 
 
 @part
-def improve(state, count):
+def improve_impulses(state, count):
     """A pass over all impacts of a group: (largest change, largest speed in it, whether the momentum leads back)."""
     impacts, terms = state.impacts, state.impacts.terms
     worst, largest = 0.0, 0.0
@@ -157,7 +157,7 @@ def keep_energy(state, count):
     given = exact_sum(terms, count)
     if not given > CANCELLED * size and size > 0.0:
         return False
-    if abs(wanted - given) > SAME * wanted:
+    if abs(wanted - given) > SAME_ENERGY * wanted:
         for g in range(count):
             impacts.ahead[impacts.group[g]] *= wanted / given
         push_bodies(state, count, False)
@@ -176,7 +176,7 @@ def is_ejected(state, i):
 
 
 @part
-def shoots(state, count):
+def is_shooting(state, count):
     """Whether a body of the group that has been solved is shot out."""
     impacts, pairs, inverse_mass, any_shot = state.impacts, state.pairs, state.bodies.inverse_mass, False
     for g in range(count):
@@ -188,7 +188,7 @@ def shoots(state, count):
 
 
 @part
-def turns(state, count):
+def is_turning_group(state, count):
     """Whether impulses along their normals turn a body of the group."""
     impacts, pairs, bodies, any_turned = state.impacts, state.pairs, state.bodies, False
     for g in range(count if state.spinning else 0):
@@ -198,7 +198,7 @@ def turns(state, count):
 
 
 @part
-def solve_friction(state, count):
+def solve_group_friction(state, count):
     """Find the impulses of friction, into ``friction_impulse``; returns whether there are any.
 
     Bodies are taken to be split among their impacts, so that these together never do more than stop what slides.
@@ -220,12 +220,12 @@ def solve_friction(state, count):
             sliding = add_scaled(w, normal, -dot(w, normal))
             fast, light = length(sliding), 0.0
             for side in range(2 if fast > 0.0 else 0):
-                i, arm, turns = (a, arms[0], 0.0) if side == 0 else (b, arms[1], 0.0)
+                i, arm, turning = (a, arms[0], 0.0) if side == 0 else (b, arms[1], 0.0)
                 entry = impacts.first_member[owner_of(state, i)] if inverse_mass[i] > 0.0 else -1
                 if state.spinning:
-                    turns = compliance(state.bodies, i, arm, divided(sliding, fast))
+                    turning = compliance(state.bodies, i, arm, divided(sliding, fast))
                 while entry >= 0:
-                    light, entry = light + inverse_mass[i] + turns, impacts.next_member[entry]
+                    light, entry = light + inverse_mass[i] + turning, impacts.next_member[entry]
             if fast > 0.0:
                 impacts.friction_impulse[m] = scale(sliding, -min(1.0 / light, mu * impacts.ahead[m] / fast))
                 rubs = True
@@ -237,7 +237,7 @@ def push_group(state, count, dt):
     """Give the bodies of a group their impulses, all at once, and note these."""
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
     inverse_mass = bodies.inverse_mass
-    rubs = solve_friction(state, count)
+    rubs = solve_group_friction(state, count)
     if rubs:
         push_bodies(state, count, True)
     for g in range(count if rubs and state.spinning else 0):
@@ -263,6 +263,6 @@ def push_group(state, count, dt):
             a, b = pairs.a[c], pairs.b[c]
             for side in range(2):
                 i = a if side == 0 else b
-                still = stands_still(bodies, a + b - i)
+                still = is_immovable(bodies, a + b - i)
                 if inverse_mass[i] > 0.0 and still == (strikes_mover == 0):
-                    note_caught(state, i, still)
+                    note_trapped(state, i, still)

@@ -16,7 +16,7 @@ def earlier(impacts, i, j):
 
 
 @part
-def holds(state, event):
+def is_current(state, event):
     """Whether neither body has had an impact since the event was made."""
     impacts, pairs, count = state.impacts, state.pairs, state.bodies.impact_count
     c = impacts.event_pair[event]

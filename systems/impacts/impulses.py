@@ -17,14 +17,14 @@ from ..compounds.rows import next_row, owner_of
 from ..integration.trajectory import along, path_of, rate_along
 from ..narrow_phase.manifolds import forget_manifold
 from ..shapes.dispatch import restitution_of
-from .turning import arms_of, mill_speed, turn_by_impact
+from .turning import arms_of, kinematic_normal_speed, turn_by_impact
 
 STOPPED = 1 << 30  # added to a body's impacts: it moves no more in this step, and the solver leaves it alone
 
 # Events: an impact; a crossing of what does not push; a touch from which on the solver has the two. Else: none.
-IMPACT, CROSSING, HAND_OVER, NONE = range(4)
+IMPACT, CROSSING, HAND_OVER, NO_EVENT = range(4)
 MOST_LOOKS = 16_000_000  # at pairs in a step, of elastic impacts too: some seconds, then what meets is stopped
-FEW, CAUGHT = 16, 1000  # impacts of a body in a step, one after the other with what stands still
+FEW_IMPACTS, TRAPPED_IMPACTS = 16, 1000  # impacts of a body in a step, one after the other with what stands still
 
 
 @part
@@ -63,9 +63,9 @@ def count_impact(state, i, counted):
 
 
 @part
-def note_caught(state, i, still):
+def note_trapped(state, i, still):
     """One more impact of body i in a row with what stands still, or the end of these."""
-    caught, i = state.bodies.caught, owner_of(state, i)
+    caught, i = state.bodies.trapped_impacts, owner_of(state, i)
     while i >= 0:
         caught[i] = caught[i] + 1 if still else 0
         i = next_row(state, i)
@@ -87,7 +87,7 @@ def log_impact(state, event, impulse):
 
 
 @inlined
-def stands_still(bodies, i):
+def is_immovable(bodies, i):
     """Whether body i neither can be moved nor moves by itself."""
     return bodies.inverse_mass[i] == 0.0 and length(bodies.path_velocity[i]) == 0.0
 
@@ -104,11 +104,11 @@ def is_counted(state, event):
     if restitution_of(state, a, b) != 1.0 or t <= last[a] or t <= last[b]:
         return True
     one = a if inverse_mass[a] == 0.0 else b
-    return inverse_mass[one] == 0.0 and not stands_still(state.bodies, one)
+    return inverse_mass[one] == 0.0 and not is_immovable(state.bodies, one)
 
 
 @part
-def bounce(state, event, dt):
+def bounce_pair(state, event, dt):
     """One impact: both bodies get their impulse now, and the rest of the step with the new velocities."""
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
     c = impacts.event_pair[event]
@@ -125,7 +125,7 @@ def bounce(state, event, dt):
         if inverse_mass[i] > 0.0:  # what cannot be moved is as it was: its other impacts stand, and no cap is on it
             count_impact(state, i, counted)
             if impacts.sweeps:
-                note_caught(state, i, stands_still(bodies, a + b - i))
+                note_trapped(state, i, is_immovable(bodies, a + b - i))
             deflect(state, i, scale(change, (-mass if side == 0 else mass) * inverse_mass[i]), now, dt)
     log_impact(state, event, impacts.event_change[event] * mass)
 
@@ -141,29 +141,29 @@ def is_deflected(state, i):
 
 
 @inlined
-def most_caught(state):
+def trapped_limit(state):
     """The impacts of a body in a row with what stands still after which it is caught."""
-    return CAUGHT if state.mode == EVENT_DRIVEN else max(FEW, min(CAUGHT, state.max_impacts))
+    return TRAPPED_IMPACTS if state.mode == EVENT_DRIVEN else max(FEW_IMPACTS, min(TRAPPED_IMPACTS, state.max_impacts))
 
 
 @part
-def is_rattling(state, a, b):
+def is_trapped(state, a, b):
     """Whether one of the two bounces for ever between things that stand still, of which the other is one."""
-    bodies, caught, most = state.bodies, state.bodies.caught, most_caught(state)
-    return (caught[a] >= most and stands_still(bodies, b)) or (caught[b] >= most and stands_still(bodies, a))
+    bodies, caught, most = state.bodies, state.bodies.trapped_impacts, trapped_limit(state)
+    return (caught[a] >= most and is_immovable(bodies, b)) or (caught[b] >= most and is_immovable(bodies, a))
 
 
 @part
 def is_beyond_cap(state, a, b):
     """Whether one of the two has had all the impacts it may have in a step."""
     counted, cap = state.bodies.counted_impacts, state.max_impacts
-    if state.impacts.sweeps and is_rattling(state, a, b):
+    if state.impacts.sweeps and is_trapped(state, a, b):
         return True
     return counted[a] >= cap or counted[b] >= cap or state.impacts.looked >= MOST_LOOKS
 
 
 @part
-def stop(state, i, now):
+def stop_body(state, i, now):
     """Beyond the cap a fast body stays where it is until the step ends, and keeps its velocity."""
     bodies, path, zero = state.bodies, path_of(state, i), zero_of(state)
     at, velocity, i = along(path, now), rate_along(path, now), owner_of(state, i)
@@ -178,7 +178,7 @@ def stop(state, i, now):
 
 
 @part
-def slide(state, i, normal, rate, dt):
+def slide_body(state, i, normal, rate, dt):
     """A body that is caught in a slot little wider than itself keeps its velocity, but moves only along the slot until
     the step ends, or as what turns there carries it: its impacts in between would be too many to count, and end where
     they began. rate: m/s, of that along the normal."""
@@ -198,7 +198,7 @@ def slide(state, i, normal, rate, dt):
 
 
 @part
-def lands(state, event):
+def is_landing(state, event):
     """Whether an event is a landing: too slow to bounce, where impacts are left."""
     impacts, pairs = state.impacts, state.pairs
     c = impacts.event_pair[event]
@@ -221,23 +221,23 @@ def hand_over(state, event, dt):
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
     c = impacts.event_pair[event]
     a, b = pairs.a[c], pairs.b[c]
-    landing = lands(state, event)
+    landing = is_landing(state, event)
     if landing:
-        bounce(state, event, dt)
+        bounce_pair(state, event, dt)
     else:
         count_capped(state, a, b)
-    caught = restitution_of(state, a, b) == 1.0 and is_rattling(state, a, b)
-    if landing or (caught and max(bodies.caught[a], bodies.caught[b]) < 2 * most_caught(state)):
+    caught = restitution_of(state, a, b) == 1.0 and is_trapped(state, a, b)
+    if landing or (caught and max(bodies.trapped_impacts[a], bodies.trapped_impacts[b]) < 2 * trapped_limit(state)):
         if bodies.inverse_mass[a] * bodies.inverse_mass[b] == 0.0:
             i = a if bodies.inverse_mass[a] > 0.0 else b
-            rate = mill_speed(state, event) if state.spinning else 0.0
-            slide(state, i, impacts.event_normal[event], rate, dt)
+            rate = kinematic_normal_speed(state, event) if state.spinning else 0.0
+            slide_body(state, i, impacts.event_normal[event], rate, dt)
             if not landing:  # what turns may touch again at once, whatever it slides along
-                note_caught(state, i, True)
+                note_trapped(state, i, True)
         return
     pairs.crossed[c] = True
     forget_manifold(pairs, c)
     for side in range(2):
         i = a if side == 0 else b
         if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] < STOPPED:
-            stop(state, i, impacts.now)
+            stop_body(state, i, impacts.now)

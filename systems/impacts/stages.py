@@ -10,15 +10,15 @@ from ...framework.schedule.stages import Rows
 from ..ccd.search_bounds import FAST
 from ..codes import NEED_IMPACTS, NEED_ROOM, OK, REFRESH_PAIRS
 from ..linking.parts import FIRST_TOUCH, TAKE_TOGETHER, call_take_together
-from ..narrow_phase.stages import find_hasty
+from ..narrow_phase.stages import flag_fast_bodies
 from .find import queue_next_impact
-from .heap import heap_pop, holds
-from .impulses import CROSSING, IMPACT, STOPPED, bounce, hand_over, stop
+from .heap import heap_pop, is_current
+from .impulses import CROSSING, IMPACT, STOPPED, bounce_pair, hand_over, stop_body
 from .records import BODIES_OF_MEMBERS, EVENTS, HEADS, LOG, MEMBERS
-from .together import EQUAL, put_back
+from .together import EQUAL, requeue
 from .worklist import list_contacts, list_landings, list_neighbours, list_pairs_of, most_listed
 
-BLOCK = 256  # bodies that are looked at before one that bounces is enough
+EVENT_BLOCK = 256  # bodies that are looked at before one that bounces is enough
 FAR = 1 << 15  # bodies from which their columns do not fit into the second-level cache
 AHEAD = 4  # looks between the request of a body's rows and their use
 
@@ -31,9 +31,9 @@ UNLISTED = -1  # in place of a number of pairs: those of the contacts are still 
 def any_restitution(state):
     """Whether a collider of the scene bounces."""
     restitution, bounces = state.colliders.restitution, False
-    for start in range(0, state.count if len(restitution) > 0 else 0, BLOCK):
+    for start in range(0, state.count if len(restitution) > 0 else 0, EVENT_BLOCK):
         for slot in range(state.slot_count if not bounces else 0):
-            for i in range(start, min(start + BLOCK, state.count)):
+            for i in range(start, min(start + EVENT_BLOCK, state.count)):
                 bounces |= restitution[slot, i] != 0.0
     return bounces
 
@@ -79,7 +79,7 @@ def begin_sweeps(state):
     impacts, bodies = state.impacts, state.bodies
     known = impacts.swept_version == state.version
     for i in range(state.first if known else 0, state.moving if known else state.count):
-        bodies.caught[i], bodies.last_impact[i] = 0, -1.0
+        bodies.trapped_impacts[i], bodies.last_impact[i] = 0, -1.0
     impacts.swept_version = state.version
 
 
@@ -95,13 +95,13 @@ def next_event(state):
         if impacts.sweeps and impacts.event_time[event] > impacts.until:
             return -1
         heap_pop(impacts)
-        if holds(state, event):
+        if is_current(state, event):
             return event
     return -1
 
 
 @part
-def touches_down_first(state, event):
+def lands_before(state, event):
     """Whether a body of this event may have to land on something thin before: then that is searched, and the event
     waits once more."""
     impacts = state.impacts
@@ -112,7 +112,7 @@ def touches_down_first(state, event):
     list_landings(state, c, now)
     if impacts.listed == 0:
         return False
-    put_back(impacts, event)
+    requeue(impacts, event)
     impacts.touchdown_pair, impacts.touchdown_time = c, now
     return True
 
@@ -121,7 +121,7 @@ def touches_down_first(state, event):
 def take_event(state, event, dt):
     """Carry an event out, with all impacts at the same time; a code if these need something first."""
     impacts = state.impacts
-    if touches_down_first(state, event):
+    if lands_before(state, event):
         return OK
     c, kind = impacts.event_pair[event], impacts.event_kind[event]
     impacts.now = impacts.event_time[event]
@@ -135,7 +135,7 @@ def take_event(state, event, dt):
         if taken >= 0:
             return taken
     if kind == IMPACT:
-        bounce(state, event, dt)
+        bounce_pair(state, event, dt)
     else:
         hand_over(state, event, dt)
     list_neighbours(state, c, dt)
@@ -163,7 +163,7 @@ def request_bodies(state, c):
 
 
 @part
-def halt(state, dt):
+def end_worklist(state, dt):
     """Too many rounds: what impacts have sent elsewhere stays where it is until the step ends; others may meet it."""
     impacts, bodies = state.impacts, state.bodies
     impacts.now = impacts.until
@@ -172,7 +172,7 @@ def halt(state, dt):
             if impacts.halted == 0:
                 impacts.halted_row = i
             impacts.halted += 1
-            stop(state, i, impacts.now)
+            stop_body(state, i, impacts.now)
             list_pairs_of(state, i, -1, dt)
     impacts.until = math.inf
 
@@ -232,11 +232,11 @@ def resolve_impacts(state, dt):
             impacts.rounds += 1
             if impacts.rounds <= MOST_ROUNDS:
                 return REFRESH_PAIRS
-            halt(state, dt)
+            end_worklist(state, dt)
         else:
             break
     if impacts.logged > 0:
-        find_hasty(state, dt, True)
+        flag_fast_bodies(state, dt, True)
     state.impacts_counted += impacts.logged
     state.looks_counted += impacts.looked
     state.capped_counted += impacts.capped

@@ -15,9 +15,9 @@ from ..ccd.time_of_impact import clear_of_rounding
 from ..codes import NEED_ROOM, OK
 from ..compounds.rows import owner_of
 from ..integration.trajectory import rate_along, relative_path
-from .group import WORK, is_affordable, push_group, shoots, solve_group, turns
-from .heap import heap_pop, heap_push, holds
-from .impulses import HAND_OVER, IMPACT, bounce
+from .group import WORK, is_affordable, is_shooting, is_turning_group, push_group, solve_group
+from .heap import heap_pop, heap_push, is_current
+from .impulses import HAND_OVER, IMPACT, bounce_pair
 from .worklist import list_landings, list_pairs_of
 
 EQUAL = 1e-6  # of the step: times that differ by more are never the same, however slow the approach
@@ -47,7 +47,7 @@ def next_at(state, now, dt):
         c, kind, time = impacts.event_pair[event], impacts.event_kind[event], impacts.event_time[event]
         if time - now > EQUAL * dt or (impacts.sweeps and time > impacts.until):
             return -1
-        if holds(state, event):
+        if is_current(state, event):
             if kind == HAND_OVER or not is_at(state, event, now, dt):
                 return -1
             if kind == IMPACT:
@@ -62,7 +62,7 @@ def next_at(state, now, dt):
 
 
 @part
-def put_back(impacts, event):
+def requeue(impacts, event):
     """Add an event to the queue again that has been taken off it."""
     place = impacts.waiting
     while impacts.heap[place] != event:
@@ -173,19 +173,19 @@ def take_group(state, m, dt):
     first = impacts.member[m]
     impacts.now = impacts.event_time[first]
     count = find_group(state, m)
-    single = count == 1 or turns(state, count)
+    single = count == 1 or is_turning_group(state, count)
     solves = not single and is_affordable(impacts, count)
     if solves:
         solves = solve_group(state, count)
     elif not single:
         impacts.group_visits = WORK
-    if solves and not (shoots(state, count) and not impacts.sweeps):
+    if solves and not (is_shooting(state, count) and not impacts.sweeps):
         push_group(state, count, dt)
     else:
         for g in range(count - 1, -1, -1):  # the last one off the queue is found first
             if impacts.group[g] != m:
-                put_back(impacts, impacts.member[impacts.group[g]])
-        bounce(state, first, dt)
+                requeue(impacts, impacts.member[impacts.group[g]])
+        bounce_pair(state, first, dt)
     for k in range(logged, impacts.logged):
         c, listed = impacts.log_pair[k], -1
         for side in range(2):

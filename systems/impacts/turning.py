@@ -17,7 +17,7 @@ from ...framework.vectors import add, add_scaled, divided, dot, item, length, re
 from ..compounds.rows import next_row, owner_of
 from ..integration.trajectory import along, path_of
 from ..integration.turning import arms_to, change_of_spin, compliance, cross_spin, lever, twist, velocity_by_spin
-from ..shapes.poses import lead_on, motion_of, set_motion, tumbles, turn_on, turn_shape
+from ..shapes.poses import advance_pose, has_unequal_moments, motion_of, rotate_pose, set_motion, turn_shape
 
 PIECES = 6  # slides, sticks or turns round, and each once more for the restitution
 STUCK = 1e-14  # of the speeds: a slower slip is none
@@ -69,7 +69,7 @@ def impulses_of(masses, speeds, e, mu):
 
 
 @part
-def respond(state, sides, touch, motion, e, mu):
+def respond_at_arms(state, sides, touch, motion, e, mu):
     """(change of the speed of b as a sees it, along the normal; change of its velocity along the surface) by an impact.
 
     motion: (velocity of b's body as that of a sees it, speed of the point along the normal).
@@ -111,7 +111,7 @@ def arms_of(state, event):
 
 
 @part
-def mill_speed(state, event):
+def kinematic_normal_speed(state, event):
     """The speed along the normal at which what cannot be moved, of the two of an impact, turns at its point."""
     impacts, bodies, arms = state.impacts, state.bodies, arms_of(state, event)
     c = impacts.event_pair[event]
@@ -130,15 +130,15 @@ def turn_by_impact(state, event, arms, impulse, friction, dt):
         i, arm, sign = (state.pairs.a[c], arms[0], -1.0) if side == 0 else (state.pairs.b[c], arms[1], 1.0)
         twisted = add(scale(lever(bodies, i, arm, normal), impulse), twist(arm, friction))
         motion = motion_of(state, i)
-        lead_on(state, i, bodies.spin[i], -left)
+        advance_pose(state, i, bodies.spin[i], -left)
         change = scale(change_of_spin(bodies, i, twisted), sign)
         set_motion(state, i, motion)
         i = owner_of(state, i) if length(change) > 0.0 else -1
         while i >= 0:
-            if tumbles(state, i):
-                turn_on(state, i, bodies.spin[i], -left)
+            if has_unequal_moments(state, i):
+                rotate_pose(state, i, bodies.spin[i], -left)
                 bodies.spin[i] = add(bodies.spin[i], change)
-                turn_on(state, i, bodies.spin[i], left)
+                rotate_pose(state, i, bodies.spin[i], left)
             else:
                 bodies.spin[i] = add(bodies.spin[i], change)
                 bodies.turn[i] = add_scaled(bodies.turn[i], change, left)

@@ -20,7 +20,7 @@ OBJECTS = "whose entities have Python objects"
 MASKS = "which components it has"
 ROTATED = "some body is rotated: shapes as they are in the world"
 NOT_ENCLOSING = "some body has several colliders: whether the cheaper one still encloses the other"
-UNDO = "copies for going back to the start of a step that fails"
+UNDO_NOTE = "copies for going back to the start of a step that fails"
 
 
 def planned_columns(
@@ -40,7 +40,7 @@ def planned_columns(
     for key, array in sorted(scene.rotated_columns.items()):
         yield from _column(f"{key}, rotated", "body", "rotation", array, capacity, ROTATED)
     for key, copy in copies.items():
-        yield from _column(f"copy of {key}", "body", "going back", copy, len(copy), UNDO)
+        yield from _column(f"copy of {key}", "body", "going back", copy, len(copy), UNDO_NOTE)
     for name, schema in state.schema.fields.items():
         if isinstance(schema, Schema) and schema is not BODIES:
             yield from _sections(getattr(state, name), schema.sections, least=3)  # fewer: numbers of the whole record

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...framework.jit.records.record import Record
 from ...framework.schedule.stages import Program
-from .turns import BESIDE
+from .turns import ROTATION_STAGES
 
 
 @dataclass
@@ -53,6 +53,6 @@ class Motion:
     def run(self, stage: str, h: float) -> None:
         """Run a stage of a built-in integrator over ``h`` seconds, and turn bodies beside it."""
         assert self.program is not None
-        if self.turn is not None and stage in BESIDE:
-            self.turn(BESIDE[stage], h)
+        if self.turn is not None and stage in ROTATION_STAGES:
+            self.turn(ROTATION_STAGES[stage], h)
         self.program.run_one(stage, h)

@@ -16,14 +16,14 @@ from ...framework.schedule.stages import Rows
 from ...framework.vectors import add, add_scaled, divided, dot, item, scale, sub
 from ..codes import CHECK_FLIGHT, OK
 from ..forces.stages import within
-from ..opening import KEEPS_FORCE, KEEPS_START, LARGEST
+from ..opening import KEEPS_FORCE, KEEPS_START, LARGEST_FLOAT
 from ..quarantine.columns import are_columns_sound
 from ..records import CURVES, UNDO_FORCE
 
 LINE, PARABOLA, CUBIC = 1, 2, 3  # degree of the path within the step
 
 UNMOVED = 1e-6  # of its extent, at least of a metre: a body that should move by more, and does not, is too far out
-NEAR = 2.0**33  # m: up to here numbers are less than 2 UNMOVED apart
+NEAR_ORIGIN = 2.0**33  # m: up to here numbers are less than 2 UNMOVED apart
 
 
 @inlined
@@ -90,11 +90,11 @@ def keep_start(state, dt):
 
 
 @inlined
-def is_near(x, v):
+def is_near_origin(x, v):
     """Whether a body is neither far out nor fast, for every axis: one comparison, which is false if either is nan."""
     near = True
     for k in range(len(x)):
-        near &= abs(item(x, k)) + abs(item(v, k)) <= NEAR
+        near &= abs(item(x, k)) + abs(item(v, k)) <= NEAR_ORIGIN
     return near
 
 
@@ -122,7 +122,7 @@ def drift(state, h):
         for i in range(state.first, dynamic):
             x = add_scaled(position[i], velocity[i], h)
             position[i] = x
-            usual &= is_near(x, velocity[i])
+            usual &= is_near_origin(x, velocity[i])
         state.flight_usual, state.flight_seen = usual, dynamic
     return 0
 
@@ -141,7 +141,7 @@ def euler(state, h, with_new_velocity):
         new = add(old, scale(scale(force[i], inverse_mass[i]), h))
         x = add_scaled(position[i], new if with_new_velocity else old, h)
         velocity[i], position[i] = new, x
-        usual &= is_near(x, new)
+        usual &= is_near_origin(x, new)
     state.flight_usual, state.flight_seen = usual, 0 if damped else dynamic
     for i in range(state.first, dynamic if damped else 0):
         c, decay, gain = damping[i], 1.0, h
@@ -324,13 +324,13 @@ def end_flight(state, dt):
 
 
 @part
-def is_astray(state, i, dt):
+def is_out_of_range(state, i, dt):
     """Whether a body is nowhere, too fast, or where numbers are so far apart that its motion along an axis is lost."""
     bodies, astray = state.bodies, False
     x, before, v = bodies.position[i], bodies.previous_position[i], bodies.linear_velocity[i]
     extent = max(1.0, bodies.min_extent[i] if len(bodies.min_extent) > 0 else 0.0)
     for k in range(len(x)):
-        astray |= not (abs(item(x, k)) <= LARGEST and abs(item(v, k)) <= FASTEST)
+        astray |= not (abs(item(x, k)) <= LARGEST_FLOAT and abs(item(v, k)) <= FASTEST)
         astray |= item(x, k) == item(before, k) and abs(item(v, k)) * dt > UNMOVED * extent
     return astray
 
@@ -344,12 +344,12 @@ def check_flight(state, dt):
     bodies, usual = state.bodies, state.flight_usual
     position, velocity = bodies.position, bodies.linear_velocity
     for i in range(max(state.flight_seen, state.first), state.moving):
-        usual &= is_near(position[i], velocity[i])
+        usual &= is_near_origin(position[i], velocity[i])
     state.flight_usual = usual
     if state.quarantining or (state.others_write and not are_columns_sound(state)):
         return CHECK_FLIGHT
     for i in range(state.moving if usual else state.first, state.moving):
-        if is_astray(state, i, dt):
+        if is_out_of_range(state, i, dt):
             return CHECK_FLIGHT
     return OK
 

@@ -41,7 +41,7 @@ from .stages import (
     verlet_drift,
     verlet_kick,
 )
-from .turns import COLUMNS
+from .turns import ROTATION_COLUMNS
 
 STANDARD = frozenset((*STANDARD_INTEGRATORS.values(), Flight))
 ON_WAY = "runge_kutta_stage"  # stages of plugins next to it turn bodies beside all that an integrator calls
@@ -64,7 +64,7 @@ class Integration(StagedSystem):
         Stage(carry_forces, "forces on parts act on their bodies", ("force",), ("force",), "parts"),
         Stage(
             look_at_sleepers, "what code of the game has done to sleepers in this step", ("force", "rest_force"),
-            ("still",), "sleeping", "bodies sleep",
+            ("sleep_state",), "sleeping", "bodies sleep",
         ),
         Stage(
             keep_start, "keeps where the step starts, and the step before", (*MOTION, "previous_position", "rotation"),
@@ -89,7 +89,7 @@ class Integration(StagedSystem):
         ),
         Stage(
             begin_joints, "which joints hold a body that may move; how far motors may turn these",
-            ("inverse_mass", "still", "spin"), ("solver", "driven", "driven_turn"), "joints",
+            ("inverse_mass", "sleep_state", "spin"), ("solver", "driven", "driven_turn"), "joints",
             room=(Rows("bodies", SPINS, all_rows), Rows("bodies", COLLISIONS, all_rows)),
         ),
         Stage(
@@ -103,7 +103,7 @@ class Integration(StagedSystem):
         ),
         Stage(
             rest_sleepers, "puts sleepers back that have flown with the others, as some were disturbed", MOTION,
-            (*MOTION, "path_velocity", "still"), "sleeping", "bodies sleep",
+            (*MOTION, "path_velocity", "sleep_state"), "sleeping", "bodies sleep",
         ),
     )  # fmt: skip
     ON_DEMAND = (
@@ -234,7 +234,7 @@ class Integration(StagedSystem):
         turns.torque = torque.reshape(-1)
         turns.within = bool(turning)
         if turning:
-            turns.reserve(len(torque), *COLUMNS)
+            turns.reserve(len(torque), *ROTATION_COLUMNS)
             turns.begins = True
             motion.turn = functools.partial(self._turn, turning)
         return torque

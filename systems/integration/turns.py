@@ -5,9 +5,10 @@ from __future__ import annotations
 
 from ...framework.jit.records.schema import Schema, flag, flags, floats, integer, table
 
-DRIFT, KICK, RUNGE_KUTTA = 1, 2, 3
-BESIDE = {
-    "verlet_drift": DRIFT, "first_half_kick": DRIFT, "verlet_kick": KICK, "second_half_kick": KICK,
+ROTATION_DRIFT, ROTATION_KICK, RUNGE_KUTTA = 1, 2, 3
+ROTATION_STAGES = {
+    "verlet_drift": ROTATION_DRIFT, "first_half_kick": ROTATION_DRIFT,
+    "verlet_kick": ROTATION_KICK, "second_half_kick": ROTATION_KICK,
     "runge_kutta_stage": RUNGE_KUTTA,
 }  # fmt: skip
 # part: of these; begins: it is the first of the step; within: bodies turn with these parts; torque: of force systems,
@@ -20,4 +21,4 @@ TURNS = Schema(
     turned=table("float64", 3), momentum=table("float64", 3), middle=table("float64", 3), speeds=table("float64", 3),
     kicks=table("float64", 3),
 )  # fmt: skip
-COLUMNS = tuple(name for name in TURNS.fields if name not in ("part", "begins", "within", "torque"))
+ROTATION_COLUMNS = tuple(name for name in TURNS.fields if name not in ("part", "begins", "within", "torque"))

@@ -9,12 +9,12 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 from ..codes import OK
 from ..compounds.rows import next_row, owner_of
-from ..contacts.solving.rows import turn_body
+from ..contacts.solving.rows import rotate_body
 from ..contacts.solving.warm_start import row_of
 from ..integration.turning import change_of_spin, cross_spin
 from ..narrow_phase.stages import layers_meet
 from .coupling import first_of
-from .records import DRIVE, FREE, GIVEN, POINT, SLIDE, TURN, TWIST
+from .records import CUSTOM, DRIVE, FREE, POINT, SLIDE, TURN, TWIST
 from .rows import turn_about
 
 
@@ -25,9 +25,9 @@ def may_move(state, i):
 
 
 @inlined
-def left_out(state, i):
+def is_left_out(state, i):
     """Whether row i is a dynamic body that sleeps, or one that takes no part as it had a value that cannot be."""
-    asleep = 0 <= i < state.dynamic and (i < state.first or state.bodies.still[i] > 0)
+    asleep = 0 <= i < state.dynamic and (i < state.first or state.bodies.sleep_state[i] > 0)
     return asleep or (i >= 0 and state.bodies.quarantined[i])
 
 
@@ -58,7 +58,7 @@ def find_active(state):
         joints.old_normal[j], joints.old_along_a[j] = joints.normal[j], joints.along_a[j]
         joints.total[j], joints.thrust[j] = 0.0, zero_of(state)
         gone = (a < 0 and joints.entity_a[j] > 0) or (b < 0 and joints.entity_b[j] > 0)
-        if gone or left_out(state, a) or left_out(state, b) or joints.rule[j] == FREE:
+        if gone or is_left_out(state, a) or is_left_out(state, b) or joints.rule[j] == FREE:
             continue
         if may_move(state, a) or may_move(state, b):
             joints.order[found] = j
@@ -109,7 +109,7 @@ def find_driven(state, dt):
         a, b = joints.row_a[j], joints.row_b[j]
         axis, missing = joints.axis[j], joints.target[j]
         if a >= 0 and len(axis) == 3:
-            axis = turned(state, a, axis)
+            axis = turned_since(state, a, axis)
         missing -= spin_about(state, b, axis) - spin_about(state, a, axis)
         hold = j  # the first row of the joint: the point about which they turn
         while hold > 0 and joints.joint[hold - 1] == joints.joint[j]:
@@ -126,7 +126,7 @@ def find_driven(state, dt):
 
 
 @part
-def is_apart(joints, a, b):
+def is_kept_apart(joints, a, b):
     """Whether a joint keeps two bodies, by their ids, from touching."""
     low, high = 0, joints.apart
     while low < high:
@@ -149,13 +149,13 @@ def leave_out_joined(state, dt):
         a, b = first[c], second[c]
         first[kept], second[kept] = a, b
         one, other = entity[owner_of(state, a)], entity[owner_of(state, b)]
-        kept += not (layers_meet(state, a, b) and is_apart(joints, min(one, other), max(one, other)))
+        kept += not (layers_meet(state, a, b) and is_kept_apart(joints, min(one, other), max(one, other)))
     candidates.count = kept
     return OK
 
 
 @inlined
-def turned(state, i, v):
+def turned_since(state, i, v):
     """A vector along the axes of body i, as it is in the world."""
     rotation, axes = state.bodies.rotation, state.bodies.axes
     if len(rotation) == 0:
@@ -179,7 +179,7 @@ def push_joined(state, dt):
     velocity, inverse_mass = bodies.linear_velocity, bodies.inverse_mass
     for e in range(joints.active):
         j = joints.order[e]
-        given = joints.kind[j] == GIVEN
+        given = joints.kind[j] == CUSTOM
         if joints.kind[j] >= TURN and not given:
             continue
         push = scale(joints.pull[j] if joints.kind[j] == POINT else scale(joints.normal[j], joints.load[j]), dt)
@@ -193,7 +193,7 @@ def push_joined(state, dt):
 
 
 @part
-def lay_given(state, j):
+def build_custom_rows(state, j):
     """Where the bodies of a row of a plugin are when the step starts, and their axes as it has turned them."""
     joints, bodies, zero = state.solver.joints, state.bodies, zero_of(state)
     a, b, d = joints.row_a[j], joints.row_b[j], len(zero)
@@ -201,24 +201,24 @@ def lay_given(state, j):
     joints.base_b[j] = bodies.previous_position[b] if b >= 0 else zero
     for k in range(d):
         axis = replace(zero, k, 1.0)
-        joints.axes_a[d * j + k] = turned(state, a, axis) if a >= 0 else axis
-        joints.axes_b[d * j + k] = turned(state, b, axis) if b >= 0 else axis
+        joints.axes_a[d * j + k] = turned_since(state, a, axis) if a >= 0 else axis
+        joints.axes_b[d * j + k] = turned_since(state, b, axis) if b >= 0 else axis
 
 
 @part
-def lay_joints(state):
+def build_joint_rows(state):
     """Where the joints hold their bodies, as the step has turned these. The world has the place behind all bodies."""
     solver, joints, bodies, zero = state.solver, state.solver.joints, state.bodies, zero_of(state)
     ground = solver.bodies
     solver.velocity[ground], solver.shift[ground], solver.spin[ground] = zero, zero, zero
-    turn_body(solver, ground, zero)
+    rotate_body(solver, ground, zero)
     solver.inverse_mass[ground] = 0.0
     solver.inverse_inertia[ground], solver.inverse_products[ground] = zero, zero
     for e in range(joints.active):
         j = joints.order[e]
         a, b = joints.row_a[j], joints.row_b[j]
-        if joints.kind[j] == GIVEN:
-            lay_given(state, j)
+        if joints.kind[j] == CUSTOM:
+            build_custom_rows(state, j)
             continue
         if joints.kind[j] == TURN and len(zero) == 2:
             joints.rail[j], joints.angle[j] = joints.axis[j], 0.0
@@ -229,10 +229,10 @@ def lay_joints(state):
         start_a = bodies.previous_position[a] if a >= 0 else zero
         start_b = bodies.previous_position[b] if b >= 0 else zero
         joints.between[j] = sub(start_b, start_a)
-        joints.base_a[j] = turned(state, a, joints.anchor_a[j]) if a >= 0 else joints.anchor_a[j]
-        joints.base_b[j] = turned(state, b, joints.anchor_b[j]) if b >= 0 else joints.anchor_b[j]
+        joints.base_a[j] = turned_since(state, a, joints.anchor_a[j]) if a >= 0 else joints.anchor_a[j]
+        joints.base_b[j] = turned_since(state, b, joints.anchor_b[j]) if b >= 0 else joints.anchor_b[j]
         if joints.kind[j] == SLIDE or len(zero) == 3:
-            joints.rail[j] = turned(state, a, joints.axis[j]) if a >= 0 else joints.axis[j]
+            joints.rail[j] = turned_since(state, a, joints.axis[j]) if a >= 0 else joints.axis[j]
 
 
 def count_turns(state, dt):
@@ -240,11 +240,12 @@ def count_turns(state, dt):
     joints = state.solver.joints
     for j in range(joints.count if len(zero_of(state)) == 3 else 0):
         a, b, above = joints.row_a[j], joints.row_b[j], max(j - 1, 0)
-        if joints.kind[j] in (TURN, TWIST) and not (left_out(state, a) or left_out(state, b)):
+        if joints.kind[j] in (TURN, TWIST) and not (is_left_out(state, a) or is_left_out(state, b)):
             axis, end_a = joints.axis[j], joints.anchor_a[j]
-            axis, end_a = (turned(state, a, axis), turned(state, a, end_a)) if a >= 0 else (axis, end_a)
+            axis, end_a = (turned_since(state, a, axis), turned_since(state, a, end_a)) if a >= 0 else (axis, end_a)
             end_b, axis_b = joints.anchor_b[j], joints.anchor_b[above]
-            end_b, axis_b = (turned(state, b, end_b), turned(state, b, axis_b)) if b >= 0 else (end_b, axis_b)
+            if b >= 0:
+                end_b, axis_b = turned_since(state, b, end_b), turned_since(state, b, axis_b)
             if joints.rule[j] == FREE:  # others have been counted in each substep
                 joints.value[first_of(joints, j)] += dt * (spin_about(state, b, axis) - spin_about(state, a, axis))
             turn_about(joints, j, axis, (end_a, end_b), axis_b)

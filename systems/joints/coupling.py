@@ -15,9 +15,9 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, item, replace, row, scale, store
 from ..integration.turning import change_of_spin, cross_spin, symmetric, twist
-from .records import GIVEN, HOLD, POINT, SPRING, TURN
+from .records import CUSTOM, HOLD, POINT, SPRING, TURN
 
-MOST = 6  # rows that hold, in space, and each a number
+MOST_ANSWERS = 6  # rows that hold, in space, and each a number
 MOST_LEVER = 16.0  # times as much as the masses alone: what more is moved at the end of an arm gives way no more
 NOTHING = 1e-9  # of what an impulse moves: less is held by rows before
 
@@ -41,25 +41,25 @@ def end_of(joints, j):
 
 
 @inlined
-def swings(joints, j):
+def is_soft_spring(joints, j):
     """Whether a row is a spring that its substeps can follow: others gain energy where springs meet at a body."""
     return joints.rule[j] == SPRING and joints.frequency[j] <= joints.fastest
 
 
 @inlined
-def holds(joints, j):
+def is_holding(joints, j):
     """Whether a row holds its value, as springs do that are too fast for their substeps."""
     return joints.rule[j] == HOLD or (joints.rule[j] == SPRING and joints.frequency[j] > joints.fastest)
 
 
 @inlined
-def is_answered(joints, j):
+def has_coupling(joints, j):
     """Whether rows before row j may answer it."""
-    return joints.kind[j] != GIVEN and j > 0 and joints.joint[j - 1] == joints.joint[j]
+    return joints.kind[j] != CUSTOM and j > 0 and joints.joint[j - 1] == joints.joint[j]
 
 
 @inlined
-def multiplied(diagonal, others, v):
+def symmetric_product(diagonal, others, v):
     """A symmetric matrix times a vector; others: xy, in space xy, xz, yz."""
     if len(v) == 2:
         x = item(diagonal, 0) * item(v, 0) + item(others, 0) * item(v, 1)
@@ -68,7 +68,7 @@ def multiplied(diagonal, others, v):
 
 
 @inlined
-def pushes_of(joints, j):
+def row_directions(joints, j):
     """(impulse, turn of a, turn of b) that 1 N s or N m s of a row which is no POINT gives its second body; the first
     one gets as much back."""
     along = joints.normal[j]
@@ -78,7 +78,7 @@ def pushes_of(joints, j):
 
 
 @inlined
-def answer_at(joints, j, k, soft):
+def response_at(joints, j, k, soft):
     """The answer number k to row j, where what holds gives way or not."""
     answer, further = (joints.soft_answer[j], joints.soft_further[j]) if soft else (joints.answer[j], joints.further[j])
     d = len(answer)
@@ -86,7 +86,7 @@ def answer_at(joints, j, k, soft):
 
 
 @inlined
-def giving_of(solver, first):
+def compliance_of(solver, first):
     """By how much of what an impulse moves at it a joint gives way. Where that is the end of a long arm of a body which
     turns easily it may have to bear the body itself, and gives way less."""
     joints = solver.joints
@@ -103,21 +103,22 @@ def couple(solver, first, gives):
     gives way (Gram and Schmidt). gives: by so much of what an impulse at it moves, or 0; then of rows that hold alone.
     """
     joints, zero = solver.joints, scale(solver.joints.normal[first], 0.0)
-    force, spins_a, spins_b = stack_array(MOST, zero), stack_array(MOST, zero), stack_array(MOST, zero)
-    answers, furthers, masses = stack_array(MOST, zero), stack_array(MOST, zero), stack_array(MOST, 0.0)
+    n = MOST_ANSWERS
+    force, spins_a, spins_b = stack_array(n, zero), stack_array(n, zero), stack_array(n, zero)
+    answers, furthers, masses = stack_array(n, zero), stack_array(n, zero), stack_array(n, 0.0)
     a, b, d, held = joints.first[first], joints.second[first], len(zero), 0
     w, point = solver.inverse_mass[a] + solver.inverse_mass[b], joints.kind[first] == POINT
     arm_a, arm_b = joints.arm_a[first], joints.arm_b[first]
     for j in range(first + 1 if point else first, end_of(joints, first)):
-        if gives > 0.0 and swings(joints, j):
+        if gives > 0.0 and is_soft_spring(joints, j):
             continue
-        along, turn_a, turn_b = pushes_of(joints, j)
+        along, turn_a, turn_b = row_directions(joints, j)
         push, spin_a, spin_b = along, change_of_spin(solver, a, turn_a), change_of_spin(solver, b, turn_b)
         whole = w * dot(along, along) + dot(turn_a, spin_a) + dot(turn_b, spin_b)
         answer = further = zero
         if point:
             apart = add(scale(along, w), add(cross_spin(spin_a, arm_a), cross_spin(spin_b, arm_b)))
-            answer = multiplied(joints.inverse[first], joints.inverse_products[first], apart)
+            answer = symmetric_product(joints.inverse[first], joints.inverse_products[first], apart)
             answer = scale(answer, -1.0 / (1.0 + gives))
             push = add(push, answer)
             spin_a = add(spin_a, change_of_spin(solver, a, twist(arm_a, answer)))
@@ -136,7 +137,7 @@ def couple(solver, first, gives):
             else:
                 further = replace(further, k - d, item(further, k - d) + share)
         left = w * dot(along, push) + dot(turn_a, spin_a) + dot(turn_b, spin_b)
-        gives_way = gives * whole if holds(joints, j) else 0.0
+        gives_way = gives * whole if is_holding(joints, j) else 0.0
         mass = 1.0 / (left + gives_way) if left > NOTHING * whole else 0.0
         if gives > 0.0:
             joints.soft_answer[j], joints.soft_further[j] = answer, further
@@ -144,7 +145,7 @@ def couple(solver, first, gives):
             joints.impulse_scale[j] = gives_way * mass
         else:
             joints.mass[j], joints.answer[j], joints.further[j] = mass, answer, further
-        if holds(joints, j):
+        if is_holding(joints, j):
             store(force, held, push)
             store(spins_a, held, spin_a)
             store(spins_b, held, spin_b)

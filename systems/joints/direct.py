@@ -16,17 +16,17 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
-from ..contacts.constants import MOST_RIGID, RIGID
+from ..contacts.constants import DIRECT_RELAX_STIFFNESS, DIRECT_STIFFNESS_MAX
 from ..integration.turning import change_of_spin, cross_spin, twist
-from .given import speed_of_given
+from .given import speed_of_custom
 from .order import NO_BLOCK, block_of, freedoms
-from .records import GIVEN, HELD, LIMITED, POINT, TURN
+from .records import CUSTOM, HELD_AT_ONCE, LIMITED_AT_ONCE, POINT, TURN
 
-PUSHES, RELAXES, RESULT_OF, ERRORS = 0, 1, 2, -2  # what is asked of rows; even: errors are pushed out
+PUSH_PASS, RELAX_PASS, RESULT_OF, ERRORS = 0, 1, 2, -2  # what is asked of rows; even: errors are pushed out
 
 
 @part
-def lay_root(solver, q):
+def mass_root(solver, q):
     """The root of the inverse inertia of a body: below the diagonal, row by row."""
     root, d, p = solver.direct.root, solver.inverse_inertia[q], solver.inverse_products[q]
     if len(d) == 2:
@@ -43,7 +43,7 @@ def lay_root(solver, q):
 
 
 @inlined
-def to_measure(solver, q, push, turn, out):
+def to_energy_norm(solver, q, push, turn, out):
     """R' times an impulse and an angular impulse of body q."""
     root, d = solver.direct.root, len(push)
     w = math.sqrt(solver.inverse_mass[q])
@@ -59,7 +59,7 @@ def to_measure(solver, q, push, turn, out):
 
 
 @inlined
-def from_measure(solver, q, like):
+def from_energy_norm(solver, q, like):
     """(velocity, spin) of the solution of body q: R times that."""
     root, x, d = solver.direct.root, solver.direct.solution, len(like)
     w, v, spin = math.sqrt(solver.inverse_mass[q]), like, scale(like, 0.0)
@@ -73,10 +73,10 @@ def from_measure(solver, q, like):
 
 
 @inlined
-def pushes_at(joints, j, k):
+def directions_at(joints, j, k):
     """(impulse of a, its turn, impulse of b, its turn) that 1 N s or N m s of row j gives; of a POINT its axis k."""
     along, kind = joints.normal[j], joints.kind[j]
-    if kind == GIVEN:
+    if kind == CUSTOM:
         return joints.along_a[j], joints.turn_a[j], along, joints.turn_b[j]
     zero = scale(along, 0.0)
     if kind >= TURN:
@@ -87,14 +87,14 @@ def pushes_at(joints, j, k):
 
 
 @inlined
-def weight_of(solver, j):
+def inverse_mass_of(solver, j):
     """How stiff a row is: as if it bore the heaviest body of its group; of angles, at the end of a beam of welds."""
     joints, a, b = solver.joints, solver.joints.first[j], solver.joints.second[j]
     w = max(solver.inverse_mass[a], solver.inverse_mass[b])
-    share = min(solver.direct.stiffer * joints.stiffness * joints.bears[j] * w, MOST_RIGID)
+    share = min(solver.direct.stiffer * joints.stiffness * joints.bears[j] * w, DIRECT_STIFFNESS_MAX)
     if joints.kind[j] < TURN:
         return share / w
-    if joints.kind[j] == GIVEN:
+    if joints.kind[j] == CUSTOM:
         return share * joints.mass[j]
     axis = joints.normal[j]
     moved = dot(axis, change_of_spin(solver, a, axis)) + dot(axis, change_of_spin(solver, b, axis))
@@ -122,12 +122,12 @@ def add_row(solver, j, weight):
         first = a if direct.place[a] < direct.place[b] else b
         block = block_of(direct, first, b if first == a else a)
     for axis in range(len(zero) if joints.kind[j] == POINT else 1):
-        push_a, turn_a, push_b, turn_b = pushes_at(joints, j, axis)
+        push_a, turn_a, push_b, turn_b = directions_at(joints, j, axis)
         if moves_a:
-            to_measure(solver, a, push_a, turn_a, of_a)
+            to_energy_norm(solver, a, push_a, turn_a, of_a)
             add_square(direct, a, of_a, weight, n)
         if moves_b:
-            to_measure(solver, b, push_b, turn_b, of_b)
+            to_energy_norm(solver, b, push_b, turn_b, of_b)
             add_square(direct, b, of_b, weight, n)
         if block != NO_BLOCK:
             for i in range(n):
@@ -162,7 +162,7 @@ def factorise_body(direct, q, n):
 
 
 @part
-def take_from_pair(direct, one, other, p, o, n):
+def subtract_from_pair(direct, one, other, p, o, n):
     """What is left between bodies p and o where their blocks with a body that goes are these."""
     values = direct.values
     if p == o:
@@ -189,7 +189,7 @@ def factorise(solver, pushes):
     n = freedoms(solver.velocity[solver.bodies])
     for e in range(direct.begin, direct.end):
         q = direct.body[e]
-        lay_root(solver, q)
+        mass_root(solver, q)
         for i in range(n):
             for k in range(i):
                 direct.diagonal[q, n * i + k] = 0.0
@@ -197,11 +197,11 @@ def factorise(solver, pushes):
         for k in range(direct.degree[q]):
             for i in range(n * n):
                 direct.values[direct.block[q, k], i] = 0.0
-    direct.stiffer, direct.mixed = 1.0 if pushes else RIGID, False
+    direct.stiffer, direct.mixed = 1.0 if pushes else DIRECT_RELAX_STIFFNESS, False
     for e in range(joints.begin, joints.end):
         j = joints.order[e]
-        if joints.at_once[j] == HELD:
-            add_row(solver, j, weight_of(solver, j))
+        if joints.at_once[j] == HELD_AT_ONCE:
+            add_row(solver, j, inverse_mass_of(solver, j))
         else:
             direct.mixed = True
     for e in range(direct.begin, direct.end):
@@ -209,7 +209,7 @@ def factorise(solver, pushes):
         factorise_body(direct, q, n)
         for k in range(direct.degree[q]):
             for i in range(k + 1):
-                take_from_pair(
+                subtract_from_pair(
                     direct, direct.block[q, i], direct.block[q, k], direct.near[q, i], direct.near[q, k], n
                 )
 
@@ -224,8 +224,8 @@ def note_push(direct, q, push, turn, impulse):
 def speed_of(solver, j):
     """How fast the value of a row that is no POINT changes."""
     joints, a, b = solver.joints, solver.joints.first[j], solver.joints.second[j]
-    if joints.kind[j] == GIVEN:
-        return speed_of_given(solver, j)
+    if joints.kind[j] == CUSTOM:
+        return speed_of_custom(solver, j)
     turning = sub(solver.spin[b], solver.spin[a])
     if joints.kind[j] >= TURN:
         return dot(joints.normal[j], turning)
@@ -246,9 +246,9 @@ def note_rows(solver, what):
         direct.push[direct.body[q]] = direct.twist[direct.body[q]] = scale(solver.velocity[solver.bodies], 0.0)
     for e in range(joints.begin, joints.end):
         j = joints.order[e]
-        if joints.at_once[j] != HELD:
+        if joints.at_once[j] != HELD_AT_ONCE:
             continue
-        a, b, weight = joints.first[j], joints.second[j], weight_of(solver, j)
+        a, b, weight = joints.first[j], joints.second[j], inverse_mass_of(solver, j)
         if joints.kind[j] == POINT:
             v_a = add(solver.velocity[a], cross_spin(solver.spin[a], joints.arm_a[j]))
             speed = sub(add(solver.velocity[b], cross_spin(solver.spin[b], joints.arm_b[j])), v_a)
@@ -263,25 +263,25 @@ def note_rows(solver, what):
             note_push(direct, a, change, twist(joints.arm_a[j], change), -1.0)
             note_push(direct, b, change, twist(joints.arm_b[j], change), 1.0)
             continue
-        asked = direct.share * joints.pushing[j] if pushes else joints.opening[j]
+        asked = direct.share * joints.pushing[j] if pushes else joints.target_speed[j]
         change = weight * (asked - (0.0 if errors else speed_of(solver, j)))
         if pushes and not errors:
             change -= joints.impulse[j]
         if ends:
             joints.impulse[j] += change
-        push_a, turn_a, push_b, turn_b = pushes_at(joints, j, 0)
+        push_a, turn_a, push_b, turn_b = directions_at(joints, j, 0)
         note_push(direct, a, push_a, turn_a, change)
         note_push(direct, b, push_b, turn_b, change)
 
 
 @part
-def divide(solver, n):
+def back_substitute(solver, n):
     """The solution for the impulses of the bodies: first what is asked of each, then how it moves."""
     direct, out = solver.direct, stack_array(6, 0.0)
     diagonal, values, x = direct.diagonal, direct.values, direct.solution
     for e in range(direct.begin, direct.end):
         q = direct.body[e]
-        to_measure(solver, q, direct.push[q], direct.twist[q], out)
+        to_energy_norm(solver, q, direct.push[q], direct.twist[q], out)
         for k in range(n):
             x[q, k] = out[k]
     for e in range(direct.begin, direct.end):
@@ -316,13 +316,13 @@ def bound_push(solver, h):
     error = strays = 0.0
     direct.share = 1.0
     note_rows(solver, ERRORS)
-    divide(solver, freedoms(zero))
+    back_substitute(solver, freedoms(zero))
     for e in range(direct.begin, direct.end):
         q = direct.body[e]
-        _, direct.twist[q] = from_measure(solver, q, zero)
+        _, direct.twist[q] = from_energy_norm(solver, q, zero)
     for e in range(joints.begin, joints.end):
         j = joints.order[e]
-        if joints.at_once[j] != HELD:
+        if joints.at_once[j] != HELD_AT_ONCE:
             continue
         point = joints.kind[j] == POINT
         error = max(error, h * (joints.push_rate[j] * length(joints.gap[j]) if point else abs(joints.pushing[j])))
@@ -336,17 +336,17 @@ def bound_push(solver, h):
 @part
 def solve_direct(solver, pushes):
     """The joints of a range that are solved at once."""
-    direct, zero, what = solver.direct, scale(solver.velocity[solver.bodies], 0.0), PUSHES if pushes else RELAXES
+    direct, zero, what = solver.direct, scale(solver.velocity[solver.bodies], 0.0), PUSH_PASS if pushes else RELAX_PASS
     note_rows(solver, what)
-    divide(solver, freedoms(zero))
+    back_substitute(solver, freedoms(zero))
     for e in range(direct.begin, direct.end):
         q = direct.body[e]
-        v, spin = from_measure(solver, q, zero)
+        v, spin = from_energy_norm(solver, q, zero)
         solver.velocity[q], solver.spin[q] = add(solver.velocity[q], v), add(solver.spin[q], spin)
     note_rows(solver, what + RESULT_OF)
     for e in range(direct.begin, direct.end):  # what the impulses make of it, to the last bit
         q = direct.body[e]
-        v, spin = from_measure(solver, q, zero)
+        v, spin = from_energy_norm(solver, q, zero)
         v = sub(scale(direct.push[q], solver.inverse_mass[q]), v)
         spin = sub(change_of_spin(solver, q, direct.twist[q]), spin)
         solver.velocity[q], solver.spin[q] = add(solver.velocity[q], v), add(solver.spin[q], spin)
@@ -357,7 +357,7 @@ def change_at(solver, j, k):
     """How fast the value of row j, of a POINT along axis k, changes by the motion that is in push and twist."""
     joints, direct = solver.joints, solver.direct
     a, b = joints.first[j], joints.second[j]
-    push_a, turn_a, push_b, turn_b = pushes_at(joints, j, k)
+    push_a, turn_a, push_b, turn_b = directions_at(joints, j, k)
     change = 0.0
     if solver.island[a] >= 0:
         change += dot(push_a, direct.push[a]) + dot(turn_a, direct.twist[a])
@@ -367,10 +367,10 @@ def change_at(solver, j, k):
 
 
 @part
-def give_to_bodies(solver, j, k, impulse):
+def apply_to_bodies(solver, j, k, impulse):
     """Let a row act, of a POINT along axis k."""
     joints = solver.joints
-    push_a, turn_a, push_b, turn_b = pushes_at(joints, j, k)
+    push_a, turn_a, push_b, turn_b = directions_at(joints, j, k)
     for q, push, turn in ((joints.first[j], push_a, turn_a), (joints.second[j], push_b, turn_b)):
         if solver.island[q] >= 0:
             solver.velocity[q] = add_scaled(solver.velocity[q], push, impulse * solver.inverse_mass[q])
@@ -381,35 +381,35 @@ def give_to_bodies(solver, j, k, impulse):
 def solve_limited(solver, j, pushes):
     """A limit, a motor or a servo whose joint, and all that hang on it, are solved at once: these answer it."""
     joints, direct, zero = solver.joints, solver.direct, scale(solver.velocity[solver.bodies], 0.0)
-    old, missing = joints.impulse[j], (joints.pushing[j] if pushes else joints.opening[j]) - speed_of(solver, j)
+    old, missing = joints.impulse[j], (joints.pushing[j] if pushes else joints.target_speed[j]) - speed_of(solver, j)
     if old == 0.0 and min(joints.greatest[j], max(joints.least[j], missing)) == 0.0:
         return
     for e in range(direct.begin, direct.end):
         direct.push[direct.body[e]] = direct.twist[direct.body[e]] = zero
-    push_a, turn_a, push_b, turn_b = pushes_at(joints, j, 0)
+    push_a, turn_a, push_b, turn_b = directions_at(joints, j, 0)
     note_push(direct, joints.first[j], push_a, turn_a, 1.0)
     note_push(direct, joints.second[j], push_b, turn_b, 1.0)
-    divide(solver, freedoms(zero))
+    back_substitute(solver, freedoms(zero))
     for e in range(direct.begin, direct.end):
         q = direct.body[e]
-        direct.push[q], direct.twist[q] = from_measure(solver, q, zero)
+        direct.push[q], direct.twist[q] = from_energy_norm(solver, q, zero)
     moved = change_at(solver, j, 0)
     new = min(joints.greatest[j], max(joints.least[j], old + missing / moved if moved > 0.0 else old))
     joints.impulse[j] = new
     if new == old:
         return
-    give_to_bodies(solver, j, 0, new - old)
+    apply_to_bodies(solver, j, 0, new - old)
     for e in range(joints.begin, joints.end):
         i = joints.order[e]
-        if joints.at_once[i] == HELD:
-            share = (old - new) * weight_of(solver, i)
+        if joints.at_once[i] == HELD_AT_ONCE:
+            share = (old - new) * inverse_mass_of(solver, i)
             for k in range(len(zero) if joints.kind[i] == POINT else 1):
                 answer = share * change_at(solver, i, k)
                 if joints.kind[i] == POINT:
                     joints.push[i] = replace(joints.push[i], k, item(joints.push[i], k) + answer)
                 else:
                     joints.impulse[i] += answer
-                give_to_bodies(solver, i, k, answer)
+                apply_to_bodies(solver, i, k, answer)
 
 
 @part
@@ -417,5 +417,5 @@ def solve_all_limited(solver, pushes):
     """One pass over the limits, motors and servos of joints that are solved at once."""
     joints = solver.joints
     for e in range(joints.begin, joints.end):
-        if joints.at_once[joints.order[e]] == LIMITED:
+        if joints.at_once[joints.order[e]] == LIMITED_AT_ONCE:
             solve_limited(solver, joints.order[e], pushes)

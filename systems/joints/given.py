@@ -20,17 +20,17 @@ from ..shapes.linking.signatures import call_in_dimension, vector_type
 
 
 @cache
-def given_signature(dimensions: int) -> Any:
+def custom_signature(dimensions: int) -> Any:
     """(solver, row) -> (value, or NaN where the function tells none, along a, turn of a, along b, turn of b)."""
     vector = vector_type(dimensions)
     return types.Tuple((types.float64, *(vector,) * 4))(record_type(SOLVER, dimensions), types.int64)
 
 
-call_given = call_in_dimension(given_signature)
+call_given = call_in_dimension(custom_signature)
 
 
 @inlined
-def rates_of_given(solver, j):
+def rates_of_custom(solver, j):
     """How fast the value of a row changes by what each of its bodies does."""
     joints = solver.joints
     a, b = joints.first[j], joints.second[j]
@@ -39,19 +39,19 @@ def rates_of_given(solver, j):
 
 
 @inlined
-def speed_of_given(solver, j):
+def speed_of_custom(solver, j):
     """How fast the value of a row changes."""
-    at_a, at_b = rates_of_given(solver, j)
+    at_a, at_b = rates_of_custom(solver, j)
     return at_a + at_b
 
 
 @part
-def measure_given(solver, j):
+def measure_custom(solver, j):
     """The value of a row now. Its sum of changes takes the mean of those before and after a substep."""
     joints = solver.joints
     a, b = joints.first[j], joints.second[j]
     moved_for = joints.moved_for
-    before = speed_of_given(solver, j) if moved_for > 0.0 else 0.0
+    before = speed_of_custom(solver, j) if moved_for > 0.0 else 0.0
     joints.asked = joints.joint[j]
     value, along_a, turn_a, along_b, turn_b = call_given(joints.function[j], solver, j)
     joints.asked = 0
@@ -62,7 +62,7 @@ def measure_given(solver, j):
     if value != value:
         value = joints.value[j]
         if moved_for > 0.0:
-            value += 0.5 * moved_for * (before + speed_of_given(solver, j))
+            value += 0.5 * moved_for * (before + speed_of_custom(solver, j))
         else:
             value += dot(along_a, solver.shift[a]) + dot(along_b, solver.shift[b])
     joints.value[j] = value
@@ -70,7 +70,7 @@ def measure_given(solver, j):
 
 
 @inlined
-def push_given(solver, j, impulse):
+def push_custom(solver, j, impulse):
     """Let a row act with an impulse."""
     joints = solver.joints
     a, b = joints.first[j], joints.second[j]

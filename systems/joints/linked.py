@@ -10,7 +10,7 @@ from ...framework.jit.linking import CACHE_SIZE, Linked
 from ...framework.jit.source import source_module
 from ...framework.vectors import add, dot
 from ..shapes.linking.user_functions import user_function
-from .given import given_signature
+from .given import custom_signature
 from .own import OwnJoint, Placed, fields_of, seen_columns
 from .rows import turned_with
 
@@ -57,4 +57,4 @@ def linked_joint(joint: OwnJoint, dimensions: int) -> Linked:
     ]  # fmt: skip
     title = f'"""{joint.component.__name__}, {dimensions}D."""\n\n'
     made = source_module(title + "\n    ".join([*header, *lines]) + "\n", scope)
-    return Linked(made.given, given_signature(dimensions))
+    return Linked(made.given, custom_signature(dimensions))

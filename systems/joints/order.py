@@ -8,9 +8,21 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import length
 from ..compounds.rows import place_of
-from ..contacts.constants import BEND, MOST_RATIO, STIFF
+from ..contacts.constants import DIRECT_STIFFNESS, FRAME_BEND, MOST_RATIO
 from ..islands import root_of
-from .records import DRIVE, HELD, HOLD, LIMIT, LIMITED, LINE, MOST, PASSED, POINT, SERVO, TURN
+from .records import (
+    BY_PASSES,
+    DRIVE,
+    HELD_AT_ONCE,
+    HOLD,
+    LIMIT,
+    LIMITED_AT_ONCE,
+    MOST_NEIGHBOURS,
+    POINT,
+    ROD,
+    SERVO,
+    TURN,
+)
 
 NO_BLOCK = NO_BODY = -1
 
@@ -28,7 +40,7 @@ def is_rigid(joints, j):
 
 
 @part
-def weigh_group(state, j):
+def measure_group(state, j):
     """What a row of joints is to the group of its bodies, by whose first one that is known; returns that."""
     solver, joints, inverse_mass = state.solver, state.solver.joints, state.bodies.inverse_mass
     direct, a, b = solver.direct, joints.row_a[j], joints.row_b[j]
@@ -39,7 +51,7 @@ def weigh_group(state, j):
     direct.welds[g] += joints.kind[j] == TURN and joints.rule[j] == HOLD
     if is_rigid(joints, j):
         direct.freedom[g] -= 2 * (len(joints.normal[j]) if joints.kind[j] == POINT else 1)
-    if joints.kind[j] <= LINE and joints.rule[j] <= LIMIT:
+    if joints.kind[j] <= ROD and joints.rule[j] <= LIMIT:
         size = joints.low[j] if joints.rule[j] == HOLD else joints.high[j]
         if joints.kind[j] == POINT:
             reach_a = length(joints.anchor_a[j]) if w_a > 0.0 else 0.0
@@ -59,21 +71,21 @@ def choose_direct(state):
     for q in range(solver.bodies if joints.active > 0 else 0):
         direct.freedom[root_of(solver.group, q)] += free
     for e in range(joints.active):
-        weigh_group(state, joints.order[e])
+        measure_group(state, joints.order[e])
     for e in range(joints.active):
         j = joints.order[e]
         a = joints.row_a[j]
         q = place_of(state, a if a >= 0 and state.bodies.inverse_mass[a] > 0.0 else joints.row_b[j])
         g, t = root_of(solver.group, q), island[q]
-        light, heavy, bend = direct.light[g], direct.heavy[g], max(1.0, BEND * direct.welds[g] ** 2)
+        light, heavy, bend = direct.light[g], direct.heavy[g], max(1.0, FRAME_BEND * direct.welds[g] ** 2)
         chosen = light > MOST_RATIO * heavy or direct.welds[g] > 1 or direct.freedom[g] < 0
-        joints.at_once[j], joints.group[j] = PASSED, g
+        joints.at_once[j], joints.group[j] = BY_PASSES, g
         if chosen and is_rigid(joints, j):
-            joints.at_once[j] = HELD
+            joints.at_once[j] = HELD_AT_ONCE
         elif chosen and joints.rule[j] in (LIMIT, DRIVE, SERVO) and joints.kind[j] != POINT:
-            joints.at_once[j] = LIMITED
-        joints.bears[j] = STIFF / heavy * (bend if joints.kind[j] >= TURN else 1.0)
-        solver.at_once[t] |= joints.at_once[j] == HELD
+            joints.at_once[j] = LIMITED_AT_ONCE
+        joints.bears[j] = DIRECT_STIFFNESS / heavy * (bend if joints.kind[j] >= TURN else 1.0)
+        solver.at_once[t] |= joints.at_once[j] == HELD_AT_ONCE
         solver.sway[t] = max(solver.sway[t], direct.swing[g] / heavy)
 
 
@@ -90,7 +102,7 @@ def block_of(direct, q, p):
 def note_near(direct, q, p, block):
     """Body q has a neighbour more; returns whether there is room for it."""
     k = direct.degree[q]
-    if k == MOST:
+    if k == MOST_NEIGHBOURS:
         return False
     direct.near[q, k], direct.block[q, k], direct.degree[q] = p, block, k + 1
     return True
@@ -107,7 +119,7 @@ def join_pair(direct, q, p):
 
 
 @part
-def leave(direct, q, p):
+def eliminate_neighbour(direct, q, p):
     """Body q, which goes, is no neighbour of p any more."""
     last = direct.degree[p] - 1
     for k in range(last + 1):
@@ -123,7 +135,7 @@ def eliminate(direct, q):
     direct.place[q], direct.body[direct.bodies] = direct.bodies, q
     direct.bodies += 1
     for k in range(direct.degree[q]):
-        leave(direct, q, direct.near[q, k])
+        eliminate_neighbour(direct, q, direct.near[q, k])
     for k in range(direct.degree[q]):
         for i in range(k):
             if not join_pair(direct, direct.near[q, i], direct.near[q, k]):
@@ -140,15 +152,15 @@ def order_island(solver, begin, end, rows_begin, rows_end):
         direct.degree[q] = direct.place[q] = -1
     for e in range(rows_begin, rows_end):
         j = joints.order[e]
-        if joints.at_once[j] != PASSED:
+        if joints.at_once[j] != BY_PASSES:
             a, b = joints.first[j], joints.second[j]
             for q in (a, b):
                 if island[q] >= 0:
                     direct.degree[q] = max(0, direct.degree[q])
-            both = island[a] >= 0 and island[b] >= 0 and joints.at_once[j] == HELD
+            both = island[a] >= 0 and island[b] >= 0 and joints.at_once[j] == HELD_AT_ONCE
             if both and not join_pair(direct, a, b):
                 return a
-    for least in range(MOST + 1):
+    for least in range(MOST_NEIGHBOURS + 1):
         for one in range(begin, end):
             q = one
             while q >= 0 and direct.place[q] < 0 and 0 <= direct.degree[q] <= least:
@@ -163,16 +175,16 @@ def order_island(solver, begin, end, rows_begin, rows_end):
 
 
 @part
-def pass_group(solver, q, rows_begin, rows_end):
+def solve_group_by_passes(solver, q, rows_begin, rows_end):
     """The joints of the group of body q are solved by passes."""
     joints, group = solver.joints, -1
     for e in range(rows_begin, rows_end):
         j = joints.order[e]
-        if joints.at_once[j] != PASSED and (joints.first[j] == q or joints.second[j] == q):
+        if joints.at_once[j] != BY_PASSES and (joints.first[j] == q or joints.second[j] == q):
             group = joints.group[j]
     for e in range(rows_begin, rows_end):
         if joints.group[joints.order[e]] == group:
-            joints.at_once[joints.order[e]] = PASSED
+            joints.at_once[joints.order[e]] = BY_PASSES
 
 
 @part
@@ -188,5 +200,5 @@ def order_direct(solver):
             if full == NO_BODY:
                 break
             direct.bodies, direct.blocks = first, blocks
-            pass_group(solver, full, rows_begin, rows_end)
+            solve_group_by_passes(solver, full, rows_begin, rows_end)
         direct.body_ends[s], begin, rows_begin = direct.bodies, end, rows_end

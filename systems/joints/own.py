@@ -21,10 +21,10 @@ from ...framework.errors import PluginError
 # What functions do not see of a joint.
 HIDDEN = ("a", "b", "collide_connected", "breaking_force", "breaking_torque", "attached", "changed")
 ARGUMENTS = ("joint", "a", "b")
-ROW = "(value, along_a, turn_a, along_b, turn_b)"
+ROW_FIELDS = "(value, along_a, turn_a, along_b, turn_b)"
 
 # (position, axes) of two bodies to try functions with.
-PLACES: Any = (
+SAMPLE_PLACES: Any = (
     ((0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))),
     ((1.0, 0.5, -0.25), ((0.8, 0.6, 0.0), (-0.6, 0.8, 0.0), (0.0, 0.0, 1.0))),
 )
@@ -67,7 +67,7 @@ def fields_of(component: type[Component]) -> Any:
     return collections.namedtuple(component.__name__, [column.name for column in seen_columns(component)])
 
 
-def numbers_of(joint: Component, dimensions: int) -> np.ndarray:
+def custom_numbers(joint: Component, dimensions: int) -> np.ndarray:
     """These fields one after the other, NaN for None."""
     found = []
     for column in seen_columns(type(joint)):
@@ -76,9 +76,9 @@ def numbers_of(joint: Component, dimensions: int) -> np.ndarray:
     return np.concatenate(found)
 
 
-def parameters_of(joint: Component, dimensions: int) -> Any:
+def custom_parameters(joint: Component, dimensions: int) -> Any:
     """These fields, for a call from Python."""
-    given, values, at = numbers_of(joint, dimensions), [], 0
+    given, values, at = custom_numbers(joint, dimensions), [], 0
     for column in seen_columns(type(joint)):
         shape = column.item_shape(dimensions)
         part = tuple(given[at : at + math.prod(shape)])
@@ -89,7 +89,7 @@ def parameters_of(joint: Component, dimensions: int) -> Any:
 
 def rows_of(component: Any, joint: Any, a: Placed, b: Placed) -> tuple[Any, ...]:
     """What the function returns where these bodies are, as a tuple of rows."""
-    made = component.constraint(parameters_of(joint, len(a.position)), a, b)
+    made = component.constraint(custom_parameters(joint, len(a.position)), a, b)
     return (made,) if _is_single(made) else made
 
 
@@ -119,7 +119,7 @@ def own_joint(plugin: Any, component: type[Component]) -> OwnJoint:
     function = inspect.getattr_static(component, "constraint", None)
     function = getattr(function, "__func__", function)
     if not inspect.isfunction(function):
-        raise PluginError(f"{where} has no constraint: write constraint(joint, a, b) that returns {ROW}")
+        raise PluginError(f"{where} has no constraint: write constraint(joint, a, b) that returns {ROW_FIELDS}")
     given = tuple(inspect.signature(function).parameters)
     if len(given) != len(ARGUMENTS):
         raise PluginError(f"{where}: constraint takes ({', '.join(given)}), it must take ({', '.join(ARGUMENTS)})")
@@ -132,17 +132,17 @@ def _try(where: str, component: Any, dimensions: int) -> tuple[bool, tuple[bool,
     """Whether the function returns one row, and for each whether it tells its value."""
     if dimensions not in component.dimensions:
         return True, ()
-    a, b = PLACES
+    a, b = SAMPLE_PLACES
     a, b = (Placed(p[:dimensions], tuple(axis[:dimensions] for axis in axes[:dimensions])) for p, axes in (a, b))
     said = f"{where}: constraint, tried in {dimensions}D,"
     try:
-        made = component.constraint(parameters_of(sample_of(component, dimensions), dimensions), a, b)
+        made = component.constraint(custom_parameters(sample_of(component, dimensions), dimensions), a, b)
     except Exception as error:  # whatever it raises, its author has to hear of
         raise PluginError(f"{said} raised {type(error).__name__}: {error}") from error
     rows = (made,) if _is_single(made) else made
     for row in rows:
         if not isinstance(row, tuple) or len(row) != 5:
-            raise PluginError(f"{said} returned {row!r}: return {ROW}, or a tuple of such rows")
+            raise PluginError(f"{said} returned {row!r}: return {ROW_FIELDS}, or a tuple of such rows")
         for name, vector in zip(("along_a", "turn_a", "along_b", "turn_b"), row[1:], strict=True):
             if not (isinstance(vector, tuple) and len(vector) == dimensions and all(map(_is_finite, vector))):
                 flat = " (in 2D a turn is (turn, 0.0))" if dimensions == 2 and name[:4] == "turn" else ""

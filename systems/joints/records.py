@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from ...framework.jit.records.schema import Column, Schema, flag, floats, integer, ints, number, table, vectors
 
-POINT, LINE, SLIDE, TURN, ALIGN, CONE, TWIST, GIVEN = range(8)
+POINT, ROD, SLIDE, TURN, ALIGN, CONE, TWIST, CUSTOM = range(8)
 HOLD, LIMIT, DRIVE, SPRING, SERVO, FREE = range(6)
-PASSED, HELD, LIMITED = range(3)
-MOST = 64  # neighbours of a body where joints are solved at once
+BY_PASSES, HELD_AT_ONCE, LIMITED_AT_ONCE = range(3)
+MOST_NEIGHBOURS = 64  # neighbours of a body where joints are solved at once
 
 JOINTS = Schema(
     "Joints",
@@ -96,7 +96,7 @@ JOINTS = Schema(
     inverse=vectors(),  # of the masses of a POINT: diagonal,
     inverse_products=vectors(),  # and beside it
     pushing=floats(),  # m/s or rad/s that the passes ask for,
-    opening=floats(),  # and those that do not push
+    target_speed=floats(),  # and those that do not push
     least=floats(),  # N s or N m s
     greatest=floats(),
     impulse=floats(),
@@ -114,8 +114,8 @@ DIRECT = Schema(
     place=ints("int32"),  # and where each is in that
     body_ends=ints("int32"),  # of each range
     degree=ints("int32"),  # neighbours when it goes; -1: it has no such joint,
-    near=table("int32", MOST),  # these,
-    block=table("int32", MOST),  # and where their blocks are
+    near=table("int32", MOST_NEIGHBOURS),  # these,
+    block=table("int32", MOST_NEIGHBOURS),  # and where their blocks are
     blocks=integer(),
     root=table("float64", 6),  # of its inverse inertia
     diagonal=table("float64", 36),  # of the matrix, then its root

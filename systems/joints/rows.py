@@ -22,11 +22,20 @@ from ...framework.compilation import inlined, part
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 from ..contacts.constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY, SPRING_FREQUENCY
 from ..integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
-from .coupling import answer_at, couple, first_of, giving_of, holds, is_answered, multiplied, swings
+from .coupling import (
+    compliance_of,
+    couple,
+    first_of,
+    has_coupling,
+    is_holding,
+    is_soft_spring,
+    response_at,
+    symmetric_product,
+)
 from .direct import bound_push, factorise, solve_all_limited, solve_direct
-from .given import measure_given, push_given, speed_of_given
+from .given import measure_custom, push_custom, speed_of_custom
 from .order import is_rigid
-from .records import ALIGN, DRIVE, GIVEN, HELD, LIMIT, PASSED, POINT, SERVO, SLIDE, TURN, TWIST
+from .records import ALIGN, BY_PASSES, CUSTOM, DRIVE, HELD_AT_ONCE, LIMIT, POINT, SERVO, SLIDE, TURN, TWIST
 
 FULL_TURN = 2.0 * math.pi
 FOLDED = 1e-2  # 1 + cosine of a swing: beyond it a twist is nearly any angle
@@ -46,12 +55,12 @@ def count_springs(solver):
         for e in range(joints.begin, joints.end):
             j = joints.order[e]
             for q in (joints.first[j], joints.second[j]):
-                moves = swings(joints, j) and solver.inverse_mass[q] > 0.0
+                moves = is_soft_spring(joints, j) and solver.inverse_mass[q] > 0.0
                 used[q] = used[q] + moves if count > 0 else 0
 
 
 @inlined
-def spring_of(angle, ratio, together):
+def joint_spring(angle, ratio, together):
     """(error that a spring pushes out in a substep, share of its mass) for it to turn by an angle, rad, in a substep.
 
     It takes share * (v + rate * x / h) from the speed v at a stretch x, then x changes by v h: a map of (x, v) whose
@@ -82,17 +91,17 @@ def start_joints(solver, h, period):
     for e in range(joints.begin, joints.end):
         j = joints.order[e]
         joints.impulse[j], joints.push[j] = joints.load[j] * h, scale(joints.pull[j], h)
-        if swings(joints, j):
+        if is_soft_spring(joints, j):
             omega = 2.0 * math.pi * joints.frequency[j]
             together = max(solver.used[joints.first[j]], solver.used[joints.second[j]])
-            rate, mass_scale = spring_of(omega * h, joints.damping_ratio[j], together)
+            rate, mass_scale = joint_spring(omega * h, joints.damping_ratio[j], together)
             joints.push_rate[j], joints.mass_scale[j], joints.impulse_scale[j] = rate / h, mass_scale, 1.0 - mass_scale
             continue
         omega = 2.0 * math.pi * JOINT_FREQUENCY / period
         damping = 2.0 * JOINT_DAMPING_RATIO + h * omega
         stiffness = joints.stiffness = h * omega * damping
         joints.push_rate[j] = omega / damping
-        holding = holds(joints, j)
+        holding = is_holding(joints, j)
         joints.mass_scale[j] = stiffness / (1.0 + stiffness) if holding else 1.0
         joints.impulse_scale[j] = 1.0 / (1.0 + stiffness) if holding else 0.0
 
@@ -114,7 +123,7 @@ def moved_by(solver, q, arm, along):
 
 
 @inlined
-def weigh_point(solver, j, zero):
+def compute_point_mass(solver, j, zero):
     """The masses that impulses at two anchors move: the inverse of a matrix."""
     joints, d = solver.joints, len(zero)
     a, b, arm_a, arm_b = joints.first[j], joints.second[j], joints.arm_a[j], joints.arm_b[j]
@@ -179,14 +188,14 @@ def angle_of(solver, j):
 
 
 @part
-def ask(joints, j, value):
+def update_joint_targets(joints, j, value):
     """What a row asks of the speed of its value, m/s or rad/s, and the impulses that it may have."""
     rule, h = joints.rule[j], joints.step
-    joints.opening[j] = joints.pushing[j] = 0.0
+    joints.target_speed[j] = joints.pushing[j] = 0.0
     joints.greatest[j] = joints.most[j] * h
     joints.least[j] = -joints.greatest[j]
     if rule == DRIVE:
-        joints.opening[j] = joints.pushing[j] = joints.target[j]
+        joints.target_speed[j] = joints.pushing[j] = joints.target[j]
     elif rule == SERVO:
         joints.pushing[j] = joints.low[j] - value  # see brake
     elif rule != LIMIT:
@@ -198,7 +207,7 @@ def ask(joints, j, value):
         speed = -room / h if room > 0.0 else -joints.push_rate[j] * room
         joints.pushing[j] = speed if lower else -speed
         if room > 0.0:
-            joints.opening[j] = joints.pushing[j]
+            joints.target_speed[j] = joints.pushing[j]
         if lower:
             joints.least[j] = 0.0
         else:
@@ -206,11 +215,11 @@ def ask(joints, j, value):
 
 
 @inlined
-def brake(joints, j):
+def servo_speed(joints, j):
     """The speed of a servo, which starts to stop in time."""
     way, mass = joints.pushing[j], joints.mass[j]
     stops = BRAKES * math.sqrt(2.0 * joints.most[j] * abs(way) / mass) if mass > 0.0 else 0.0
-    joints.opening[j] = joints.pushing[j] = math.copysign(min(joints.push_rate[j] * abs(way), stops), way)
+    joints.target_speed[j] = joints.pushing[j] = math.copysign(min(joints.push_rate[j] * abs(way), stops), way)
 
 
 @part
@@ -222,24 +231,24 @@ def measure_joints(solver):
     for e in range(joints.begin, joints.end):
         j = order[e]
         kind, a, b = kinds[j], first[j], second[j]
-        if kind == GIVEN:
-            ask(joints, j, measure_given(solver, j))
+        if kind == CUSTOM:
+            update_joint_targets(joints, j, measure_custom(solver, j))
             continue
         if kind >= TURN:
             axis, angle = angle_of(solver, j)
             moved = dot(axis, change_of_spin(solver, a, axis)) + dot(axis, change_of_spin(solver, b, axis))
             joints.normal[j], joints.mass[j] = axis, 1.0 / moved if moved > 0.0 else 0.0
-            ask(joints, j, angle)
+            update_joint_targets(joints, j, angle)
             continue
         arm_a, arm_b = turned_with(solver, a, base_a[j]), turned_with(solver, b, base_b[j])
         way = add(between[j], sub(add(shift[b], arm_b), add(shift[a], arm_a)))
         if kind == POINT:
-            if joints.at_once[j] == HELD:  # both ends where b's is: great forces that are a gap apart would turn them
+            if joints.at_once[j] == HELD_AT_ONCE:  # both ends where b's is: great forces a gap apart turn them
                 arm_a = add(arm_a, way)
             arms_a[j], arms_b[j], gap[j] = arm_a, arm_b, way
-            weigh_point(solver, j, scale(way, 0.0))
-            if holds(joints, j):
-                gives = giving_of(solver, j)
+            compute_point_mass(solver, j, scale(way, 0.0))
+            if is_holding(joints, j):
+                gives = compliance_of(solver, j)
                 joints.mass_scale[j], joints.impulse_scale[j] = 1.0 / (1.0 + gives), gives / (1.0 + gives)
             continue
         normal, value = joints.normal[j], length(way)
@@ -251,16 +260,16 @@ def measure_joints(solver):
         arms_a[j], arms_b[j], joints.normal[j] = arm_a, arm_b, normal
         moved = solver.inverse_mass[a] + solver.inverse_mass[b]
         joints.mass[j] = 1.0 / (moved + compliance(solver, a, arm_a, normal) + compliance(solver, b, arm_b, normal))
-        ask(joints, j, value)
+        update_joint_targets(joints, j, value)
     for e in range(joints.begin, joints.end):  # now that all rows are measured: those of a joint may come in any order
         j = order[e]
-        if is_answered(joints, j) and not is_answered(joints, j - 1):
-            gives = giving_of(solver, j - 1)
+        if has_coupling(joints, j) and not has_coupling(joints, j - 1):
+            gives = compliance_of(solver, j - 1)
             couple(solver, j - 1, 0.0)
             couple(solver, j - 1, gives)
     for e in range(joints.begin, joints.end):
         if joints.rule[order[e]] == SERVO:
-            brake(joints, order[e])
+            servo_speed(joints, order[e])
     joints.moved_for = joints.step
 
 
@@ -285,15 +294,15 @@ def push_apart(columns, ends, arms, impulse):
 
 
 @inlined
-def give_row(solver, j, impulse):
+def apply_row(solver, j, impulse):
     """Let a row that is no POINT act with an impulse."""
     joints = solver.joints
     if joints.kind[j] < TURN:
         ends, arms = (joints.first[j], joints.second[j]), (joints.arm_a[j], joints.arm_b[j])
         push_apart(columns_of(solver), ends, arms, scale(joints.normal[j], impulse))
         return
-    if joints.kind[j] == GIVEN:
-        push_given(solver, j, impulse)
+    if joints.kind[j] == CUSTOM:
+        push_custom(solver, j, impulse)
         return
     a, b, twisted = joints.first[j], joints.second[j], scale(joints.normal[j], impulse)
     if solver.inverse_mass[a] > 0.0:
@@ -303,11 +312,11 @@ def give_row(solver, j, impulse):
 
 
 @inlined
-def answer_row(solver, j, impulse, soft):
+def row_response(solver, j, impulse, soft):
     """What holds in the joint of row j pushes with it, see coupling."""
     joints, k = solver.joints, 0
     for i in range(first_of(joints, j), j):
-        if not holds(joints, i):
+        if not is_holding(joints, i):
             continue
         if joints.kind[i] == POINT:
             answer = scale(joints.soft_answer[j] if soft else joints.answer[j], impulse)
@@ -316,9 +325,9 @@ def answer_row(solver, j, impulse, soft):
             push_apart(columns_of(solver), ends, arms, answer)
             k += len(answer)
         else:
-            share = answer_at(joints, j, k, soft) * impulse
+            share = response_at(joints, j, k, soft) * impulse
             joints.impulse[i] += share
-            give_row(solver, i, share)
+            apply_row(solver, i, share)
             k += 1
 
 
@@ -332,7 +341,7 @@ def warm_start_joints(solver):
         if kind[j] == POINT:
             push_apart(columns, (first[j], second[j]), (arm_a[j], arm_b[j]), push[j])
         elif joints.impulse[j] != 0.0:
-            give_row(solver, j, joints.impulse[j])
+            apply_row(solver, j, joints.impulse[j])
 
 
 @inlined
@@ -348,8 +357,8 @@ def speed_between(solver, j):
 def solve_row(solver, j, pushes):
     """The value of a row changes as it asks, as far as its impulses allow."""
     joints, old = solver.joints, solver.joints.impulse[j]
-    if joints.kind[j] == GIVEN:
-        speed = speed_of_given(solver, j)
+    if joints.kind[j] == CUSTOM:
+        speed = speed_of_custom(solver, j)
     elif joints.kind[j] >= TURN:
         speed = dot(joints.normal[j], sub(solver.spin[joints.second[j]], solver.spin[joints.first[j]]))
     else:
@@ -357,17 +366,17 @@ def solve_row(solver, j, pushes):
     if pushes:
         change = joints.mass_scale[j] * joints.mass[j] * (joints.pushing[j] - speed) - joints.impulse_scale[j] * old
     else:
-        change = joints.mass[j] * (joints.opening[j] - speed)
+        change = joints.mass[j] * (joints.target_speed[j] - speed)
     new = min(joints.greatest[j], max(joints.least[j], old + change))
     joints.impulse[j] = new
     if new != old:  # most limits are not met
-        give_row(solver, j, new - old)
-        if is_answered(joints, j):
-            answer_row(solver, j, new - old, pushes and not swings(joints, j))
+        apply_row(solver, j, new - old)
+        if has_coupling(joints, j):
+            row_response(solver, j, new - old, pushes and not is_soft_spring(joints, j))
 
 
 @part
-def pass_over_joints(solver, pushes):
+def solve_joint_pass(solver, pushes):
     """One pass over the joints of a range that are not solved at once."""
     joints, columns, velocity, spin = solver.joints, columns_of(solver), solver.velocity, solver.spin
     order, kind, first, second = joints.order, joints.kind, joints.first, joints.second
@@ -376,7 +385,7 @@ def pass_over_joints(solver, pushes):
     rate, mass_scale, impulse_scale = joints.push_rate, joints.mass_scale, joints.impulse_scale
     for e in range(joints.begin, joints.end):
         j = order[e]
-        if (not pushes and swings(joints, j)) or joints.at_once[j] != PASSED:
+        if (not pushes and is_soft_spring(joints, j)) or joints.at_once[j] != BY_PASSES:
             continue
         if kind[j] != POINT:
             solve_row(solver, j, pushes)
@@ -385,10 +394,10 @@ def pass_over_joints(solver, pushes):
         speed = sub(add(velocity[b], cross_spin(spin[b], r_b)), add(velocity[a], cross_spin(spin[a], r_a)))
         if pushes:
             speed = add_scaled(speed, gap[j], rate[j])
-            change = scale(multiplied(diagonal[j], others[j], speed), -mass_scale[j])
+            change = scale(symmetric_product(diagonal[j], others[j], speed), -mass_scale[j])
             change = add_scaled(change, old, -impulse_scale[j])
         else:
-            change = scale(multiplied(diagonal[j], others[j], speed), -1.0)
+            change = scale(symmetric_product(diagonal[j], others[j], speed), -1.0)
         new, limit = add(old, change), most[j] * step
         if limit < math.inf:
             size = length(new)
@@ -402,7 +411,7 @@ def pass_over_joints(solver, pushes):
 @part
 def solve_joints(solver, pushes):
     """One pass over the joints of a range; where they are solved at once two, as those that are not know of them."""
-    pass_over_joints(solver, pushes)
+    solve_joint_pass(solver, pushes)
     if solver.direct.begin < solver.direct.end:
         factorise(solver, pushes)
         if pushes:
@@ -410,7 +419,7 @@ def solve_joints(solver, pushes):
         solve_direct(solver, pushes)
         if solver.direct.mixed:
             solve_all_limited(solver, pushes)
-            pass_over_joints(solver, pushes)
+            solve_joint_pass(solver, pushes)
             solve_direct(solver, pushes)
             solve_all_limited(solver, pushes)
 
@@ -422,13 +431,13 @@ def relax_open(solver):
     for e in range(joints.opened):
         j = joints.open_row[e]
         a, b = joints.first[j], joints.second[j]
-        if swings(joints, j) or joints.at_once[j] != PASSED:
+        if is_soft_spring(joints, j) or joints.at_once[j] != BY_PASSES:
             continue
         if joints.kind[j] != POINT:
             solve_row(solver, j, False)
             continue
         old, speed = joints.push[j], speed_between(solver, j)
-        new, limit = sub(old, multiplied(joints.inverse[j], joints.inverse_products[j], speed)), joints.most[j]
+        new, limit = sub(old, symmetric_product(joints.inverse[j], joints.inverse_products[j], speed)), joints.most[j]
         size = length(new)
         if size > limit * joints.step:
             new = scale(new, limit * joints.step / size)

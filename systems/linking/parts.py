@@ -15,7 +15,7 @@ from ..shapes.linking.signatures import call_in_dimension, vector_type
 
 # Places in ``state.links``.
 BOUND_SEARCHES, FIRST_TOUCH, TAKE_TOGETHER = PLACES = range(3)
-SWEPT, IMPACTS = (BOUND_SEARCHES, FIRST_TOUCH), (FIRST_TOUCH, TAKE_TOGETHER)
+SWEPT_PARTS, IMPACT_PARTS = (BOUND_SEARCHES, FIRST_TOUCH), (FIRST_TOUCH, TAKE_TOGETHER)
 
 
 @cache

@@ -48,7 +48,7 @@ QUERY_SHAPES = (SphereCollider, AABBCollider)  # that queries ask with, beside c
 Kind = tuple[int, tuple[Stage, ...], frozenset[str], LinkedShapes | None, tuple[LinkedQuery, ...]]
 
 
-def kind_of(scene: Scene, integration: Integration, program: Program) -> Kind:
+def kind_of_world(scene: Scene, integration: Integration, program: Program) -> Kind:
     """What can be needed depends on this alone; the same for all worlds alike."""
     linked, registry, dimensions = scene.linked, scene.registry, scene.state.dimensions
     stages = program.stages
@@ -120,7 +120,7 @@ def keep_ready(scene: Scene, adoption: Adoption, components: tuple[type[Any], ..
 
 def link_needed(scene: Scene, integration: Integration, program: Program) -> None:
     """Compile or load now all that such a world may call."""
-    link_all(needed_functions(*kind_of(scene, integration, program)))
+    link_all(needed_functions(*kind_of_world(scene, integration, program)))
 
 
 def evaluate_forces(table: Table, bodies: Bodies, world: World) -> None:

@@ -14,13 +14,13 @@ from ..broad_phase.search import CandidateSearch
 from ..ccd.search_bounds import DISCRETE
 from ..extensions.extensions import Extensions
 from ..integration.system import Integration
-from ..records import SWEEPS
+from ..records import SWEEP_COLUMNS
 from ..scene import Scene
 from ..stage_list import LINKED_PARTS
-from .parts import IMPACTS, PLACES, SWEPT, linked_part
-from .preparation import kind_of, link_possible
+from .parts import IMPACT_PARTS, PLACES, SWEPT_PARTS, linked_part
+from .preparation import kind_of_world, link_possible
 
-NEVER = -1
+NEVER_LINKED = -1
 
 
 class StepLinks:
@@ -33,8 +33,8 @@ class StepLinks:
         self._integration, self._search, self._extensions = integration, search, extensions
         self._joints, self._parts = self._state.solver.joints, self._state.parts
         self._state.links = np.zeros(len(PLACES), np.int64)
-        self.version = NEVER  # of the scene
-        self._forces = NEVER, False  # how many force systems there were, and whether some of them turn
+        self.version = NEVER_LINKED  # of the scene
+        self._forces = NEVER_LINKED, False  # how many force systems there were, and whether some of them turn
         self._joined = False, False  # there are joints, and parts of bodies
         self._bounces = False  # some collider does, or has
         self._key: Any = None  # what the linked stages depend on
@@ -58,14 +58,14 @@ class StepLinks:
 
     def forget(self) -> None:
         """Other settings: link again before the next step."""
-        self.version, self._key = NEVER, None
+        self.version, self._key = NEVER_LINKED, None
 
     def link(self, force_systems: tuple[int, bool]) -> bool:
         """Compile or load what the step needs, and see to what later steps and queries may need.
 
         True if these are other stages than before; bodies that come and go seldom change that.
         """
-        self.version = NEVER  # until it is done
+        self.version = NEVER_LINKED  # until it is done
         scene, state = self._scene, self._state
         collides = state.collides
         joined = self._joined = self._have_joints_and_parts()
@@ -89,7 +89,7 @@ class StepLinks:
             self._key = None
             self._integration.prepare()
             if state.sweeps_ready:
-                scene.reserve(*SWEEPS)
+                scene.reserve(*SWEEP_COLUMNS)
             self._link_stages(conditions)
             self._link_possible()
             self._key = key
@@ -142,7 +142,7 @@ class StepLinks:
         any."""
         if not self._state.collides:
             return {}
-        places = {*(SWEPT if self._state.sweeps_ready else ()), *(IMPACTS if self._bounces else ())}
+        places = {*(SWEPT_PARTS if self._state.sweeps_ready else ()), *(IMPACT_PARTS if self._bounces else ())}
         return {place: linked_part(place, LINKED_PARTS[place], self._state.dimensions) for place in places}
 
     def link_shapes(self) -> None:
@@ -165,5 +165,5 @@ class StepLinks:
         """All that this world can need, when that may be more than before."""
         key = (self._scene.linked, self._scene.registry.version, self._integration.stages_possible)
         if key != self._kept_key:
-            link_possible(*kind_of(self._scene, self._integration, self._program))
+            link_possible(*kind_of_world(self._scene, self._integration, self._program))
             self._kept_key = key

@@ -72,26 +72,26 @@ def depth_by_plane(pairs, c, d):
 
 
 @part
-def deepest_possible(pairs, c, d):
+def depth_bound(pairs, c, d):
     """The most that the depth may be where the centres are d apart: nothing gets deeper by more than it moves."""
     depth = pairs.depth[c]
     return depth + length(sub(d, pairs.at[c])) if depth > -math.inf else math.inf
 
 
 @part
-def deepest_on_way(state, c):
+def depth_bound_on_path(state, c):
     """The most that the depth may be anywhere on the way of the step, however the two are turned there; infinity if
     one has had an impact, which leads it elsewhere."""
     bodies, pairs, a, b = state.bodies, state.pairs, state.pairs.a[c], state.pairs.b[c]
     if bodies.impact_count[a] + bodies.impact_count[b] > 0:
         return math.inf
-    depth = deepest_possible(pairs, c, centre_offset_at_start(bodies, a, b))
-    depth = max(depth, deepest_possible(pairs, c, centre_offset(bodies, a, b)))
+    depth = depth_bound(pairs, c, centre_offset_at_start(bodies, a, b))
+    depth = max(depth, depth_bound(pairs, c, centre_offset(bodies, a, b)))
     return depth + way_of_turning(bodies, a, bodies.turn[a]) + way_of_turning(bodies, b, bodies.turn[b])
 
 
 @part
-def plane_tells(state, c, d, extent):
+def is_plane_reliable(state, c, d, extent):
     """Whether the plane gives the depth there, but for a small part of the slop.
 
     What goes by t along the plane of two round shapes gets nearer by t^2 / 2 extent, or less. Of a concave shape
@@ -112,7 +112,7 @@ def depth_at(state, c, d, extent, exact):
     exact: as the function says; else but for a small part of the slop.
     """
     pairs = state.pairs
-    if is_at_manifold(pairs, c, d, extent) or (not exact and plane_tells(state, c, d, extent)):
+    if is_at_manifold(pairs, c, d, extent) or (not exact and is_plane_reliable(state, c, d, extent)):
         return depth_by_plane(pairs, c, d), pairs.normal[c]
     _, depth, normal, _ = evaluate_pair(state, pairs.a[c], pairs.b[c], d)
     return depth, normal
@@ -138,7 +138,7 @@ def mark_early(state):
 
 
 @inlined
-def is_near(state, span, c):
+def is_near_manifold(state, span, c):
     """Whether a solid pair may touch within the step, by its depth where free flight leads."""
     pairs = state.pairs
     return pairs.is_solid[c] and pairs.depth[c] >= -turning_margin(state, span, pairs.a[c], pairs.b[c])
@@ -155,7 +155,7 @@ def move_to_end(state, dt):
         c, near = pairs.hits[h], True
         if pairs.early[c]:
             make_manifold(state, c, centre_offset(bodies, pairs.a[c], pairs.b[c]))
-            near = pairs.hit[c] or is_near(state, dt, c)
+            near = pairs.hit[c] or is_near_manifold(state, dt, c)
         if near:
             pairs.hits[found] = c
             found += 1

@@ -9,11 +9,11 @@ from ..codes import OK, RUN_BROAD
 from ..integration.turning import size_of_turn
 from ..records import HALVES, PAIR_COLUMNS, SORTED
 from ..shapes.dispatch import evaluate_batch
-from .manifolds import is_near, mark_early
+from .manifolds import is_near_manifold, mark_early
 
 # Candidates are sorted by comparison if there are so many times more bodies, else by counting.
 BODIES_PER_CANDIDATE = 64
-FOLLOWED = 1.0  # rad in a step
+FAST_TURN = 1.0  # rad in a step
 SURE = 1.0 - 1e-12  # factor that makes a number less than the exact one, whatever the rounding
 
 
@@ -154,7 +154,7 @@ def is_solid_pair(state, a, b):
 
 
 @part
-def find_hasty(state, dt, struck):
+def flag_fast_bodies(state, dt, struck):
     """Note the body that moves farthest beyond its own extent, if that is more than the extent of the thinnest: where
     no pair is swept, the two may have passed through each other. Once before the impacts, and once with their speeds:
     what is ``struck`` meets others unseen until the next step, which takes it to be on the side where its centre is.
@@ -181,7 +181,7 @@ def find_fast_turns(state):
     moment of it."""
     bodies = state.bodies
     for i in range(state.first, state.moving if not state.sweeping else 0):
-        if bodies.rolling_radius[i] == 0.0 and size_of_turn(bodies.turn[i]) > FOLLOWED:
+        if bodies.rolling_radius[i] == 0.0 and size_of_turn(bodies.turn[i]) > FAST_TURN:
             state.turns_too_far = i + 1
 
 
@@ -193,7 +193,7 @@ def select_pairs(state, dt):
     for i in range(state.first, state.moving):  # that of static bodies is always 0
         bodies.force_speed_change[i] = length(sub(velocity[i], start[i])) if changed else 0.0
     state.too_fast_for_discrete, state.turns_too_far = False, 0
-    find_hasty(state, dt, False)
+    flag_fast_bodies(state, dt, False)
     if state.spinning:
         find_fast_turns(state)
     shape, kind, starts = bodies.shape, candidates.kind, candidates.bucket_starts
@@ -249,7 +249,7 @@ def collect_contacts(state, dt):
     span, found = dt if state.moved else 0.0, 0
     for c in range(pairs.count):
         hit = pairs.hit[c]
-        near = hit or pairs.early[c] or is_near(state, span, c)
+        near = hit or pairs.early[c] or is_near_manifold(state, span, c)
         pairs.near_contact[c] = near
         if hit or (near and span > 0.0):
             pairs.hits[found] = c

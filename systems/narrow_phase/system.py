@@ -10,7 +10,7 @@ from ...framework.schedule.phases import Phase
 from ...framework.schedule.stages import Program, PythonPart, Stage
 from ..ccd.search_bounds import sweep_pairs
 from ..scene import Scene
-from ..sleeping.stages import find_touched, weigh_sleepers
+from ..sleeping.stages import find_touched, measure_force_changes
 from ..staged import StagedSystem
 from .filters import filtered
 from .level_stages import evaluate_levels
@@ -42,7 +42,8 @@ class NarrowPhase(StagedSystem):
             room=ROOM_FOR_PAIRS,
         ),
         Stage(
-            weigh_sleepers, "what forces would do to sleepers", ("still", "flown_velocity"), ("force_speed_change",),
+            measure_force_changes, "what forces would do to sleepers", ("sleep_state", "flown_velocity"),
+            ("force_speed_change",),
             "sleeping", "bodies sleep",
         ),
         Stage(evaluate_pairs, "the shapes' functions", ("pairs", "position"), ("pairs",), "one level"),
@@ -56,7 +57,7 @@ class NarrowPhase(StagedSystem):
             "swept bodies", "pairs are near each other",
         ),
         Stage(
-            find_touched, "wakes what an awake body touches", ("pairs", "still"), ("still",), "sleeping",
+            find_touched, "wakes what an awake body touches", ("pairs", "sleep_state"), ("sleep_state",), "sleeping",
             "bodies sleep",
         ),
     )  # fmt: skip

@@ -68,8 +68,8 @@ class Quarantine:
     # -- snapshots --------------------------------------------------------------------------------
 
     def saved(self) -> dict[str, Any]:
-        told, lent = ([list(pair) for pair in known.items()] for known in (self.told, self._table.lent))
-        return {"told": told, "far": sorted(self._far), "lent": lent}
+        told, exposed = ([list(pair) for pair in known.items()] for known in (self.told, self._table.exposed))
+        return {"told": told, "far": sorted(self._far), "exposed": exposed}
 
     def take_back(self, saved: dict[str, Any]) -> bool:
         """True if some body may have been out, or is: the scene has to be made again."""
@@ -77,7 +77,7 @@ class Quarantine:
         self.told = dict(saved["told"])
         self._far, self._generation = set(saved["far"]), self._table.generation
         self._state.quarantining = bool(self.told)
-        for key, statics in saved.get("lent", [(key, True) for key in self._table.arrays]):
+        for key, statics in saved.get("exposed", [(key, True) for key in self._table.arrays]):
             self._table.lend(key, statics)  # they may hold what no step has looked at
         return out
 
@@ -89,23 +89,23 @@ class Quarantine:
         if bound != self._bound:
             self._checked = list(self._find_columns())
             self._bound = bound
-            self.follow_lent()
+            self.follow_exposed()
         if self._generation != self._table.generation:  # ids mean other entities
             self._generation = self._table.generation
             self.told.clear()
             self._far.clear()
         if self.told or self._state.bodies.quarantined.any():
             told = np.isin(self._table.column("entity"), list(self.told))  # also those that no column shows
-            self._scene.take_out(self._find_bad() | told)
+            self._scene.exclude(self._find_bad() | told)
 
-    def follow_lent(self) -> None:
+    def follow_exposed(self) -> None:
         """The stages look at the columns that code of the game can write in place; vectors also before a body has the
         component that they are of."""
-        lent, addresses = self._table.lent, []
+        exposed, addresses = self._table.exposed, []
         for checked in self._checked:
             key = checked.column.key
-            if key in lent or checked.array.ndim > 1:
-                checked.record.statics = lent.get(key, False)
+            if key in exposed or checked.array.ndim > 1:
+                checked.record.statics = exposed.get(key, False)
                 addresses.append(checked.record.address)
         self._state.checked = np.array(addresses, np.int64)
 
@@ -144,7 +144,7 @@ class Quarantine:
 
     def check_columns(self, dt: float) -> None:
         """At the start of a step: take out bodies with values that cannot be, and take in again what is mended."""
-        self._scene.take_out(self._find_bad())
+        self._scene.exclude(self._find_bad())
         self._state.quarantining = bool(self.told)
 
     def check_flight(self, dt: float) -> None:
@@ -152,7 +152,7 @@ class Quarantine:
         state, table, bodies = self._state, self._table, self._state.bodies
         moving, arrays = table.stops[1], table.arrays
         position, velocity = arrays["position"][:moving], arrays["linear_velocity"][:moving]
-        out = self._find_bad() if state.others_write else self.out_now()
+        out = self._find_bad() if state.others_write else self.excluded_now()
         failed = ~(np.isfinite(position).all(axis=1) & (np.abs(velocity) <= FASTEST).all(axis=1))
         for row in np.flatnonzero(failed & ~out[:moving]).tolist():
             self._tell_of_flight(row)
@@ -160,14 +160,14 @@ class Quarantine:
         gone = np.flatnonzero(out[:moving])
         position[gone], velocity[gone] = bodies.previous_position[gone], bodies.start_velocity[gone]
         self._tell_of_distance(np.flatnonzero(~out[:moving]), dt)
-        self._scene.take_out(out)
+        self._scene.exclude(out)
         if out.any():
             self._forget_contacts(out)
         still = set(arrays["entity"][: table.count][out].tolist())
         self.told = {entity: field for entity, field in self.told.items() if entity in still}
         state.quarantining = bool(self.told)
 
-    def tell(self, row: int, field: str, value: Any, prefix: str = "") -> None:
+    def report(self, row: int, field: str, value: Any, prefix: str = "") -> None:
         """A fault that names the body, unless that has been said."""
         entity = int(self._table.arrays["entity"][row])
         if entity in self.told:
@@ -179,7 +179,7 @@ class Quarantine:
             kind="quarantine", entity=entity,
         )  # fmt: skip
 
-    def out_now(self) -> np.ndarray:
+    def excluded_now(self) -> np.ndarray:
         """(count,) mask of the bodies that are out."""
         quarantined, count = self._state.bodies.quarantined, self._table.count
         return quarantined[:count].copy() if len(quarantined) else np.zeros(count, bool)
@@ -192,7 +192,7 @@ class Quarantine:
             for k in np.flatnonzero(checked.bad(rows)).tolist():
                 row = rows.start + k
                 found[row] = True
-                self.tell(row, checked.column.key, checked.array[row].tolist())
+                self.report(row, checked.column.key, checked.array[row].tolist())
         return found
 
     def _tell_of_flight(self, row: int) -> None:
@@ -203,11 +203,11 @@ class Quarantine:
             start["force"] = bodies.force[row]
         for field, value in start.items():
             if not (np.abs(value) <= (FASTEST if field == "linear_velocity" else np.finfo(float).max)).all():
-                self.tell(row, field, value.tolist())
+                self.report(row, field, value.tolist())
                 return
         finite = {field: np.isfinite(arrays[field][row]).all() for field in ("position", "linear_velocity")}
         field = "position" if finite["linear_velocity"] and not finite["position"] else "linear_velocity"
-        self.tell(row, field, arrays[field][row].tolist())
+        self.report(row, field, arrays[field][row].tolist())
 
     def _tell_of_distance(self, rows: np.ndarray, dt: float) -> None:
         """Name bodies that have not moved along an axis because numbers are too far apart where they are."""

@@ -21,7 +21,7 @@ NO_ROOM = -1  # in place of a number of hits
 
 
 @inlined
-def boxes_overlap(tree, place, low, high):
+def overlaps_tree_box(tree, place, low, high):
     """Whether the box at that place of the tree's order and low..high have a point in common; false for nan."""
     d, hit = len(low), True
     for k in range(d):
@@ -47,7 +47,7 @@ def places_of(grid, cells, n):
 
 
 @inlined
-def near_at(grid, n, start, end, outlined):
+def may_be_near_at(grid, n, start, end, outlined):
     """Bits of the boxes from ``start`` on in that line, up to LANES of them, that may overlap what is outlined."""
     code, guards = outlined
     some = (np.int64(1) << min(end - start, LANES)) - 1
@@ -70,7 +70,7 @@ def frame_of(grid):
 
 
 @inlined
-def rounding_of(point, low, high):
+def box_rounding(point, low, high):
     """Per axis more than all rounding errors of distances between the point and boxes inside of low..high."""
     result = point
     for k in range(len(point)):
@@ -161,7 +161,7 @@ def make_find_all(
                     return NO_ROOM
                 for place in range(begin, end):
                     batch.row[found] = tree.order[place]
-                    found += boxes_overlap(tree, place, low, high)
+                    found += overlaps_tree_box(tree, place, low, high)
         return found
 
     @pasted
@@ -173,7 +173,7 @@ def make_find_all(
             if found + (end - first) > len(batch.row):
                 return NO_ROOM
             for start in range(first, end, LANES):
-                bits = near_at(grid, n, start, end, outlined)
+                bits = may_be_near_at(grid, n, start, end, outlined)
                 while bits != 0:
                     batch.row[found] = row_at(grid, n, start + lowest_bit(bits))
                     bits &= bits - 1

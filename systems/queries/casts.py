@@ -15,11 +15,11 @@ from ..bits import lowest_bit
 from ..broad_phase.tree.cells import cells_of, cover, parts_of, uncertainty
 from ..broad_phase.uniform_grid import LANES, cells_around, outline
 from ..shapes.query import query_half_extents
-from .candidates import box_at, frame_of, is_wanted, nan_vector, near_at, places_of, rounding_of, row_at
-from .first_touch import LAST_STEP, Path, first_touch
+from .candidates import box_at, box_rounding, frame_of, is_wanted, may_be_near_at, nan_vector, places_of, row_at
+from .first_touch import LAST_STEP, Path, first_touch_of_cast
 from .records import ENDLESS
 
-SLACK = 1.0 + 4.0 * LAST_STEP  # so that bodies at the nearest distance are all tested, in whatever order
+SLICE_SLACK = 1.0 + 4.0 * LAST_STEP  # so that bodies at the nearest distance are all tested, in whatever order
 
 SLICE = 3.0  # cells; measured: 2 is as good, 6 is worse
 SHORTEST = 2.2250738585072014e-308  # m, the smallest normal number: at a length of 0 the distance is 0 too
@@ -39,7 +39,7 @@ def inverse_of(direction):
 
 
 @inlined
-def path_of(state, batch, q, rounding):
+def cast_path(state, batch, q, rounding):
     """The path of query q; rounding: what half extents exceed those of the query's shape by."""
     start, direction = batch.centre[q], batch.direction[q]
     half = add(query_half_extents(state, batch.query, q), rounding)
@@ -134,10 +134,10 @@ def keep_hit(state, batch, q, i, path, touch):
 @pasted
 def cast_at(state, batch, q, path, i, box, between):
     """Test row i if the path enters its box in the slice from between[0] to between[1]: each has its turn in one."""
-    reach = batch.search_limit[q] * SLACK
+    reach = batch.search_limit[q] * SLICE_SLACK
     enter, leave = box_interval(box[0], box[1], path, reach)
     if enter <= leave and between[0] <= enter < between[1] and is_wanted(state, batch, q, i):
-        touches, distance, normal, point = first_touch(state, batch, q, i, path, leave, reach)
+        touches, distance, normal, point = first_touch_of_cast(state, batch, q, i, path, leave, reach)
         if touches:
             keep_hit(state, batch, q, i, path, (distance, normal, point))
 
@@ -146,13 +146,13 @@ def cast_at(state, batch, q, path, i, box, between):
 def cast_in_grid(state, batch, grid, q):
     """What query q meets of the bodies in a grid: first of those outside of it, then slice by slice."""
     lowest, highest = frame_of(grid)
-    path = path_of(state, batch, q, rounding_of(batch.centre[q], lowest, highest))
+    path = cast_path(state, batch, q, box_rounding(batch.centre[q], lowest, highest))
     enter, leave = box_interval(lowest, highest, path, math.inf)
-    meets, first, batch.span = enter <= leave and enter <= batch.search_limit[q] * SLACK, -1, 0.0
+    meets, first, batch.span = enter <= leave and enter <= batch.search_limit[q] * SLICE_SLACK, -1, 0.0
     enter, leave = (enter, leave) if meets else (0.0, 0.0)
     begin = enter
     while True:
-        reach = batch.search_limit[q] * SLACK
+        reach = batch.search_limit[q] * SLICE_SLACK
         end = min(begin + SLICE / grid.inverse_cell, leave)
         low, high = slice_box(path, begin, min(end, reach))
         outlined, cells = outline(grid, low, high), cells_around(grid, low, high)
@@ -161,12 +161,12 @@ def cast_in_grid(state, batch, grid, q):
             first_place, behind = places_of(grid, cells, n)
             between = (-math.inf if n < 0 or begin == enter else begin, math.inf if n < 0 or last else end)
             for start in range(first_place, behind, LANES):
-                bits = near_at(grid, n, start, behind, outlined)
+                bits = may_be_near_at(grid, n, start, behind, outlined)
                 while bits != 0:
                     i = row_at(grid, n, start + lowest_bit(bits))
                     bits &= bits - 1
                     cast_at(state, batch, q, path, i, (state.bodies.lower[i], state.bodies.upper[i]), between)
-        if last or not end <= batch.search_limit[q] * SLACK:
+        if last or not end <= batch.search_limit[q] * SLICE_SLACK:
             return
         begin, first = end, 0
 
@@ -174,14 +174,14 @@ def cast_in_grid(state, batch, grid, q):
 @pasted
 def cast_in_tree(state, batch, tree, q):
     """The same of the bodies in a tree; nearly all cells in use lie in its extent."""
-    path = path_of(state, batch, q, uncertainty(tree, batch.centre[q]))
+    path = cast_path(state, batch, q, uncertainty(tree, batch.centre[q]))
     enter, leave = box_interval(tree.origin[0], add(tree.origin[0], tree.extent[0]), path, math.inf)
     used = begin_slices(batch, tree)
     batch.span = 0.0
     while used > 0:
         turn = earliest_slice(batch, used)
         level, begin = batch.slice_level[turn], batch.slice_begin[turn]
-        reach = batch.search_limit[q] * SLACK
+        reach = batch.search_limit[q] * SLICE_SLACK
         if not begin <= reach:
             break
         end = slice_end(tree, level, begin, enter, leave)

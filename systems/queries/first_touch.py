@@ -18,7 +18,7 @@ from ...framework.vectors import add_scaled, dot, length, scale
 from ..shapes.query import evaluate_against, sweep_against
 from .candidates import to_collider
 
-MAX_STEPS = 100  # a graze takes about 30; what still approaches after that counts as touching
+CAST_STEPS = 100  # a graze takes about 30; what still approaches after that counts as touching
 ROUNDING = 4e-16  # of the distance between the centres: a gap smaller than that is none
 LAST_STEP = 1e-9  # of the way: the most that rounding is made up for
 LONGEST_SPAN = 1e200  # m; on the way past bodies without end
@@ -55,7 +55,7 @@ def search_touch(state, batch, q, i, path, away, reach):
     """(touches, distance, normal, point) by steps along the path; reach: where to give up."""
     shape, direction = state.bodies.shape[i], path.direction
     distance, touches, normal, point = 0.0, False, away, away
-    for step in range(MAX_STEPS):
+    for step in range(CAST_STEPS):
         d = add_scaled(away, direction, 0.0 - distance)
         hit, depth, here, point = evaluate_against(state, batch.query, q, shape, i, d)
         rate = dot(direction, here)
@@ -70,7 +70,7 @@ def search_touch(state, batch, q, i, path, away, reach):
             break
         if further > reach:
             break
-        touches = step == MAX_STEPS - 1
+        touches = step == CAST_STEPS - 1
         if not further > distance:
             touches = True
             break
@@ -79,7 +79,7 @@ def search_touch(state, batch, q, i, path, away, reach):
 
 
 @pasted
-def first_touch(state, batch, q, i, path, leave, reach):
+def first_touch_of_cast(state, batch, q, i, path, leave, reach):
     """(touches, distance, normal, point) of query q on its path and row i, whose box it leaves at ``leave``."""
     away = to_collider(state, path.start, i)
     if not leave <= batch.span < SPAN_RATIO * leave:

@@ -13,12 +13,12 @@ from ..broad_phase.uniform_grid import LANES, cells_around, outline
 from ..shapes.query import evaluate_against
 from .candidates import (
     box_at,
+    box_rounding,
     frame_of,
     is_wanted,
+    may_be_near_at,
     nan_vector,
-    near_at,
     places_of,
-    rounding_of,
     row_at,
     to_collider,
 )
@@ -39,7 +39,7 @@ def squared_gap(low, high, point, slack):
 
 
 @pasted
-def improve(state, batch, q, i, gap):
+def improve_nearest(state, batch, q, i, gap):
     """Compare what query q has as its nearest with row i, the square of the distance to whose box is ``gap``."""
     point, ids, best = batch.centre[q], state.bodies.entity, batch.distance[q]
     outside = max(best, 0.0)
@@ -54,7 +54,7 @@ def improve(state, batch, q, i, gap):
 
 
 @inlined
-def around(point, reach, slack):
+def box_around(point, reach, slack):
     """The box that reaches so far from the point, and its uncertainty farther."""
     low, high = point, point
     for k in range(len(point)):
@@ -94,7 +94,7 @@ def improve_from_tree(state, batch, tree, q):
     slack = uncertainty(tree, point)
     reach, level = 0.0, top
     while True:
-        low, high = around(point, reach, slack)
+        low, high = box_around(point, reach, slack)
         if tree.level_end[level] > tree.level_begin[level]:
             runs = cover(tree, low, high, level)
             parts, wraps = parts_of(tree, level, runs)
@@ -102,7 +102,7 @@ def improve_from_tree(state, batch, tree, q):
                 begin, end = cells_of(tree, level, runs, part, wraps)
                 for place in range(begin, end):
                     lower, upper = box_at(tree, place)
-                    improve(state, batch, q, tree.order[place], squared_gap(lower, upper, point, slack))
+                    improve_nearest(state, batch, q, tree.order[place], squared_gap(lower, upper, point, slack))
         if level < top - 1:
             level += 1
             continue
@@ -124,22 +124,22 @@ def improve_from_grid(state, batch, grid, q):
     """The same with a grid: first what is outside of it, then boxes around the point that grow."""
     point, bodies = batch.centre[q], state.bodies
     lowest, highest = frame_of(grid)
-    slack, first = rounding_of(point, lowest, highest), FIRST_BOX / grid.inverse_cell
+    slack, first = box_rounding(point, lowest, highest), FIRST_BOX / grid.inverse_cell
     reach, begin = first, -1
     for k in range(len(point)):
         reach = max(reach, max(item(lowest, k) - item(point, k), item(point, k) - item(highest, k)) + first)
     while True:
         reach = min(reach, max(batch.distance[q], 0.0))
-        low, high = around(point, reach, slack)
+        low, high = box_around(point, reach, slack)
         outlined, cells = outline(grid, low, high), cells_around(grid, low, high)
         for n in range(begin, cells[1]):
             first_place, end = places_of(grid, cells, n)
             for start in range(first_place, end, LANES):
-                bits = near_at(grid, n, start, end, outlined)
+                bits = may_be_near_at(grid, n, start, end, outlined)
                 while bits != 0:
                     i = row_at(grid, n, start + lowest_bit(bits))
                     bits &= bits - 1
-                    improve(state, batch, q, i, squared_gap(bodies.lower[i], bodies.upper[i], point, slack))
+                    improve_nearest(state, batch, q, i, squared_gap(bodies.lower[i], bodies.upper[i], point, slack))
         best, covers = batch.distance[q], True
         for k in range(len(point)):
             covers &= (item(low, k) <= item(lowest, k)) & (item(high, k) >= item(highest, k))

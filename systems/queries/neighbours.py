@@ -28,12 +28,12 @@ def may_be_near(state, batch, q, centre, i):
 
 
 @inlined
-def is_near(state, batch, q, centre, i):
+def is_neighbour(state, batch, q, centre, i):
     """Whether row i is within the radius."""
     return length(sub(state.bodies.position[i], centre)) <= batch.radius
 
 
-find_near = make_find_all(box_of_body, may_be_near, is_near, in_grids=False)
+find_near = make_find_all(box_of_body, may_be_near, is_neighbour, in_grids=False)
 
 
 def find_neighbours(state, batch, points, unused, first, stop):

@@ -27,7 +27,7 @@ OTHER_FACE = 0.9  # of that: a way out that is shorter is not that of the face t
 
 
 @inlined
-def kind_of(state, shape_a, shape_b):
+def pair_index(state, shape_a, shape_b):
     """Where the tables have the pair of two shapes, in either order."""
     count = state.shapes.count
     return shape_a * count + shape_b if shape_a <= shape_b else shape_b * count + shape_a
@@ -40,7 +40,7 @@ def evaluate(state, shape_a, a, shape_b, b, d):
     The normal leads from a to b, the point is relative to a's centre; depth is negative while the two are apart. Two
     shapes that no plugin has a pair for never hit.
     """
-    shapes, kind = state.shapes, kind_of(state, shape_a, shape_b)
+    shapes, kind = state.shapes, pair_index(state, shape_a, shape_b)
     address, flipped, swapped = shapes.evaluate[kind], shapes.flipped[kind], shape_a > shape_b
     if address == 0:
         return False, -math.inf, d, d
@@ -79,7 +79,7 @@ def gives_way(state, shape_a, a, shape_b, b, d, slop):
 @inlined
 def has_corner_rule(state, shape_a, shape_b):
     """Whether the pair says itself when it touches at a corner."""
-    return state.shapes.corner[kind_of(state, shape_a, shape_b)] != 0
+    return state.shapes.corner[pair_index(state, shape_a, shape_b)] != 0
 
 
 @inlined
@@ -91,7 +91,7 @@ def both_sharp(state, shape_a, shape_b):
 @inlined
 def is_corner_touch(state, shape_a, a, shape_b, b, d, slop):
     """Whether the two touch by less than the slop and at a corner or an edge only, which is no contact."""
-    shapes, kind = state.shapes, kind_of(state, shape_a, shape_b)
+    shapes, kind = state.shapes, pair_index(state, shape_a, shape_b)
     address = shapes.corner[kind]
     if address == 0:
         return both_sharp(state, shape_a, shape_b) and gives_way(state, shape_a, a, shape_b, b, d, slop)
@@ -107,7 +107,7 @@ def sweep(state, shape_a, a, shape_b, b, d, v):
 
     The tables have sweeps only after ``fill(..., sweeps=True)``.
     """
-    shapes, kind = state.shapes, kind_of(state, shape_a, shape_b)
+    shapes, kind = state.shapes, pair_index(state, shape_a, shape_b)
     address = shapes.sweep[kind]
     if address == 0:
         return False, False, 0.0

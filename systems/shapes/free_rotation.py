@@ -15,7 +15,7 @@ import math
 from ...framework.compilation import part
 from .quaternions import product
 
-SWEEPS = 16  # of Jacobi rotations: each squares what is off the diagonal
+JACOBI_SWEEPS = 16  # of Jacobi rotations: each squares what is off the diagonal
 SPHERICAL = 1e-24  # square of the sine between momentum and angular velocity: less is none
 ENERGY_ROUNDING = 1e-14  # of the energy
 DIAGONAL = 1e-15  # of the trace: what is off the diagonal by less is rounding
@@ -106,7 +106,7 @@ def most_similar(inverse):
 
 
 @part
-def size_of(v, factor):
+def tensor_size(v, factor):
     x, y, z = factor * v[0], factor * v[1], factor * v[2]
     return math.sqrt(x * x + y * y + z * z)
 
@@ -117,10 +117,10 @@ def turn_freely(q, m, inverse, h):
     quaternion of the principal axes; m: angular momentum along them; inverse: 1 / principal moments."""
     energy, (j, k, other) = energy_of(m, inverse), most_similar(inverse)
     about_j, about_other = of_axis(inverse, j) - of_axis(inverse, k), of_axis(inverse, other) - of_axis(inverse, k)
-    turned = size_of(m, about_j * h) / PIECE
+    turned = tensor_size(m, about_j * h) / PIECE
     pieces = 1 + (int(turned) if turned < MOST_PIECES else MOST_PIECES)
     share, half = h / pieces, 0.5 * of_axis(inverse, k) * h
-    size = size_of(m, half)
+    size = tensor_size(m, half)
     sine = math.sin(size) / size * half if size > 0.0 else 0.0
     q = product(q, (math.cos(size), sine * m[0], sine * m[1], sine * m[2]))
     for _ in range(pieces):
@@ -135,7 +135,7 @@ def diagonalised(xx, yy, zz, xy, xz, yz):
     """(eigenvalues, unit quaternion that turns the coordinate axes onto the eigenvectors) of a symmetric matrix, by
     Jacobi's rotations (Golub and Van Loan, "Matrix computations", 8.5)."""
     q, small = (1.0, 0.0, 0.0, 0.0), DIAGONAL * (abs(xx) + abs(yy) + abs(zz))
-    for _ in range(SWEEPS):
+    for _ in range(JACOBI_SWEEPS):
         if abs(xy) + abs(xz) + abs(yz) <= small:
             break
         for k in range(3):

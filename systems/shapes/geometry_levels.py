@@ -22,7 +22,7 @@ from ...framework.plugins.registry import Registry
 from .linking.linked_shape import half_extents_of
 from .linking.linked_shapes import LinkedShapes
 
-COUNTERS = ("first_level_tests", "first_level_hits", "false_positives")
+LEVEL_COUNTERS = ("first_level_tests", "first_level_hits", "false_positives")
 
 # Of the outer level's size, which may stick out: sizes that were computed or stored in single precision still enclose.
 TOLERANCE = 1e-6

@@ -68,7 +68,7 @@ def pose_of(state, i):
 
 
 @part
-def tumbles(state, i):
+def has_unequal_moments(state, i):
     """Whether the axis about which body i turns by itself may move."""
     diagonal, products = state.bodies.inverse_inertia[i], state.bodies.inverse_products[i]
     if len(diagonal) == 2:
@@ -105,11 +105,11 @@ def momentum_along(q, inverse, spin):
 
 
 @part
-def lead_on(state, i, spin, h):
+def advance_pose(state, i, spin, h):
     """The vector by which body i turns freely in h seconds from that spin; its own spin and its inertia become those of
     that time, its shape stays."""
     bodies, own = state.bodies, state.bodies.spin[i]
-    if h == 0.0 or length(own) + length(spin) == 0.0 or not tumbles(state, i):
+    if h == 0.0 or length(own) + length(spin) == 0.0 or not has_unequal_moments(state, i):
         return scale(spin, h)
     inverse, q = principal_axes(state, i)
     m, mine = momentum_along(q, inverse, spin), momentum_along(q, inverse, own)
@@ -127,9 +127,9 @@ def lead_on(state, i, spin, h):
 
 
 @part
-def turn_on(state, i, spin, h):
+def rotate_pose(state, i, spin, h):
     """The same, and its shape turns by that."""
-    turn_shape(state, i, lead_on(state, i, spin, h))
+    turn_shape(state, i, advance_pose(state, i, spin, h))
 
 
 @part
@@ -146,6 +146,6 @@ def turn_to(state, i, end, spin, until, t):
     bodies.offset[i] = offset
     set_motion(state, i, motion)
     if t != until:
-        turn_on(state, i, spin, t - until)
+        rotate_pose(state, i, spin, t - until)
     elif bodies.shape[i] >= 0:
         write_rotated(state, bodies.shape[i], i, state.rotated)

@@ -73,7 +73,7 @@ def linked_query(registry: Registry, linked: LinkedShapes, component: type[Compo
         raise ValueError(f"no plugin has registered {component.__name__} as a shape, which this query needs")
     asking = registry.shapes[component]
     pairs = tuple(registry.pair(component, shape.component) for shape in linked.shapes)
-    return _made(asking, linked, pairs)
+    return _made_query(asking, linked, pairs)
 
 
 class LinkedQuery:
@@ -130,5 +130,5 @@ class LinkedQuery:
 
 
 @lru_cache(maxsize=CACHE_SIZE)
-def _made(asking: Shape, linked: LinkedShapes, pairs: tuple[Any, ...]) -> LinkedQuery:
+def _made_query(asking: Shape, linked: LinkedShapes, pairs: tuple[Any, ...]) -> LinkedQuery:
     return LinkedQuery(asking, linked, pairs)

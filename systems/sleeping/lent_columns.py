@@ -17,7 +17,7 @@ OF_BODIES = (
 MOVABLE, STATIC = range(2)
 
 
-class LentColumns:
+class ExposedColumns:
     """Copies of the rows that are still; of columns that were never lent there are none: they change in no such way."""
 
     def __init__(self, table: Table, scene: Scene) -> None:
@@ -34,12 +34,12 @@ class LentColumns:
         self._rows = np.split(rows, [int(rows.searchsorted(table.stops[1]))])
         self._ids = [table.column("entity")[each] for each in self._rows]
         self._version, self._copies = -1, {}
-        for key in table.lent if len(rows) else ():
+        for key in table.exposed if len(rows) else ():
             self.add(key)
 
     def add(self, key: str) -> None:
         """A column is lent, perhaps its static rows too."""
-        for group in (MOVABLE, STATIC) if self._table.lent[key] else (MOVABLE,):
+        for group in (MOVABLE, STATIC) if self._table.exposed[key] else (MOVABLE,):
             if len(self._ids[group]) and (key, group) not in self._copies and key in self._watched():
                 self._copies[key, group] = self._table.values(key, self._rows_now()[group])
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...framework.jit.records.record import Record
-from .stages import FALLING
+from .stages import FALLING_ASLEEP
 
 
 def links_with_falling(state: Record, links: np.ndarray) -> np.ndarray:
@@ -19,7 +19,7 @@ def links_with_falling(state: Record, links: np.ndarray) -> np.ndarray:
     fixed, body = np.maximum(a, b), np.minimum(a, b)
     some = (fixed >= dynamic) & (body >= 0) & (body < dynamic)
     fixed, body = fixed[some], body[some]
-    due = bodies.still[body] == FALLING
+    due = bodies.sleep_state[body] == FALLING_ASLEEP
     found = np.stack((bodies.entity[fixed[due]], bodies.island[body[due]]), axis=1)
     links = np.concatenate((links, found))
     links = links[np.lexsort((links[:, 1], links[:, 0]))]

@@ -14,15 +14,15 @@ from ...framework.schedule.stages import Program
 from ..contacts.solving.records import WARM_START_ROWS
 from ..records import CONTACT_ROWS, SLEEP_COLUMNS, SLEEPING
 from ..scene import ZERO_WHERE_STATIC, Scene
-from ..tracking import CONTACTS as CONTACT_NUMBERS
-from ..tracking import WARM_START, put_rows_back, saved_rows
-from .lent_columns import LentColumns
+from ..tracking import CONTACT_NUMBERS as CONTACT_NUMBERS
+from ..tracking import WARM_START_NUMBERS, put_rows_back, saved_rows
+from .lent_columns import ExposedColumns
 from .links import links_with_falling
-from .stages import AWAKE, DISTURBED, FALLING, STILL
-from .stored import CONTACTS, IMPULSES, Stored
+from .stages import ASLEEP, AWAKE, FALLING_ASLEEP, WAKING
+from .stored import CONTACT_COLUMNS, IMPULSE_COLUMNS, Stored
 
-PUSHES = ("applied_force", "applied_frame", "step_force")
-PATH = ("origin", "path_velocity", "path_second", "path_third")
+PUSH_COLUMNS = ("applied_force", "applied_frame", "step_force")
+PATH_COLUMNS = ("origin", "path_velocity", "path_second", "path_third")
 
 
 class Sleepers:
@@ -38,13 +38,13 @@ class Sleepers:
 
     def __init__(self, state: Record, table: Table, scene: Scene, program: Program) -> None:
         self._state, self._table, self._scene, self._program = state, table, scene, program
-        self._lent = LentColumns(table, scene)
+        self._exposed = ExposedColumns(table, scene)
         self._disturbed = False  # some are marked, or may be
         self._pushed = False
         self._still_count = -1  # with what cannot move, when the contacts were kept
         self._placed: Any = None  # rows and arrays in which sleepers are as what does not move
-        self.contacts = Stored(state.contacts, CONTACTS, CONTACT_ROWS)
-        self.impulses = Stored(state.warm_start, IMPULSES, WARM_START_ROWS)
+        self.contacts = Stored(state.contacts, CONTACT_COLUMNS, CONTACT_ROWS)
+        self.impulses = Stored(state.warm_start, IMPULSE_COLUMNS, WARM_START_ROWS)
         self._dt = 1.0  # s, of the step that the impulses are of
         self.links = self.sizes = np.empty((0, 2), np.int64)
         self._followed: Any = None  # the structure that all this is of
@@ -91,11 +91,11 @@ class Sleepers:
         if words[self._due] or (words[self._asleep] and words[self._fresh]):
             self._fall_asleep(table.stops[1])
         if words[self._asleep]:
-            self._mark(self._lent.changed())
+            self._mark(self._exposed.changed())
             if self._changes_taken:
                 self._disturb_near(np.array(self._changes_taken))
         quiet = not self._disturbed and not fresh and state.asleep == table.blocks[0]
-        state.pushes = self._pushed or words[self._pushing] or not table.lent.keys().isdisjoint(PUSHES)
+        state.pushes = self._pushed or words[self._pushing] or not table.exposed.keys().isdisjoint(PUSH_COLUMNS)
         self._disturbed = self._pushed = False
         self._leave_out(table.blocks[0] if quiet else 0)
 
@@ -109,9 +109,9 @@ class Sleepers:
             self._followed = self._structure()
             self.links = links_with_falling(state, self.links)
         if state.due or (state.first == 0 and (state.asleep or table.blocks[0])):
-            table.settle(self._still()[: table.stops[0]] == STILL)
+            table.settle(self._still()[: table.stops[0]] == ASLEEP)
             self._followed = self._structure()
-            self._lent.take(np.flatnonzero(self._still() > AWAKE))
+            self._exposed.take(np.flatnonzero(self._still() > AWAKE))
         self.on = state.sleeping or self._all_wake
         table.on_written = self._mark_row if self.on else None
 
@@ -132,20 +132,20 @@ class Sleepers:
         if rows:
             bodies.force_speed_change[:rows] = np.linalg.norm(bodies.flown_velocity[:rows], axis=1)
 
-    def _join(self) -> None:
+    def _rejoin_step(self) -> None:
         """Within a step: all take part in what is left of it."""
         state, bodies, rows = self._state, self._state.bodies, self._state.first
         if not rows:
             return
         self._leave_out(0)
         state.force_first, state.all_still = 0, False
-        bodies.caught[:rows], bodies.last_impact[:rows] = 0, -1.0
+        bodies.trapped_impacts[:rows], bodies.last_impact[:rows] = 0, -1.0
 
     def look(self) -> None:
         """Code of the game has run within the step, before the flight."""
-        self._mark(self._lent.changed())
-        if self._state.first and (self._still() == DISTURBED).any():
-            self._join()
+        self._mark(self._exposed.changed())
+        if self._state.first and (self._still() == WAKING).any():
+            self._rejoin_step()
 
     def _versions(self) -> int:
         """Another number whenever rows, their components, static bodies or arrays may be others."""
@@ -161,8 +161,8 @@ class Sleepers:
         before, self._followed = self._followed, structure
         if self._state.due:
             self._keep()
-            falling = np.flatnonzero(self._still() == FALLING)
-            self._state.bodies.still[falling] = AWAKE
+            falling = np.flatnonzero(self._still() == FALLING_ASLEEP)
+            self._state.bodies.sleep_state[falling] = AWAKE
             self._state.bodies.rest_steps[falling] = 0
             self._state.due = 0
         if not self._state.asleep:
@@ -183,7 +183,7 @@ class Sleepers:
         """What is due is still from now on; so is all that cannot move."""
         self._keep()
         state, table, bodies = self._state, self._table, self._state.bodies
-        bodies.still[moving : table.count] = STILL
+        bodies.sleep_state[moving : table.count] = ASLEEP
         state.due = state.fresh_statics = 0
         self._exchange()
 
@@ -204,24 +204,24 @@ class Sleepers:
         still = self._table.arrays.get("_still")
         if still is None or not len(rows) or not len(rows := rows[still[rows] > AWAKE]):
             return
-        still[rows] = DISTURBED
+        still[rows] = WAKING
         self._disturbed = True
         if self._table.in_step and self._state.moved:  # they look for others already
-            self._join()
+            self._rejoin_step()
 
     def _mark_row(self, row: int, key: str, value: Any) -> None:
         """Code of the game writes to that row. A push that is the same in each step wakes nothing, nor does a value
         that it has."""
-        if key in PUSHES:
+        if key in PUSH_COLUMNS:
             self._pushed = True
             return
         still = self._table.arrays.get("_still")
         if still is not None and still.item(row) > AWAKE and (key == "" or self._table.is_other(key, row, value)):
-            still[row], self._disturbed = DISTURBED, True
+            still[row], self._disturbed = WAKING, True
 
     def watch(self, key: str) -> None:
         """Code of the game may write that column in place from now on."""
-        self._lent.add(key)
+        self._exposed.add(key)
 
     def follow_change(self, column: ArrayColumn, row: int, before: int, inside: np.ndarray) -> None:
         """The shape of a row has changed inside of these boxes: that disturbs nothing farther away."""
@@ -232,7 +232,7 @@ class Sleepers:
             self.disturb(table.column("entity")[row : row + 1])
         place = table.column("position")[row]
         self._changes += (inside + np.concatenate((place, place))).tolist()
-        self._lent.replace(column.key, row)
+        self._exposed.replace(column.key, row)
 
     def _disturb_near(self, changes: np.ndarray) -> None:
         """Wake what sleeps in these boxes or touches them."""
@@ -240,7 +240,7 @@ class Sleepers:
         known_until = state.neighbours_known_until
         self.box_now()
         state.neighbours_known_until = known_until
-        d, rows = state.dimensions, np.flatnonzero(bodies.still[: self._table.stops[0]] > AWAKE)
+        d, rows = state.dimensions, np.flatnonzero(bodies.sleep_state[: self._table.stops[0]] > AWAKE)
         lower, upper = bodies.lower[rows, None], bodies.upper[rows, None]
         near = ((lower <= changes[:, d:]) & (upper >= changes[:, :d])).all(axis=2).any(axis=1)
         if near.any():
@@ -251,23 +251,23 @@ class Sleepers:
         """Those that are marked, and their islands; returns the rows of the dynamic ones."""
         self._keep()
         bodies = self._state.bodies
-        rows = np.flatnonzero(self._still() == DISTURBED)
+        rows = np.flatnonzero(self._still() == WAKING)
         standing = self.links[np.isin(self.links[:, 0], bodies.entity[rows]), 1]
-        bodies.still[rows], bodies.rest_steps[rows] = AWAKE, 0
+        bodies.sleep_state[rows], bodies.rest_steps[rows] = AWAKE, 0
         return self._wake(np.concatenate((bodies.island[rows], standing)), rows)
 
     def wake_touched(self, simulation: Any, dt: float) -> None:
         """An awake body has come near: the islands have the flight that they were spared, and their pairs."""
-        self._join()
+        self._rejoin_step()
         rows = self.wake_disturbed()
         if self._state.moved:
-            self._fly(rows, dt)
+            self._apply_flight(rows, dt)
         simulation.broad_phase.process(dt)
         simulation.narrow_phase.process(dt)
 
     def wake_candidates(self, dt: float) -> bool:
         """In the middle of a step candidates are others: wake what meets the box of an awake body. Whether any does."""
-        state, still = self._state, self._state.bodies.still
+        state, still = self._state, self._state.bodies.sleep_state
         if not state.sleeping or not state.asleep:
             return False
         candidates = state.candidates
@@ -275,18 +275,18 @@ class Sleepers:
         rows = rows[(rows < state.dynamic) & (still[rows] > AWAKE)]
         if not len(rows):
             return False
-        still[rows] = DISTURBED
+        still[rows] = WAKING
         joins = state.first > 0
-        self._join()
-        self._fly(self.wake_disturbed(), dt)
+        self._rejoin_step()
+        self._apply_flight(self.wake_disturbed(), dt)
         if joins:
             self._program.run_one("box_rest_of_step", dt)
         return True
 
-    def _fly(self, rows: np.ndarray, dt: float) -> None:
+    def _apply_flight(self, rows: np.ndarray, dt: float) -> None:
         """The free flight of this step, which is that of all steps, and its path; the paths of others stay."""
         bodies, moving = self._state.bodies, self._state.moving
-        kept = {name: column[:moving].copy() for name in PATH if len(column := getattr(bodies, name))}
+        kept = {name: column[:moving].copy() for name in PATH_COLUMNS if len(column := getattr(bodies, name))}
         bodies.position[rows], bodies.linear_velocity[rows] = bodies.flown_position[rows], bodies.flown_velocity[rows]
         if self._state.flies:
             bodies.flight_velocity[rows], bodies.acceleration[rows] = 0.0, 0.5 * bodies.flown_velocity[rows] / dt
@@ -300,7 +300,7 @@ class Sleepers:
         """All of them, without their flight."""
         self._keep()
         bodies = self._state.bodies
-        if len(bodies.still):
+        if len(bodies.sleep_state):
             self._still()[:] = AWAKE
             bodies.rest_steps[: self._table.count] = 0
         self._state.due = self._state.fresh_statics = 0
@@ -311,9 +311,9 @@ class Sleepers:
         """These islands are awake; returns the rows of their bodies, and of dynamic ones that are ``disturbed``."""
         bodies, dynamic = self._state.bodies, self._table.stops[0]
         islands = np.unique(islands[islands != 0])
-        asleep = bodies.still[:dynamic] > AWAKE
+        asleep = bodies.sleep_state[:dynamic] > AWAKE
         rows = np.flatnonzero(asleep & np.isin(bodies.island[:dynamic], islands))
-        bodies.still[rows], bodies.rest_steps[rows] = AWAKE, 0
+        bodies.sleep_state[rows], bodies.rest_steps[rows] = AWAKE, 0
         self.links = self.links[~np.isin(self.links[:, 1], islands)]
         self._exchange()
         alone = np.asarray(disturbed, np.int64)
@@ -326,7 +326,7 @@ class Sleepers:
         state, memory, still = self._state, self._state.warm_start, self._still()
         state.asleep = int(np.count_nonzero(still[: self._table.stops[0]] > AWAKE))
         if not state.asleep:
-            state.bodies.rest_steps[: len(still)][still == DISTURBED] = 0  # woken before it fell asleep
+            state.bodies.rest_steps[: len(still)][still == WAKING] = 0  # woken before it fell asleep
             still[:] = AWAKE
             state.fresh_statics = 0
         now = memory.now
@@ -359,12 +359,12 @@ class Sleepers:
         return (one >= 0) & (other >= 0) & (still[one] > AWAKE) & (still[other] > AWAKE)
 
     def _still(self) -> np.ndarray:
-        return self._state.bodies.still[: self._table.count]
+        return self._state.bodies.sleep_state[: self._table.count]
 
     def _islands(self) -> np.ndarray:
         """The island of each sleeper."""
         bodies, dynamic = self._state.bodies, self._table.stops[0]
-        return bodies.island[:dynamic][bodies.still[:dynamic] > AWAKE]
+        return bodies.island[:dynamic][bodies.sleep_state[:dynamic] > AWAKE]
 
     # -- a step that fails, snapshots -------------------------------------------------------------
 
@@ -372,11 +372,11 @@ class Sleepers:
         """What a failed step puts back, before the first change in it."""
         if self.kept is None:
             state, bodies, count = self._state, self._state.bodies, self._table.count
-            names = [name for name in ("still", "rest_steps", "island") if len(getattr(bodies, name))]
+            names = [name for name in ("sleep_state", "rest_steps", "island") if len(getattr(bodies, name))]
             self.kept = (
                 {name: getattr(bodies, name)[:count].copy() for name in names},
                 self._saved_parts(), self._followed, self._all_wake,
-                saved_rows(state.warm_start, WARM_START), saved_rows(state.contacts, CONTACT_NUMBERS),
+                saved_rows(state.warm_start, WARM_START_NUMBERS), saved_rows(state.contacts, CONTACT_NUMBERS),
             )  # fmt: skip
 
     def abandon_step(self) -> None:
@@ -418,7 +418,7 @@ class Sleepers:
     def notice_written(self) -> None:
         """What code of the game has written into since the last step wakes."""
         if self.on:
-            self._mark(self._lent.changed())
+            self._mark(self._exposed.changed())
 
     def saved(self) -> dict[str, Any] | None:
         """For snapshots; also whether bodies have come or gone since the last step, and whether all wake."""
@@ -435,8 +435,8 @@ class Sleepers:
         state = self._state
         self.kept, self._followed, self._seen = None, None, -1
         self._leave_out(0)
-        self._placed, self._disturbed, self._pushed = None, bool((self._still() == DISTURBED).any()), True
-        self._lent.take(np.flatnonzero(self._still() > AWAKE))
+        self._placed, self._disturbed, self._pushed = None, bool((self._still() == WAKING).any()), True
+        self._exposed.take(np.flatnonzero(self._still() > AWAKE))
         self._changes = [] if saved is None else list(saved.get("changes", ()))
         if saved is None:
             self.contacts.clear()

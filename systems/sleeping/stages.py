@@ -14,10 +14,10 @@ from ..islands import join_roots, root_of
 from ..shapes.tolerances import contact_margin
 
 # Values of ``bodies.still``. FALLING: its first step asleep is the next one. What cannot be moved is still, too.
-AWAKE, STILL, FALLING, DISTURBED = 0, 1, 2, -1
+AWAKE, ASLEEP, FALLING_ASLEEP, WAKING = 0, 1, 2, -1
 
 # Stages without which nothing can sleep, as bits of ``state.sleep_stages``: a game may have replaced their systems.
-RESTED, LEFT_OUT, TOUCHED = 1, 2, 4
+HAS_RESTING, HAS_LEFT_OUT, HAS_TOUCHED = 1, 2, 4
 ALL_BODIES = -1  # in place of the number of those that fall asleep: all wake
 
 REST_TIME = 0.5  # s at rest before sleep,
@@ -31,11 +31,11 @@ UNMOVED_SIZES = 1e-6  # of the extent, per step: what is slower is, without forc
 GOES_ON = 0.5  # of the way at its speed: what goes farther slides and is not held, what rattles or leans is
 LOOK_EVERY = 4  # steps; islands need not be joined in each
 FIRST_SHARE = 0.05  # of what forces change: they may differ by it when its velocity has become 0
-THROW = 3.0  # times the highest speed there is: what an impact may make of a body within the step
+THROW_FACTOR = 3.0  # times the highest speed there is: what an impact may make of a body within the step
 
 
 @inlined
-def same(one, other):
+def is_same_vector(one, other):
     """Whether two vectors have the same numbers; nan is none."""
     equal = True
     for k in range(len(one)):
@@ -56,8 +56,8 @@ def is_pushed_otherwise(state, i, dt):
     bodies, free = state.bodies, state.has_force_systems or state.others_write
     if len(bodies.force) == 0:
         return False
-    if bodies.still[i] == STILL:
-        return not same(bodies.force[i], bodies.rest_force[i])
+    if bodies.sleep_state[i] == ASLEEP:
+        return not is_same_vector(bodies.force[i], bodies.rest_force[i])
     push = length(sub(bodies.force[i], bodies.rest_force[i])) * bodies.inverse_mass[i] * dt
     bodies.rest_force[i] = bodies.force[i]
     return not push <= (FIRST_SHARE * bodies.force_speed_change[i] if free else 0.0)
@@ -65,12 +65,12 @@ def is_pushed_otherwise(state, i, dt):
 
 def look_at_sleepers(state, dt):
     """Disturb what other forces act on; Python looks for what code of the game has written in this step."""
-    still, disturbed = state.bodies.still, False
+    still, disturbed = state.bodies.sleep_state, False
     if state.asleep == 0:
         return OK
     for i in range(state.force_first, state.dynamic):
         if still[i] > AWAKE and is_pushed_otherwise(state, i, dt):
-            still[i], disturbed = DISTURBED, True
+            still[i], disturbed = WAKING, True
     return LOOK if state.others_write or (disturbed and state.first > 0) else OK
 
 
@@ -79,26 +79,26 @@ def is_lively(state):
     """Whether anything is awake that could meet another."""
     bodies, lively = state.bodies, False
     for i in range(state.first, state.moving):
-        lively |= bodies.still[i] == AWAKE and bodies.shape[i] >= 0
+        lively |= bodies.sleep_state[i] == AWAKE and bodies.shape[i] >= 0
     return lively
 
 
 def rest_sleepers(state, dt):
     """Where some are disturbed all have flown: what sleeps on is back where it rests, without speed."""
-    bodies, still, zero, disturbed, fresh = state.bodies, state.bodies.still, zero_of(state), False, 0
-    state.sleep_stages |= RESTED
+    bodies, still, zero, disturbed, fresh = state.bodies, state.bodies.sleep_state, zero_of(state), False, 0
+    state.sleep_stages |= HAS_RESTING
     if state.asleep == 0:
         return OK
     for i in range(state.count if state.first == 0 else 0):
-        disturbed |= still[i] == DISTURBED
+        disturbed |= still[i] == WAKING
     if disturbed:
         return WAKE
     for i in range(state.dynamic if state.first == 0 else 0):
         if still[i] == AWAKE:
             continue
-        if still[i] == FALLING:
+        if still[i] == FALLING_ASLEEP:
             bodies.flown_position[i], bodies.flown_velocity[i] = bodies.position[i], bodies.linear_velocity[i]
-        still[i] = STILL
+        still[i] = ASLEEP
         bodies.position[i], bodies.linear_velocity[i] = bodies.rest_position[i], zero
         bodies.path_velocity[i] = zero
         if state.path_degree > 1:
@@ -106,7 +106,7 @@ def rest_sleepers(state, dt):
     for i in range(state.moving, state.count if state.first == 0 else 0):
         fresh += still[i] == AWAKE
     for i in range(state.dynamic, state.moving):
-        still[i] = STILL if still[i] == FALLING else still[i]
+        still[i] = ASLEEP if still[i] == FALLING_ASLEEP else still[i]
     state.fresh_statics = fresh
     state.all_still = fresh == 0 and not is_lively(state)
     return OK
@@ -117,8 +117,8 @@ def rest_sleepers(state, dt):
 
 def leave_out_still(state, dt):
     """Pairs of two bodies that are still are no candidates."""
-    candidates, still, kept = state.candidates, state.bodies.still, 0
-    state.sleep_stages |= LEFT_OUT
+    candidates, still, kept = state.candidates, state.bodies.sleep_state, 0
+    state.sleep_stages |= HAS_LEFT_OUT
     if state.asleep == 0:
         return OK
     first, second = candidates.first, candidates.second
@@ -130,11 +130,11 @@ def leave_out_still(state, dt):
     return OK
 
 
-def weigh_sleepers(state, dt):
+def measure_force_changes(state, dt):
     """What forces would change of the speed of sleepers, for the margins of their pairs."""
     bodies = state.bodies
     for i in range(state.dynamic if state.asleep > 0 and state.first == 0 and state.pairs.count > 0 else 0):
-        if bodies.still[i] == STILL:
+        if bodies.sleep_state[i] == ASLEEP:
             bodies.force_speed_change[i] = length(bodies.flown_velocity[i])
     return OK
 
@@ -146,7 +146,7 @@ def highest_speed(state):
     for i in range(state.first, state.moving):
         u, v = bodies.start_velocity[i], bodies.linear_velocity[i]
         square = max(dot(u, u), dot(v, v))
-        if bodies.still[i] == AWAKE and square > fastest:
+        if bodies.sleep_state[i] == AWAKE and square > fastest:
             fastest = square
     return math.sqrt(fastest)
 
@@ -156,9 +156,9 @@ def reach_of_next_step(state, dt):
     """How far, at most, what is awake will wake others, if nothing but forces makes it faster."""
     bodies, change = state.bodies, 0.0
     for i in range(state.first, state.dynamic):
-        if bodies.still[i] == AWAKE:
+        if bodies.sleep_state[i] == AWAKE:
             change = max(change, bodies.force_speed_change[i])
-    return THROW * (highest_speed(state) + change) * dt
+    return THROW_FACTOR * (highest_speed(state) + change) * dt
 
 
 @inlined
@@ -169,18 +169,18 @@ def wakes(state, dt, c, reach):
 
 def find_touched(state, dt):
     """Wake what an awake body touches, or may touch after impacts in this step."""
-    pairs, still, disturbed = state.pairs, state.bodies.still, False
-    state.sleep_stages |= TOUCHED
+    pairs, still, disturbed = state.pairs, state.bodies.sleep_state, False
+    state.sleep_stages |= HAS_TOUCHED
     if state.asleep == 0 or pairs.count == 0:
         return OK
-    reach = THROW * highest_speed(state) * dt
+    reach = THROW_FACTOR * highest_speed(state) * dt
     for c in range(pairs.count):
         a, b = pairs.a[c], pairs.b[c]
-        i, other = (a, b) if still[a] == STILL and a < state.dynamic else (b, a)
-        if not (pairs.is_solid[c] and i < state.dynamic and still[i] == STILL and still[other] <= AWAKE):
+        i, other = (a, b) if still[a] == ASLEEP and a < state.dynamic else (b, a)
+        if not (pairs.is_solid[c] and i < state.dynamic and still[i] == ASLEEP and still[other] <= AWAKE):
             continue
         if pairs.near_contact[c] or wakes(state, dt, c, reach if other < state.moving else 0.0):
-            still[i], disturbed = DISTURBED, True
+            still[i], disturbed = WAKING, True
     return WAKE_TOUCHED if disturbed else OK
 
 
@@ -233,10 +233,10 @@ def is_at_rest(state, i, dt):
 
 
 @part
-def stands_still(state, i):
+def is_unmoved_by_itself(state, i):
     """Whether a body that moves by its own velocity alone has none."""
     bodies = state.bodies
-    return is_zero(bodies.linear_velocity[i]) and same(bodies.position[i], bodies.previous_position[i])
+    return is_zero(bodies.linear_velocity[i]) and is_same_vector(bodies.position[i], bodies.previous_position[i])
 
 
 @part
@@ -245,8 +245,8 @@ def count_rest(state, dt, needed):
     that cannot be moved, where others sleep."""
     bodies, ripe, last = state.bodies, False, state.moving if state.asleep > 0 else state.dynamic
     for i in range(state.first, state.moving):
-        if bodies.still[i] == AWAKE:
-            rests = is_at_rest(state, i, dt) if i < state.dynamic else stands_still(state, i)
+        if bodies.sleep_state[i] == AWAKE:
+            rests = is_at_rest(state, i, dt) if i < state.dynamic else is_unmoved_by_itself(state, i)
             bodies.rest_steps[i] = bodies.rest_steps[i] + 1 if rests else 0
             if bodies.rest_steps[i] <= 1:
                 bodies.rest_position[i] = bodies.position[i]
@@ -267,7 +267,7 @@ def join_islands(state, dt, needed):
     stands on something that moves, or that a system disables the contact with.
     """
     bodies, pairs, root, keeps_awake = state.bodies, state.pairs, state.bodies.rest_root, state.bodies.keeps_awake
-    still = bodies.still
+    still = bodies.sleep_state
     for i in range(state.first, state.dynamic):
         root[i], keeps_awake[i] = i, bodies.rest_steps[i] < needed or not is_unmoved(state, i, dt)
     for c in range(pairs.count):
@@ -316,7 +316,7 @@ def join_islands(state, dt, needed):
 def put_to_sleep(state, i):
     """Row i is still from the next step on, if nothing changes until then."""
     bodies = state.bodies
-    bodies.still[i], bodies.rest_position[i] = FALLING, bodies.position[i]
+    bodies.sleep_state[i], bodies.rest_position[i] = FALLING_ASLEEP, bodies.position[i]
     bodies.linear_velocity[i] = zero_of(state)
 
 
@@ -325,7 +325,7 @@ def update_sleep(state, dt):
     bodies, due = state.bodies, 0
     if state.unsound != 0:
         return OK
-    if not state.moved or state.sleep_stages != RESTED | LEFT_OUT | TOUCHED:
+    if not state.moved or state.sleep_stages != HAS_RESTING | HAS_LEFT_OUT | HAS_TOUCHED:
         state.due = ALL_BODIES if state.asleep > 0 else 0
         return OK
     needed = max(REST_STEPS, math.ceil(REST_TIME / dt))
@@ -334,12 +334,12 @@ def update_sleep(state, dt):
     join_islands(state, dt, needed)
     for i in range(state.first, state.dynamic):
         first = root_of(bodies.rest_root, i)
-        if bodies.still[i] == AWAKE and not bodies.keeps_awake[first]:
+        if bodies.sleep_state[i] == AWAKE and not bodies.keeps_awake[first]:
             put_to_sleep(state, i)
             bodies.rest_force[i], bodies.island[i] = bodies.force[i], bodies.entity[first]
             due += 1
     for i in range(state.dynamic, state.moving if due > 0 or state.asleep > 0 else state.dynamic):
-        if bodies.still[i] == AWAKE and bodies.rest_steps[i] >= needed:
+        if bodies.sleep_state[i] == AWAKE and bodies.rest_steps[i] >= needed:
             put_to_sleep(state, i)
             due += 1
     state.due = due

@@ -16,8 +16,8 @@ from ...framework.jit.records.schema import Section
 
 Columns = dict[str, np.ndarray]
 
-CONTACTS = ("entity_a", "entity_b", "point", "normal", "depth", "impulse", "enabled", "rested")
-IMPULSES = ("entity_a", "entity_b", "place", "normal", "impulse", "tangent", "push", "closing")
+CONTACT_COLUMNS = ("entity_a", "entity_b", "point", "normal", "depth", "impulse", "enabled", "rested")
+IMPULSE_COLUMNS = ("entity_a", "entity_b", "place", "normal", "impulse", "tangent", "push", "closing")
 
 
 def merged(one: Columns, other: Columns) -> tuple[Columns, np.ndarray]:

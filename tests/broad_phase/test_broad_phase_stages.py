@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from worlds import both_dimensions
 
 from carom.systems.broad_phase.brute_force import BRUTE_FORCE_MAX
-from carom.systems.broad_phase.stages import BRUTE_FORCE, TREE, UNIFORM_GRID
+from carom.systems.broad_phase.stages import BRUTE_FORCE, SPATIAL_TREE, UNIFORM_GRID
 from carom.systems.codes import FIND_IN_PYTHON
 
 
@@ -92,7 +92,7 @@ def test_uneven_boxes_are_left_to_trees(d, moving, static):
     boxes = Boxes(d)
     boxes.set(lower, upper, moving)
     assert pair_set(*boxes.find()) == overlapping(lower, upper, moving)
-    assert boxes.state.pair_search == TREE
+    assert boxes.state.pair_search == SPATIAL_TREE
     assert ("quadtree" if d == 2 else "octree") in boxes.search.describe()
     lower, upper = spread(rng, moving + static, d)  # and grids take over again
     boxes.set(lower, upper, moving)

@@ -16,7 +16,7 @@ from carom.systems.broad_phase.brute_force import BRUTE_FORCE_MAX
 from carom.systems.broad_phase.stages import CANDIDATE_LIMIT, UNIFORM_GRID
 from carom.systems.broad_phase.tree.tree import CandidateLimitError
 from carom.systems.broad_phase.uniform_grid import OUTSIDE_MAX
-from carom.systems.record_buffers import SPARE
+from carom.systems.record_buffers import SPARE_ROWS
 
 # -- what moves ------------------------------------------------------------------------------------
 
@@ -202,7 +202,7 @@ def test_too_many_pairs_are_left_to_the_tree():
     with pytest.raises(CandidateLimitError):
         boxes.find()
     assert boxes.state.static_grid.suits
-    assert CANDIDATE_LIMIT <= len(boxes.state.candidates.first) < CANDIDATE_LIMIT + 2 * SPARE
+    assert CANDIDATE_LIMIT <= len(boxes.state.candidates.first) < CANDIDATE_LIMIT + 2 * SPARE_ROWS
 
 
 def reason(world):

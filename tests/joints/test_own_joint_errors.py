@@ -10,7 +10,7 @@ from helpers_machines import Gear, Pulley, body, machine_world, machines
 
 from carom import Physics, Plugin, PluginError, StepError, Transform, World, column
 from carom.framework.vectors import scale
-from carom.plugins.joints import GIVEN, HOLD, Distance, Joint, Joints, Row
+from carom.plugins.joints import CUSTOM, HOLD, Distance, Joint, Joints, Row
 
 
 def declared(returned):
@@ -77,7 +77,7 @@ def test_rows_of_a_part_that_there_is_not_are_refused():
             return (None, *(scale(a.position, 0.0),) * 4)
 
         def rows(self, dimensions):
-            return [Row(GIVEN, HOLD, part=1)]
+            return [Row(CUSTOM, HOLD, part=1)]
 
     half = Plugin("half")
     half.joint(Half)

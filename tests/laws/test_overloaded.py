@@ -41,7 +41,7 @@ class Scene:
     def tower(self, bottom, velocity=(0.0, 0.0, 0.0)):
         return [self.add((0.0, bottom + LAID * k, 0.0), m, velocity) for k, m in enumerate((LIGHT, LIGHT, HEAVY))]
 
-    def strike(self, height):
+    def approach_extents(self, height):
         return self.add((-1.2, height, 0.0), BLOW, (1.0, 0.0, 0.0), SphereCollider(0.5))
 
 
@@ -55,7 +55,7 @@ def test_what_falls_freely_keeps_momentum_and_energy(d, mode, kind):
     scene = Scene(d, mode, kind)
     with scene.world as world:
         boxes = scene.tower(0.5)
-        scene.strike(0.5 + 2 * LAID)
+        scene.approach_extents(0.5 + 2 * LAID)
         if kind == "joined":
             world.create_entity(Distance(boxes[0], boxes[2], length=2 * LAID))
         bodies = world.bodies.dynamic
@@ -81,7 +81,7 @@ def test_a_floor_without_friction_takes_no_momentum_along_it(d, mode, kind):
     with scene.world as world:
         world.create_entity(Transform((0.0, -0.5, 0.0)[:d]), scene.box((100.0, 0.5, 100.0)[:d]))
         boxes = scene.tower(0.5)
-        scene.strike(0.5 + 2 * LAID)
+        scene.approach_extents(0.5 + 2 * LAID)
         momentum, highest = world.momentum()[0], world.kinetic_energy() + world.potential_energy()
         for _ in range(60):
             world.step()

@@ -26,11 +26,13 @@ def aging(**more):
     plugin = Plugin("aging")
     writes = ("aging.age", "aging.travel", "aging.old")
 
-    @plugin.stage(after="put_back", records=(Aging,), reads=("still", "linear_velocity", "aging.rate"), writes=writes)
+    reads = ("sleep_state", "linear_velocity", "aging.rate")
+
+    @plugin.stage(after="put_back", records=(Aging,), reads=reads, writes=writes)
     def grow_old(state, dt, aging):
         """What takes part in a step gets older"""
         for i in range(state.first, state.dynamic):
-            if aging.present[i] and state.bodies.still[i] == 0:
+            if aging.present[i] and state.bodies.sleep_state[i] == 0:
                 aging.age[i] += 1
                 aging.travel[i] = add(aging.travel[i], state.bodies.linear_velocity[i])
                 aging.old[i] = aging.rate[i] * aging.age[i] > 5.0

@@ -28,16 +28,16 @@ from .cells import REACH
 MAX_LEVELS = 60
 SAMPLE = 256  # boxes that the bounds and the cell size are estimated from
 TRIMMED = 3  # the sample's extreme values kept per side; the last of them is its 1 % or 99 % quantile
-MARGIN = 1.0 / 40.0  # of the trimmed extent, added per side: evenly spread boxes are then all inside
-CELLS_PER_BOX = 3.0  # size of the finest level's directory
-CROWDED = 24.0  # mean number of boxes in a box's cell from which finer cells are tried
+CELL_MARGIN = 1.0 / 40.0  # of the trimmed extent, added per side: evenly spread boxes are then all inside
+TREE_CELLS_PER_BOX = 3.0  # size of the finest level's directory
+CROWDED_LEVEL = 24.0  # mean number of boxes in a box's cell from which finer cells are tried
 TOO_MANY = 64  # boxes too large or too far out for all levels, from which coarser levels are added
 NEARLY_EQUAL = 1.2  # the largest of the sample against its 99 % quantile: below it that is no other size
 ABOVE_SAMPLE = 1.02  # what the largest of all may exceed the largest of the sample by
-LOOSE = 1.0 + 2.0**-16  # the finest cell exceeds the typical box by this, so that REACH does not push it a level up
+LOOSE_CELL = 1.0 + 2.0**-16  # the finest cell per typical box, so that REACH does not push it a level up
 SMALLEST_CELL = 1e-290  # m; its inverse is finite
 LARGEST_SAMPLE = 1e150  # m; coordinates beyond it do not enter the estimates
-CODE_BITS = 60
+TREE_CODE_BITS = 60
 
 CROWDED_CELLS, SUITS = 0, 1  # what a pass over all boxes returns
 
@@ -48,7 +48,7 @@ def directory_size(count: int) -> int:
     Level 0 has at most CELLS_PER_BOX * count + 64 cells; all coarser levels together at most 1.5 times that, if none of
     them has its least number, 27 in 3D; guard rows add two thirds at most.
     """
-    return int(6 * CELLS_PER_BOX * count) + 150 * (MAX_LEVELS + 2)
+    return int(6 * TREE_CELLS_PER_BOX * count) + 150 * (MAX_LEVELS + 2)
 
 
 @part
@@ -112,7 +112,7 @@ def sample_extremes(tree):
 def choose_finest_cell(tree, longest, small, large):
     """Size of the finest cell, for a trimmed extent whose longest edge is ``longest`` and boxes of small..large."""
     extent, d = tree.extent[0], len(zero_of(tree))
-    budget = CELLS_PER_BOX * (tree.stop - tree.start) + 64.0
+    budget = TREE_CELLS_PER_BOX * (tree.stop - tree.start) + 64.0
     cell, total = max(longest / budget, SMALLEST_CELL), math.inf
     while total > budget:
         cell *= 1.1
@@ -126,19 +126,19 @@ def choose_finest_cell(tree, longest, small, large):
     halved = max(large, cell)
     while 0.5 * halved >= max(cell, small):
         halved *= 0.5
-    return halved * LOOSE
+    return halved * LOOSE_CELL
 
 
 @part
-def choose_cells(tree):
+def choose_tree_cells(tree):
     """Origin, trimmed extent per axis, finest cell and number of levels, from a sample of the boxes."""
     extremes, d = tree.extremes, len(zero_of(tree))
     trim = min(sample_extremes(tree) // 85, TRIMMED - 1)
     longest, origin, extents, width = SMALLEST_CELL, zero_of(tree), zero_of(tree), zero_of(tree)
     for q in range(d):
         extent = -extremes[2 * q + 1, trim] - extremes[2 * q, trim]
-        origin = replace(origin, q, extremes[2 * q, trim] - MARGIN * extent)
-        extents = replace(extents, q, extent + 2.0 * MARGIN * extent)
+        origin = replace(origin, q, extremes[2 * q, trim] - CELL_MARGIN * extent)
+        extents = replace(extents, q, extent + 2.0 * CELL_MARGIN * extent)
         longest = max(longest, item(extents, q))
     tree.origin[0], tree.extent[0] = origin, extents
     tree.smallest_box = extremes[2 * d, trim]
@@ -156,7 +156,7 @@ def choose_cells(tree):
 
 
 @part
-def lay_out_levels(tree):
+def build_levels(tree):
     """Number the cells of all levels; returns how many there are, with the one for invalid boxes."""
     levels, width, base, scale = tree.levels, tree.width[0], 0, 1.0
     for level in range(levels + 2):
@@ -176,7 +176,7 @@ def lay_out_levels(tree):
 
 
 @part
-def find_cells(tree, used):
+def find_tree_cells(tree, used):
     """The cell of each box; directory[k + 2] counts those in cell k. Notes the bounds of the centres."""
     lower, upper, keys, directory, levels = tree.lower, tree.upper, tree.keys, tree.directory, tree.levels
     start, origin, inverse, zero = tree.start, tree.origin[0], tree.inverse_cell, zero_of(tree)
@@ -217,10 +217,10 @@ def assign_cells(tree):
 
     Crowding is the sum of squared cell counts: twice the candidates within cells.
     """
-    levels, directory, used = tree.levels, tree.directory, lay_out_levels(tree)
+    levels, directory, used = tree.levels, tree.directory, build_levels(tree)
     for k in range(used + 2):
         directory[k] = 0
-    find_cells(tree, used)
+    find_tree_cells(tree, used)
     crowding, total, finest = 0.0, 0, tree.level_cells[0]
     for k in range(used):
         found = directory[k + 2]
@@ -234,12 +234,12 @@ def assign_cells(tree):
     tree.crowding, tree.count = crowding, tree.level_end[levels]
     found = tree.level_end[0] - tree.level_begin[0]
     top = tree.level_end[levels] - tree.level_begin[levels]
-    suits = crowding <= CROWDED * found and top <= TOO_MANY + (tree.stop - tree.start) // 256
+    suits = crowding <= CROWDED_LEVEL * found and top <= TOO_MANY + (tree.stop - tree.start) // 256
     return SUITS if suits else CROWDED_CELLS
 
 
 @part
-def place_boxes(tree):
+def place_in_tree(tree):
     """The counting sort's last pass: boxes in the order of their cells, and their codes.
 
     Afterwards directory[key] is where cell ``key`` begins. A code is a box in small integers, all in one number: 14
@@ -248,7 +248,7 @@ def place_boxes(tree):
     """
     keys, directory, order, cells, boxes = tree.keys, tree.directory, tree.order, tree.cells, tree.boxes
     scale, offset, d = zero_of(tree), zero_of(tree), len(zero_of(tree))
-    start, field = tree.start, CODE_BITS // (2 * d)
+    start, field = tree.start, TREE_CODE_BITS // (2 * d)
     largest = (1 << (field - 1)) - 1
     for q in range(d):
         scale = replace(scale, q, largest / (item(tree.extent[0], q) + tree.finest_cell))
@@ -280,10 +280,10 @@ def build_one_cell(tree, _):
 
 def build_tree(tree, _):
     """Put the boxes of the record into cells; on CROWDED_CELLS Python tries others."""
-    choose_cells(tree)
+    choose_tree_cells(tree)
     result = assign_cells(tree)
     if result == SUITS:
-        place_boxes(tree)
+        place_in_tree(tree)
     return result
 
 
@@ -294,5 +294,5 @@ def assign_again(tree, _):
 
 def finish_tree(tree, _):
     """After Python has settled on the cells."""
-    place_boxes(tree)
+    place_in_tree(tree)
     return SUITS

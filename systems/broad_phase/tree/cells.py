@@ -19,7 +19,7 @@ from ....framework.compilation import inlined
 from ....framework.vectors import item, replace
 
 HALF_CELL = 0.5 + 2.0**-30  # how far a box reaches over its cell, in cells, rounding included
-FARTHEST = 2.0**39  # no box of a level is in a cell beyond this number (see REACH)
+TREE_FARTHEST = 2.0**39  # no box of a level is in a cell beyond this number (see REACH)
 REACH = 2.0**-38  # relative rounding error granted to every box
 
 
@@ -36,8 +36,8 @@ def cover(tree, low, high, level):
     span, n0, n1, n2 = np.int64(1), np.int64(1), np.int64(1), np.int64(1)
     for q in range(len(low)):
         # Clamping to what is there keeps numbers small and makes a floor of any length cost no more than the scene.
-        least = max(item(lowest, q) * shrink, -FARTHEST)
-        most = min(item(highest, q) * shrink, FARTHEST)
+        least = max(item(lowest, q) * shrink, -TREE_FARTHEST)
+        most = min(item(highest, q) * shrink, TREE_FARTHEST)
         bottom = (item(low, q) - item(origin, q)) * scale - HALF_CELL
         top = (item(high, q) - item(origin, q)) * scale + HALF_CELL
         bottom = bottom if bottom >= least else least  # in this order nan (infinity times 0) becomes the bound

@@ -17,12 +17,12 @@ import numpy as np
 from ....framework.compilation import part
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import item, replace
-from .build import CODE_BITS
+from .build import TREE_CODE_BITS
 from .cells import cover
 
-CHUNK = 2048  # candidates tested at a time; they stay in the first-level cache
-BLOCK = 4  # members of a range looked at together; codes are read so far past the last one
-SPARE = 64  # room at the end of the ranges
+RANGE_CHUNK = 2048  # candidates tested at a time; they stay in the first-level cache
+TEST_BLOCK = 4  # members of a range looked at together; codes are read so far past the last one
+SPARE_RANGES = 64  # room at the end of the ranges
 RANGES_PER_BOX = 12  # most that one level's pass writes per box
 
 DONE, MORE_RANGES, MORE_PAIRS = 0, 1, 2  # what a pass returns
@@ -106,7 +106,7 @@ def ranges_across(tree, owners, a, members, b, found):
     """Each box of level a of ``owners`` with those of level b of ``members`` in reach; -1 if there is no room."""
     boxes, directory, d = owners.boxes, members.directory, len(zero_of(tree))
     base, size = members.level_base[b], members.level_cells[b]
-    row, layer, room = members.level_stride[b, 1], members.level_stride[b, 2], len(tree.ranges) - SPARE
+    row, layer, room = members.level_stride[b, 1], members.level_stride[b, 2], len(tree.ranges) - SPARE_RANGES
     low, high = zero_of(tree), zero_of(tree)
     for i in range(owners.level_begin[a], owners.level_end[a]):
         for q in range(d):
@@ -152,25 +152,25 @@ def pick_candidates(tree, owners, members, stop, with_codes):
     """Into the chunk: what the codes do not rule out, from ``next_range`` on until it may be full; returns how many."""
     ranges, owner_codes, codes = tree.ranges, owners.codes, members.codes
     chunk_owners, chunk_members, d = tree.chunk_owners, tree.chunk_members, len(zero_of(tree))
-    field = CODE_BITS // (2 * d)
+    field = TREE_CODE_BITS // (2 * d)
     guards, full = np.int64(0), np.int64(0)
     for _ in range(2 * d):
         guards = (guards << field) | (1 << (field - 1))
         full = (full << field) | ((1 << (field - 1)) - 1)
     half = np.int64(field * d)
     lower_half, at, held = (np.int64(1) << half) - 1, tree.next_range, 0
-    while at < stop and held <= CHUNK - BLOCK:
+    while at < stop and held <= RANGE_CHUNK - TEST_BLOCK:
         owner, begin, end = ranges[at, 0], ranges[at, 1], ranges[at, 2]
         code = owner_codes[owner] if with_codes else np.int64(0)  # the frames of two trees differ; 0 overlaps all
         code = (full - ((code >> half) | ((code & lower_half) << half))) | guards
-        for k in range(BLOCK):
+        for k in range(TEST_BLOCK):
             member = begin + k
             clear = (code - codes[member]) & guards
             chunk_owners[held] = owner
             chunk_members[held] = member
             held += (clear == guards) & (member < end)
-        ranges[at, 1] = begin + BLOCK
-        at += begin + BLOCK >= end
+        ranges[at, 1] = begin + TEST_BLOCK
+        at += begin + TEST_BLOCK >= end
     tree.next_range = at
     return held
 
@@ -185,7 +185,7 @@ def test_ranges(tree, owners, members, stop, swapped, with_codes):
     chunk_owners, chunk_members, d = tree.chunk_owners, tree.chunk_members, len(zero_of(tree))
     pairs = tree.pair_count
     while tree.next_range < stop:
-        if pairs + CHUNK > len(first):
+        if pairs + RANGE_CHUNK > len(first):
             tree.pair_count = pairs
             return MORE_PAIRS
         held = pick_candidates(tree, owners, members, stop, with_codes)

@@ -16,10 +16,10 @@ from . import build, pairs
 BUILDING: tuple[Callable[..., Any], ...] = (
     build.build_one_cell, build.build_tree, build.assign_again, build.finish_tree,
 )  # fmt: skip
-PAIRS: tuple[Callable[..., Any], ...] = (
+PAIR_FUNCTIONS: tuple[Callable[..., Any], ...] = (
     pairs.find_ranges_within, pairs.find_ranges_between, pairs.test_within, pairs.test_between,
 )  # fmt: skip
-FUNCTIONS = (*BUILDING, *PAIRS)
+TREE_FUNCTIONS = (*BUILDING, *PAIR_FUNCTIONS)
 
 
 class TreePasses:
@@ -29,7 +29,7 @@ class TreePasses:
         kind = record_type(TREE, dimensions)
         self._signature = types.int64(kind, kind)
         self._at = record_at(TREE, dimensions)
-        self.linked = {function.__name__: Linked(function, self._signature) for function in FUNCTIONS}
+        self.linked = {function.__name__: Linked(function, self._signature) for function in TREE_FUNCTIONS}
 
     @cached_property
     def _call(self) -> Callable[[int, int, int], int]:
@@ -44,7 +44,7 @@ class TreePasses:
     def of_world(self, has_shapes: bool) -> Iterator[Linked | Called]:
         """The passes that a world may run; without shapes there are no pairs, only trees for queries."""
         yield Called(self._call, int, int, int)
-        for function in (*BUILDING, *(PAIRS if has_shapes else ())):
+        for function in (*BUILDING, *(PAIR_FUNCTIONS if has_shapes else ())):
             yield self.linked[function.__name__]
 
     def run(self, name: str, tree: Any, other: Any = None) -> int:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .build import CELLS_PER_BOX, CROWDED, LOOSE, MAX_LEVELS, SMALLEST_CELL, TOO_MANY
+from .build import CROWDED_LEVEL, LOOSE_CELL, MAX_LEVELS, SMALLEST_CELL, TOO_MANY, TREE_CELLS_PER_BOX
 
 IMPROVED = 0.7  # finer cells are kept if they bring crowding below this share of what it was
 
@@ -31,14 +31,14 @@ def refine(tree: Any, assign: Callable[[], int]) -> None:
             tree.levels = MAX_LEVELS - 1
             assign()
             continue
-        if before <= CROWDED * (tree.level_end[0] - tree.level_begin[0]) or cell <= 2.0 * tree.smallest_box:
+        if before <= CROWDED_LEVEL * (tree.level_end[0] - tree.level_begin[0]) or cell <= 2.0 * tree.smallest_box:
             return
-        finer = max(_spacing(tree), tree.smallest_box * LOOSE, SMALLEST_CELL)
+        finer = max(_spacing(tree), tree.smallest_box * LOOSE_CELL, SMALLEST_CELL)
         if finer > 0.5 * cell:
             return
         tree.finest_cell, tree.inverse_cell = finer, 1.0 / finer
         # The directory stays as large as it is, with equal widths: it no longer covers the extent.
-        widest = max(2.0, (CELLS_PER_BOX * count) ** (1 / tree.dimensions) - 1.0)
+        widest = max(2.0, (TREE_CELLS_PER_BOX * count) ** (1 / tree.dimensions) - 1.0)
         tree.width[0] = np.minimum(tree.extent[0] / finer, widest)
         tree.levels = min(MAX_LEVELS - 1, int(levels + np.ceil(np.log2(cell) - np.log2(finer))))
         assign()

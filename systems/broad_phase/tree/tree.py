@@ -60,8 +60,8 @@ class SpatialTree:
         record.reserve(build.MAX_LEVELS + 2, *levels)
         record.level_begin[:], record.level_end[:], record.level_cells[:] = 0, 0, 1
         record.level_stride[:], record.level_scale[:] = 0, 0.0
-        record.reserve(pairs.CHUNK + pairs.BLOCK, "chunk_owners", "chunk_members")
-        record.reserve(2 * pairs.CHUNK, "first", "second")
+        record.reserve(pairs.RANGE_CHUNK + pairs.TEST_BLOCK, "chunk_owners", "chunk_members")
+        record.reserve(2 * pairs.RANGE_CHUNK, "first", "second")
         self._reserve(0)
 
     @property
@@ -107,7 +107,7 @@ class SpatialTree:
         if self.count < 2:
             return self.record.first[:0], self.record.second[:0]
         wanted = pairs.RANGES_PER_BOX * self.count
-        if wanted + pairs.SPARE > len(self.record.ranges):
+        if wanted + pairs.SPARE_RANGES > len(self.record.ranges):
             self._grow_ranges(wanted)
         return self._pairs("within", self, limit, wanted)
 
@@ -136,7 +136,7 @@ class SpatialTree:
         record = self.record
         record.directory = np.zeros(build.directory_size(capacity), np.int32)
         record.reserve(capacity, "keys", "order", "cells", "boxes")
-        record.codes = np.zeros(capacity + pairs.BLOCK, np.int64)  # read past the end, never used
+        record.codes = np.zeros(capacity + pairs.TEST_BLOCK, np.int64)  # read past the end, never used
 
     def _grow_ranges(self, wanted: int) -> None:
-        self.record.reserve(max(wanted, 2 * len(self.record.ranges)) + 2 * pairs.SPARE, "ranges")
+        self.record.reserve(max(wanted, 2 * len(self.record.ranges)) + 2 * pairs.SPARE_RANGES, "ranges")

@@ -30,7 +30,7 @@ def find_chunks(solver, span):
 
 
 @part
-def gather(solver, start, end):
+def gather_chunk(solver, start, end):
     """Bring the motion of the bodies to the pairs of a chunk."""
     for k in range(start, end):
         a, b = solver.first[k], solver.second[k]
@@ -39,7 +39,7 @@ def gather(solver, start, end):
 
 
 @part
-def scatter(solver, start, end):
+def scatter_chunk(solver, start, end):
     """Take it back to those that move."""
     for k in range(start, end):
         if solver.mass_a[k] > 0.0:
@@ -51,7 +51,7 @@ def scatter(solver, start, end):
 
 
 @inlined
-def held(old, slip, normal, mass, limit):
+def is_chunk_held(old, slip, normal, mass, limit):
     """The impulse along the surface that stops a slip, of at most ``limit``, where it is ``old`` so far."""
     if len(normal) == 2:  # a number along the one direction there is
         along = replace(replace(normal, 0, -item(normal, 1)), 1, item(normal, 0))
@@ -83,7 +83,7 @@ def solve_rows(solver, bias, pushes, start, end, ahead):
         v_a, s_a = add_scaled(v_a, push, -w_a), sub(s_a, symmetric(d_a, p_a, twist(arm_a, push)))
         v_b, s_b = add_scaled(v_b, push, w_b), add(s_b, symmetric(d_b, p_b, twist(arm_b, push)))
         slip = sub(add(v_b, cross_spin(s_b, arm_b)), add(v_a, cross_spin(s_a, arm_a)))
-        pull = held(tangent, slip, n, solver.tangent_mass[k], solver.friction[k] * new)
+        pull = is_chunk_held(tangent, slip, n, solver.tangent_mass[k], solver.friction[k] * new)
         solver.tangent[k], push = pull, sub(pull, tangent)
         solver.velocity_a[q] = add_scaled(v_a, push, -w_a)
         solver.spin_a[q] = sub(s_a, symmetric(d_a, p_a, twist(arm_a, push)))
@@ -98,8 +98,8 @@ def solve_chunks(solver, bias, pushes, span):
     for c in range(solver.first_chunk, solver.end_chunk):
         points = solver.points[c]
         pairs = (solver.ends[c] - start) // points
-        gather(solver, start, start + pairs)
+        gather_chunk(solver, start, start + pairs)
         for e in range(points):
             solve_rows(solver, bias, pushes, start, start + pairs, e * pairs)
-        scatter(solver, start, start + pairs)
+        scatter_chunk(solver, start, start + pairs)
         start = solver.ends[c]

@@ -12,19 +12,19 @@ import math
 from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, dot, scale, sub
 from ...integration.turning import cross_spin, momentum_of_spin
-from ...joints.given import rates_of_given
-from ...joints.records import GIVEN, POINT, TURN
+from ...joints.given import rates_of_custom
+from ...joints.records import CUSTOM, POINT, TURN
 from ...joints.rows import relax_open
 from ..constants import (
-    DEEP,
-    EXCESS,
-    FADING,
     FINER_PASSES,
+    FULL_PUSH_OVERLAP,
     GAIN_MOTION,
     GAIN_PUSH,
     GAIN_ROUNDING,
     GAIN_WEIGHT,
-    SWEEPS,
+    STRUCK_EXCESS,
+    SWEEPS_PER_LOOK,
+    WARM_START_FADING,
 )  # fmt: skip
 from .rows import excess_speed, relax_listed, velocity_at
 
@@ -107,8 +107,8 @@ def work_at_joint(solver, j):
     if island[a] >= 0 and island[b] >= 0:
         return 0.0
     q, arm, away = (a, joints.arm_a[j], -1.0) if island[a] < 0 else (b, joints.arm_b[j], 1.0)
-    if joints.kind[j] == GIVEN:
-        at_a, at_b = rates_of_given(solver, j)
+    if joints.kind[j] == CUSTOM:
+        at_a, at_b = rates_of_custom(solver, j)
         return joints.impulse[j] * (at_a if q == a else at_b)
     if joints.kind[j] >= TURN:
         return away * joints.impulse[j] * dot(joints.normal[j], solver.spin[q])
@@ -117,7 +117,7 @@ def work_at_joint(solver, j):
 
 
 @part
-def weigh(solver, span, islands):
+def measure_energy(solver, span, islands):
     """What contacts do to the energy of each open island if a share s of all that they have changed acts: E(s) =
     slope s + curvature s^2 / 2, which is exact. What moves by itself gives its work to the island, not the contacts."""
     arms = span[4]
@@ -127,7 +127,7 @@ def weigh(solver, span, islands):
             slope[t] = curvature[t] = energy[t] = 0.0
     for e in range(solver.opened):
         q = solver.open_body[e]
-        t, v, m = island[q], solver.velocity_before[q], solver.heft[q]
+        t, v, m = island[q], solver.velocity_before[q], solver.solver_mass[q]
         change = sub(solver.velocity[q], v)
         slope[t] += m * dot(v, change)
         curvature[t] += m * dot(change, change)
@@ -153,14 +153,14 @@ def weigh(solver, span, islands):
 
 
 @part
-def gains(solver, t):
+def exceeds_budget(solver, t):
     """Whether the contacts of island t have given it more energy than ``allowed``."""
     gained = solver.slope[t] - solver.allowed[t] + 0.5 * solver.curvature[t]
     return not gained <= GAIN_ROUNDING * (solver.energy[t] + solver.curvature[t])
 
 
 @part
-def allow(solver, bias_rate, h, dt, span, islands):
+def energy_budget(solver, bias_rate, h, dt, span, islands):
     """What each island may gain in a substep: what forces give from rest, more of that where it is pushed out, and a
     small share of its motion and of the energy at the speed of pushing. Joints would use such a share in each substep:
     where there are some, it may give back what it has taken, and no more."""
@@ -172,7 +172,7 @@ def allow(solver, bias_rate, h, dt, span, islands):
     for q in range(begin, end):
         if solver.island[q] >= 0:
             t = solver.island[q]
-            motion[t] = add_scaled(motion[t], solver.velocity_before[q], solver.heft[q])
+            motion[t] = add_scaled(motion[t], solver.velocity_before[q], solver.solver_mass[q])
     for t in range(islands[0], islands[1]):
         mass, force = solver.mass_of[t], solver.force_of[t] * h / dt
         energy = max(0.0, solver.energy[t] - dot(motion[t], motion[t]) / mass)
@@ -180,35 +180,35 @@ def allow(solver, bias_rate, h, dt, span, islands):
         allowed[t] = (0.5 + GAIN_WEIGHT * rate) * force * force / mass
         allowed[t] += solver.credit[t] if solver.jointed[t] else share * GAIN_MOTION * energy
     for k in range(start, stop):
-        t, speed = island_of(solver, k), bias_rate * DEEP * solver.extent[k]
+        t, speed = island_of(solver, k), bias_rate * FULL_PUSH_OVERLAP * solver.extent[k]
         if len(arms) < 2 or not solver.jointed[t]:
             allowed[t] += share * GAIN_PUSH * solver.mass[k] * speed * speed
 
 
 @inlined
-def fineness(solver, t):
+def excess_scale(solver, t):
     """How many times better than EXCESS the rows of a struck island are solved, as many passes as it may have."""
     return max(1.0, solver.passes[t] / FINER_PASSES)
 
 
 @part
-def find_unsolved(solver, turn, any_struck, dt, span, islands):
+def find_unsolved_rows(solver, turn, any_struck, dt, span, islands):
     """The rows of struck islands that are not solved, and all of islands that gain, come first in ``listed``; returns
     how many. An island has as many passes as its own size allows: what is solved elsewhere changes none of its bits."""
     unsolved, struck, extent, used = solver.unsolved, solver.struck, solver.extent, solver.used
     any_gain, finest, count = False, 0.0, 0
     for t in range(islands[0], islands[1]):
         solver.listed_of[t] = 0
-        unsolved[t] = gains(solver, t) and not solver.jointed[t]  # what joints give passes over contacts do not take
+        unsolved[t] = exceeds_budget(solver, t) and not solver.jointed[t]  # contact passes do not take what joints give
         any_gain |= unsolved[t]
-        finest = max(finest, fineness(solver, t) if struck[t] else 0.0)
+        finest = max(finest, excess_scale(solver, t) if struck[t] else 0.0)
     for k in range(span[0], span[1] if any_gain or any_struck else span[0]):
         if turn > 0 and not any_gain and used[solver.first[k]] != turn and used[solver.second[k]] != turn:
             continue  # no pass since the last look has changed what it asks
-        excess, least = excess_speed(solver, k, span[4]) * dt, EXCESS * extent[k]
+        excess, least = excess_speed(solver, k, span[4]) * dt, STRUCK_EXCESS * extent[k]
         if excess * finest > least or any_gain:  # seldom
             t = island_of(solver, k)
-            if ((struck[t] and excess * fineness(solver, t) > least) or unsolved[t]) and turn < solver.passes[t]:
+            if ((struck[t] and excess * excess_scale(solver, t) > least) or unsolved[t]) and turn < solver.passes[t]:
                 solver.listed[count] = k
                 solver.listed_of[t] += 1
                 count += 1
@@ -229,14 +229,14 @@ def note_changed(solver, turn, count, arms):
 
 
 @part
-def restrain(solver, span, islands):
+def limit_energy(solver, span, islands):
     """In islands that still gain only the share acts that takes the most energy: the least of E(s). Where there are
     joints the largest share acts that gives no more than is allowed."""
     start, stop, begin, end, arms = span
     share, any_gain = solver.share, False
     for t in range(islands[0], islands[1]):
         share[t] = 1.0
-        if gains(solver, t):
+        if exceeds_budget(solver, t):
             slope, curvature = solver.slope[t] - solver.allowed[t], solver.curvature[t]
             most = -slope / curvature
             if solver.jointed[t]:  # all that is allowed, as joints are to hold
@@ -255,29 +255,29 @@ def restrain(solver, span, islands):
                 turned = sub(solver.spin[q], solver.spin_before[q])
                 solver.spin[q] = add_scaled(solver.spin_before[q], turned, share[t])
     if len(arms) > 1 and any_gain:
-        fade_joints(solver)
+        fade_joint_impulses(solver)
     for k in range(start, stop if any_gain else start):
         kept = share[island_of(solver, k)]
         if kept < 1.0:
-            kept = max(kept, FADING)
+            kept = max(kept, WARM_START_FADING)
             solver.impulse[k] *= kept
             solver.tangent[k] = scale(solver.tangent[k], kept)
 
 
 @part
-def fade_joints(solver):
+def fade_joint_impulses(solver):
     """Joints of islands that the guard has restrained begin the next substep with as much less."""
     joints = solver.joints
     for e in range(joints.begin, joints.end):
         j = joints.order[e]
         kept = solver.share[max(solver.island[joints.first[j]], solver.island[joints.second[j]])]
         if kept < 1.0:
-            kept = max(kept, FADING)
+            kept = max(kept, WARM_START_FADING)
             joints.impulse[j], joints.push[j] = kept * joints.impulse[j], scale(joints.push[j], kept)
 
 
 @part
-def settle(solver, islands):
+def carry_budget(solver, islands):
     """What joints have taken in a substep they may give back later in the step."""
     for t in range(islands[0], islands[1]):
         s = solver.share[t]
@@ -291,24 +291,24 @@ def settle(solver, islands):
 def finish_substep(solver, bias_rate, any_struck, h, dt, span):
     """Further passes over the islands of a range that gain or are struck, then the bound on their energy."""
     islands, any_gain = islands_of(solver, span), False
-    weigh(solver, span, islands)
+    measure_energy(solver, span, islands)
     for t in range(islands[0], islands[1]):
         solver.allowed[t], solver.share[t] = solver.credit[t], 1.0
-        any_gain |= gains(solver, t)
+        any_gain |= exceeds_budget(solver, t)
     if not (any_gain or any_struck):
-        settle(solver, islands)
+        carry_budget(solver, islands)
         return
-    allow(solver, bias_rate, h, dt, span, islands)
-    turn, count = 0, find_unsolved(solver, 0, any_struck, dt, span, islands)
+    energy_budget(solver, bias_rate, h, dt, span, islands)
+    turn, count = 0, find_unsolved_rows(solver, 0, any_struck, dt, span, islands)
     while count > 0:
-        for _ in range(SWEEPS):
+        for _ in range(SWEEPS_PER_LOOK):
             if len(span[4]) > 1:
                 relax_open(solver)
             relax_listed(solver, count, span[4])
-        weigh(solver, span, islands)
-        turn += SWEEPS
+        measure_energy(solver, span, islands)
+        turn += SWEEPS_PER_LOOK
         note_changed(solver, turn, count, span[4])
-        count = find_unsolved(solver, turn, any_struck, dt, span, islands)
-    restrain(solver, span, islands)
-    settle(solver, islands)
+        count = find_unsolved_rows(solver, turn, any_struck, dt, span, islands)
+    limit_energy(solver, span, islands)
+    carry_budget(solver, islands)
     open_all(solver, span)

@@ -11,23 +11,23 @@ from ....framework.vectors import add, dot, sub
 from ...ccd.search_bounds import turns_far
 from ...integration.turning import is_turned
 from ..approach import centre_offset, centre_offset_at_start
-from ..constants import ALONG, IDLE, LOAD, OPEN, UNREACHED
-from .rows import closing_speed, room_of, way_by_turns
+from ..constants import ALIGNED, GAP_TOLERANCE, IDLE_SHARE, LEAST_LOAD, UNREACHED
+from .rows import closing_speed, separation, separation_from_rotation
 
 
 @part
-def presses(solver, k, dt):
+def is_loaded(solver, k, dt):
     """Whether contact k, of two bodies that can be moved, bears a load, or will: they overlap."""
     a, b, acceleration = solver.first[k], solver.second[k], solver.acceleration
-    if solver.gap[k] < -OPEN * solver.extent[k]:
+    if solver.gap[k] < -GAP_TOLERANCE * solver.extent[k]:
         return True
-    least = LOAD * solver.mass[k] * dt
+    least = LEAST_LOAD * solver.mass[k] * dt
     load = max(dot(acceleration[a], acceleration[a]), dot(acceleration[b], acceleration[b]))
     return solver.impulse[k] > 0.0 and solver.impulse[k] * solver.impulse[k] > least * least * load
 
 
 @part
-def choose_hard(state, dt, nothing, arms):
+def select_rigid(state, dt, nothing, arms):
     """Contacts with what cannot be moved are hard if their body has rested until now, and nothing presses on it.
 
     Not those that push against the sum of its normals: no impulse is high enough for what is squeezed. Nor one that
@@ -43,7 +43,7 @@ def choose_hard(state, dt, nothing, arms):
             way[b] = add(way[b], solver.normal[k])
         elif inverse_mass[b] == 0.0:
             way[a] = sub(way[a], solver.normal[k])
-        elif not (shared[a] and shared[b]) and presses(solver, k, dt):
+        elif not (shared[a] and shared[b]) and is_loaded(solver, k, dt):
             shared[a] = shared[b] = True
     any_hard = any_apart = False
     for k in range(solver.contacts):
@@ -52,24 +52,24 @@ def choose_hard(state, dt, nothing, arms):
         if inverse_mass[a] == 0.0 or inverse_mass[b] == 0.0:
             body, along = (b, dot(way[b], n)) if inverse_mass[b] > 0.0 else (a, -dot(way[a], n))
             rested = state.any_warm_started and warm_started[solver.body_row[body]]
-            hard = rested and along > ALONG and not (shared[body] or solver.varies[k])
+            hard = rested and along > ALIGNED and not (shared[body] or solver.varies[k])
             solver.hard[k] = hard
             any_hard |= hard
             any_apart |= hard and solver.apart[k]
             if hard and solver.apart[k]:
                 least = 0.0
                 if state.spinning and turns_far(state, solver.body_row[a], solver.body_row[b]):
-                    least = -way_by_turns(solver, k, arms)
+                    least = -separation_from_rotation(solver, k, arms)
                 solver.gap[k] = max(least, solver.gap[k])  # faces that meet in the end do not overlap at the start
                 if closing_speed(solver, k, arms) < 0.0:  # the body has passed the corner
                     solver.impulse[k], solver.tangent[k] = 0.0, nothing
     solver.any_hard = any_hard
     if any_apart:
-        leave_out_of_reach(state)
+        disable_out_of_reach(state)
 
 
 @part
-def leave_out_of_reach(state):
+def disable_out_of_reach(state):
     """A hard contact that is open at the start of the step and not reached in the prediction is none in this step, if
     its body is held by another one: the body may slide past that corner, whose plane lies across its way."""
     solver, bodies, pairs, held = state.solver, state.bodies, state.pairs, state.solver.held
@@ -86,12 +86,12 @@ def leave_out_of_reach(state):
             if state.spinning and (is_turned(bodies, a) or is_turned(bodies, b)):
                 continue  # turning brings its points nearer as well
             travel = sub(centre_offset(bodies, a, b), centre_offset_at_start(bodies, a, b))
-            if held[body] > 0.0 and solver.gap[k] + dot(travel, solver.normal[k]) > OPEN * solver.extent[k]:
+            if held[body] > 0.0 and solver.gap[k] + dot(travel, solver.normal[k]) > GAP_TOLERANCE * solver.extent[k]:
                 solver.gap[k] += UNREACHED * solver.extent[k]
 
 
 @part
-def leave_open(solver, h, span):
+def defer_open_contacts(solver, h, span):
     """A hard contact that was open when the step began and is not overlapped when it ends is left to the next step if
     its body is held by another one: it slides on, and by then it may have passed the corner that it would stop at."""
     start, stop, begin, end, arms = span
@@ -105,6 +105,7 @@ def leave_open(solver, h, span):
     for k in range(start, stop):
         if solver.hard[k] and solver.apart[k]:
             body = first[k] if solver.inverse_mass[first[k]] > 0.0 else second[k]
-            room = room_of(solver, k, arms)
-            if held[body] > 0.0 and solver.impulse[k] <= IDLE * held[body] and room > -OPEN * solver.extent[k]:
-                solver.opening[k] = UNREACHED * solver.extent[k] / h
+            room = separation(solver, k, arms)
+            idle = solver.impulse[k] <= IDLE_SHARE * held[body]
+            if held[body] > 0.0 and idle and room > -GAP_TOLERANCE * solver.extent[k]:
+                solver.target_speed[k] = UNREACHED * solver.extent[k] / h

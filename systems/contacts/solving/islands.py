@@ -27,28 +27,28 @@ from ..constants import (
     AT_ONCE_WORK,
     FURTHER_PASSES,
     FURTHER_WORK,
-    JOLTED_SUBSTEPS,
     LEAST_FURTHER_PASSES,
+    LEAST_STRIKE,
     LEAST_WORK_SUBSTEPS,
-    LONG_WAY,
+    LIMIT_STRIKE,
     MOST_SAG,
     MOST_SUBSTEPS,
     MOST_SWAY,
     OWN_SAG,
     SAG,
-    STRIKE,
-    STRUCK,
+    STRIKE_SUBSTEPS,
+    STRUCK_JOINT_SUBSTEPS,
     SUBSTEP_WORK,
 )  # fmt: skip
 from ..points import points_of
 
 COLOURS = 62  # bits of a mask; pairs of a body beyond them share the last one
 STREAMS = 4  # of joints: more are no faster
-CHUNK = 64  # pairs at most: their columns stay in the processor's first cache
+ROW_CHUNK = 64  # pairs at most: their columns stay in the processor's first cache
 
 
 @part
-def number_body(state, i):
+def solver_index(state, i):
     """The place of a row among the bodies of the solver, a new one if it has none yet."""
     solver, place, i = state.solver, state.bodies.place, owner_of(state, i)
     if place[i] < 0:
@@ -75,7 +75,7 @@ def colour_rows(state):
             continue
         c, taken = solver.pair[r], 0
         a, b = pairs.a[c], pairs.b[c]
-        p, q = number_body(state, a), number_body(state, b)
+        p, q = solver_index(state, a), solver_index(state, b)
         moves_a, moves_b = inverse_mass[a] > 0.0, inverse_mass[b] > 0.0
         if moves_a:
             taken |= used[p]
@@ -101,7 +101,7 @@ def join_bodies(state):
     joints, inverse_mass = state.solver.joints, state.bodies.inverse_mass
     for e in range(joints.active):
         a, b = joints.row_a[joints.order[e]], joints.row_b[joints.order[e]]
-        p, q = number_body(state, a) if a >= 0 else -1, number_body(state, b) if b >= 0 else -1
+        p, q = solver_index(state, a) if a >= 0 else -1, solver_index(state, b) if b >= 0 else -1
         if p >= 0 and q >= 0 and inverse_mass[a] > 0.0 and inverse_mass[b] > 0.0:
             join_roots(state.solver.island, p, q)
             join_roots(state.solver.group, p, q)
@@ -116,7 +116,7 @@ def island_of_joint(state, j):
 
 
 @part
-def weigh_joint(state, j, dt):
+def measure_joint(state, j, dt):
     """Count a row of joints for its island, and find whether its bodies turn so fast that a limit strikes them."""
     solver, joints, spin = state.solver, state.solver.joints, state.bodies.spin
     a, b, t = joints.row_a[j], joints.row_b[j], island_of_joint(state, j)
@@ -126,7 +126,7 @@ def weigh_joint(state, j, dt):
     if joints.kind[j] >= TURN and joints.rule[j] == LIMIT:
         nothing = zero_of(state)
         turned = sub(spin[b] if b >= 0 else nothing, spin[a] if a >= 0 else nothing)
-        solver.jolted[t] |= length(turned) * dt > LONG_WAY
+        solver.needs_substeps[t] |= length(turned) * dt > LIMIT_STRIKE
 
 
 @part
@@ -147,9 +147,9 @@ def number_islands(state, dt):
             t = count
             count += 1
             solver.lightest[t], solver.most_change[t], solver.mass_of[t], solver.force_of[t] = math.inf, 0.0, 0.0, 0.0
-            solver.stiff[t] = solver.own[t] = solver.strike[t] = solver.taken[t] = 0.0
+            solver.stiff[t] = solver.own[t] = solver.approach_extents[t] = solver.taken[t] = 0.0
             solver.size_of[t], solver.leader[t] = 0, i
-            solver.driven[t], solver.jolted[t], solver.credit[t] = False, False, 0.0
+            solver.driven[t], solver.needs_substeps[t], solver.credit[t] = False, False, 0.0
             solver.jointed[t], solver.at_once[t], solver.sway[t], solver.links[t] = False, False, 0.0, 0
         solver.number[q] = t
         change = sub(velocity[i], start[i])
@@ -163,12 +163,12 @@ def number_islands(state, dt):
     for q in range(solver.bodies):
         island[q] = solver.number[q]
     for e in range(solver.joints.active):
-        weigh_joint(state, solver.joints.order[e], dt)
+        measure_joint(state, solver.joints.order[e], dt)
     choose_direct(state)
 
 
 @part
-def weigh_rows(state, dt):
+def measure_islands(state, dt):
     """What each island's rows ask for: how stiff they must be, and how fast they are struck."""
     solver, pairs, bodies, nothing = state.solver, state.pairs, state.bodies, zero_of(state)
     velocity, inverse_mass = bodies.start_velocity, bodies.inverse_mass
@@ -185,9 +185,9 @@ def weigh_rows(state, dt):
         if solver.jointed[t]:
             arms = arms_to(bodies, a, b, pairs.normal[c], pairs.point[c], centre_offset_at_start(bodies, a, b))
             speed = length(add(sub(v_b, v_a), velocity_by_spin(bodies, a, b, arms)))
-            solver.jolted[t] |= speed * dt * inverse_extent > LONG_WAY
-        if strike > solver.strike[t]:
-            solver.strike[t] = strike
+            solver.needs_substeps[t] |= speed * dt * inverse_extent > LIMIT_STRIKE
+        if strike > solver.approach_extents[t]:
+            solver.approach_extents[t] = strike
 
 
 @part
@@ -203,8 +203,8 @@ def choose_substeps(solver, t, usual, dt):
     sag, least = SAG * solver.most_change[t] * dt, usual
     while MOST_SWAY * float(least * least) < sag * solver.sway[t] and 2 * least <= LEAST_WORK_SUBSTEPS:
         least *= 2
-    if solver.jolted[t]:
-        least = max(least, JOLTED_SUBSTEPS)
+    if solver.needs_substeps[t]:
+        least = max(least, STRUCK_JOINT_SUBSTEPS)
     if solver.size_of[t] == 0:  # it has joints alone
         solver.substeps_of[t], solver.hard_of[t], solver.passes[t], solver.bears[t] = least, False, 0, math.inf
         return least > usual or solver.at_once[t]
@@ -214,9 +214,9 @@ def choose_substeps(solver, t, usual, dt):
     hard = own > float(usual * usual)
     if hard:
         need *= OWN_SAG / max(OWN_SAG, own)
-    strike = solver.strike[t] - 2.0 * solver.most_change[t] * solver.own[t] * dt
+    strike = solver.approach_extents[t] - 2.0 * solver.most_change[t] * solver.own[t] * dt
     ratio = solver.stiff[t] / (solver.lightest[t] * solver.own[t])
-    struck = STRIKE * strike * ratio if strike > STRUCK else 0.0
+    struck = STRIKE_SUBSTEPS * strike * ratio if strike > LEAST_STRIKE else 0.0
     most = max(LEAST_WORK_SUBSTEPS, min(MOST_SUBSTEPS, SUBSTEP_WORK // rows))
     asked, substeps = max(need, struck * struck), least
     while float(substeps * substeps) < asked and 2 * substeps <= most:
@@ -270,7 +270,7 @@ def place_rows(state):
 
 
 @part
-def lay_chunks(state):
+def build_chunks(state):
     """Divide the rows of each range and colour into chunks, and place those of a chunk point by point."""
     solver, listed, colour, ends = state.solver, state.solver.listed, state.solver.colour, state.solver.row_ends
     for r in range(solver.contacts):
@@ -282,7 +282,7 @@ def lay_chunks(state):
             s += 1
         chosen = colour[listed[start]]
         points = points_of(state, solver.pair[listed[start]]) if chosen % 2 == 1 else 1
-        most = min(ends[s], start + points * (CHUNK if chosen < 2 * COLOURS - 2 else 1))
+        most = min(ends[s], start + points * (ROW_CHUNK if chosen < 2 * COLOURS - 2 else 1))
         stop = start
         while stop < most and colour[listed[stop]] == chosen:
             stop += points
@@ -342,7 +342,7 @@ def order_rows(state, dt):
     colour_rows(state)
     join_bodies(state)
     number_islands(state, dt)
-    weigh_rows(state, dt)
+    measure_islands(state, dt)
     solver.ranges = 1
     for t in range(solver.islands):
         solver.range_of[t] = 0
@@ -351,7 +351,7 @@ def order_rows(state, dt):
             solver.ranges += 1
     place_rows(state)
     if state.spinning:
-        lay_chunks(state)
+        build_chunks(state)
     for s in range(solver.ranges):
         solver.joint_ends[s] = 0
     if solver.joints.active > 0:

@@ -11,11 +11,11 @@ from ....framework.vectors import add, add_scaled, dot, length, scale, sub
 from ...integration.turning import momentum_of_spin
 from ..constants import GAIN_ROUNDING
 from .guard import work_at_joint, work_of_mover
-from .rows import turn_body, weigh_row
+from .rows import compute_effective_mass, rotate_body
 
 
 @part
-def lighten(solver, t, dt, span):
+def cap_mass_ratio(solver, t, dt, span):
     """What island t cannot bear with the most substeps counts as no heavier than it can."""
     least = solver.lightest[t] / solver.bears[t]
     solver.mass_of[t] = solver.force_of[t] = 0.0
@@ -30,11 +30,11 @@ def lighten(solver, t, dt, span):
                 solver.inverse_inertia[q] = scale(solver.inverse_inertia[q], 1.0 / by)
                 solver.inverse_products[q] = scale(solver.inverse_products[q], 1.0 / by)
                 solver.inverse_moments[q] = scale(solver.inverse_moments[q], 1.0 / by)
-            solver.inverse_mass[q], solver.heft[q] = least, 1.0 / least
-        solver.mass_of[t] += solver.heft[q]
-        solver.force_of[t] += solver.heft[q] * length(solver.acceleration[q]) * dt
+            solver.inverse_mass[q], solver.solver_mass[q] = least, 1.0 / least
+        solver.mass_of[t] += solver.solver_mass[q]
+        solver.force_of[t] += solver.solver_mass[q] * length(solver.acceleration[q]) * dt
     for k in range(span[0], span[1]):
-        weigh_row(solver, k, span[4])
+        compute_effective_mass(solver, k, span[4])
 
 
 @part
@@ -44,15 +44,15 @@ def find_support(solver, span):
     total = scale(solver.velocity[span[2]], 0.0)
     motion = given = work = 0.0
     for q in range(span[2], span[3]):  # among themselves they give none
-        total = add_scaled(total, sub(solver.velocity[q], solver.velocity_before[q]), solver.heft[q])
-        motion += solver.heft[q] * length(solver.velocity_before[q])
+        total = add_scaled(total, sub(solver.velocity[q], solver.velocity_before[q]), solver.solver_mass[q])
+        motion += solver.solver_mass[q] * length(solver.velocity_before[q])
     size = length(total)
     if not size > GAIN_ROUNDING * motion:
         return total, 0.0, 0.0
     way = scale(total, 1.0 / size)
     for q in range(span[2], span[3]):
         if solver.mass_ratio[q] < 1.0:
-            given += max(0.0, dot(way, sub(solver.velocity[q], solver.velocity_before[q]))) * solver.heft[q]
+            given += max(0.0, dot(way, sub(solver.velocity[q], solver.velocity_before[q]))) * solver.solver_mass[q]
     for e in range(solver.driven_rows):
         work += work_of_mover(solver, solver.driven_row[e], span[4])
     if len(span[4]) > 1 and solver.movers > 0:
@@ -62,7 +62,7 @@ def find_support(solver, span):
 
 
 @inlined
-def stopping(rest, held, motion, change):
+def braking_share(rest, held, motion, change):
     """The share of a change that stops what moves against it, where its ``rest`` has not acted, and of that at most as
     much as is ``held``. motion, change: the momentum of the change times the motion with all of it, and times itself.
     """
@@ -70,7 +70,7 @@ def stopping(rest, held, motion, change):
 
 
 @part
-def weigh_down(solver, h, span):
+def restore_mass(solver, h, span):
     """In the h of a substep bodies have moved as if they were light; where h is 0 velocities are as if they were.
 
     What is outside of the island stops them as if it were so: it can bear anything. It throws none.
@@ -81,7 +81,7 @@ def weigh_down(solver, h, span):
         if rest > 0.0:
             change = sub(solver.velocity[q], solver.velocity_before[q])
             along = max(0.0, dot(change, way))
-            stop = stopping(rest, held, along * (dot(solver.velocity[q], way) - speed), along * along)
+            stop = braking_share(rest, held, along * (dot(solver.velocity[q], way) - speed), along * along)
             change = add_scaled(scale(way, stop * along), change, -rest)
             if h > 0.0:
                 solver.shift[q] = add_scaled(solver.shift[q], change, h)
@@ -90,9 +90,9 @@ def weigh_down(solver, h, span):
         if rest > 0.0 and len(span[4]) > 0:
             change = sub(solver.spin[q], solver.spin_before[q])
             momentum = momentum_of_spin(solver, q, change)
-            stop = stopping(rest, held, dot(momentum, solver.spin[q]), dot(momentum, change))
+            stop = braking_share(rest, held, dot(momentum, solver.spin[q]), dot(momentum, change))
             change = scale(change, stop - rest)
             if h > 0.0:
-                turn_body(solver, q, add_scaled(solver.turn[q], change, h))
+                rotate_body(solver, q, add_scaled(solver.turn[q], change, h))
             else:
                 solver.spin[q] = add(solver.spin[q], change)

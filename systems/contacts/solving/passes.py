@@ -6,11 +6,11 @@ import math
 
 from ....framework.compilation import part
 from ....framework.vectors import length
-from ..constants import AGREED, AGREED_SHARE, HARD_PASSES, SUBSTEP_WORK
+from ..constants import CONVERGED_SHARE, CONVERGED_SPEED, HARD_PASSES, SUBSTEP_WORK
 from .chunks import solve_chunks
 from .rows import closing_speed, relax_listed, solve_friction, solve_normals, solve_rolling
 
-FEW = 6  # rows of a chunk: fewer are as fast one by one, with the same bits
+FEW_ROWS = 6  # rows of a chunk: fewer are as fast one by one, with the same bits
 
 
 @part
@@ -18,7 +18,7 @@ def solve_pass(solver, bias, pushes, over, span):
     """One pass over the rows of a range: along their normals and along their surfaces. over: see OVER."""
     if len(span[4]) > 0 and solver.has_rolling:
         solve_rolling(solver, span)
-    if len(span[4]) > 0 and (solver.end_chunk - solver.first_chunk) * FEW < span[1] - span[0]:
+    if len(span[4]) > 0 and (solver.end_chunk - solver.first_chunk) * FEW_ROWS < span[1] - span[0]:
         solve_chunks(solver, bias, pushes, span)
     else:
         solve_normals(solver, bias, pushes, span)
@@ -40,7 +40,7 @@ def least_change(solver, h, span):
     fastest = 0.0
     for q in range(span[2], span[3]):
         fastest = max(fastest, length(solver.acceleration[q]) * h)
-    return AGREED_SHARE * fastest if fastest > 0.0 else math.inf
+    return CONVERGED_SHARE * fastest if fastest > 0.0 else math.inf
 
 
 @part
@@ -48,7 +48,7 @@ def agrees(solver, h, least, span):
     """Whether the last pass has changed nothing that matters."""
     any_wrong = False
     for k in range(span[0], span[1]):
-        wrong = min(AGREED * solver.extent[k] / h, least) * solver.mass[k]
+        wrong = min(CONVERGED_SPEED * solver.extent[k] / h, least) * solver.mass[k]
         any_wrong |= not abs(solver.impulse[k] - solver.previous[k]) <= wrong
     return not any_wrong
 
@@ -59,7 +59,7 @@ def converge(solver, pushes, h, span):
     start, stop, least = span[0], span[1], least_change(solver, h, span)
     for _ in range(min(HARD_PASSES, SUBSTEP_WORK // (stop - start))):
         note_impulses(solver, span)
-        solve_pass(solver, solver.pushing if pushes else solver.opening, pushes, 1.0, span)
+        solve_pass(solver, solver.pushing if pushes else solver.target_speed, pushes, 1.0, span)
         if agrees(solver, h, least, span):
             break
 
@@ -67,7 +67,7 @@ def converge(solver, pushes, h, span):
 @part
 def list_by_gap(solver, span):
     """The rows of a range into ``listed``, what is nearest first; Shell's sort."""
-    start, count, listed, opening = span[0], span[1] - span[0], solver.listed, solver.opening
+    start, count, listed, opening = span[0], span[1] - span[0], solver.listed, solver.target_speed
     for e in range(count):
         listed[e] = start + e
     stride = count // 2
@@ -85,7 +85,7 @@ def list_by_gap(solver, span):
 
 
 @part
-def close_in_order(solver, h, span):
+def close_nearest_first(solver, h, span):
     """What falls far in a substep: rows come in as they close, the nearest first, each once those before it agree.
 
     All at once would not end: a pass takes back of an impulse no more than what is open, and one of a row that another
@@ -96,7 +96,7 @@ def close_in_order(solver, h, span):
     work = SUBSTEP_WORK
     for e in range(count):
         k = solver.listed[e]
-        new = closing_speed(solver, k, span[4]) > solver.opening[k]
+        new = closing_speed(solver, k, span[4]) > solver.target_speed[k]
         while new and work > 0:
             note_impulses(solver, span)
             relax_listed(solver, e + 1, span[4])

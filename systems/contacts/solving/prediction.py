@@ -15,7 +15,7 @@ from ....framework.schedule.stages import Rows
 from ....framework.vectors import add, add_scaled, dot, length, scale, sub
 from ...codes import OK
 from ...compounds.rows import owner_of
-from ...compounds.stages import share_prediction
+from ...compounds.stages import copy_prediction_to_parts
 from ...joints.bodies import push_joined
 from ...records import CURVES, PREDICTED
 from .warm_start import find_rows, scale_to
@@ -137,7 +137,7 @@ def predict_rest(state, dt):
                 bodies.path_second[i] = add_scaled(bodies.path_second[i], dv, travels / dt)
             else:
                 bodies.path_velocity[i] = add_scaled(bodies.path_velocity[i], dv, travels)
-    share_prediction(state)
+    copy_prediction_to_parts(state)
     return OK
 
 

@@ -42,7 +42,7 @@ SOLVER = Schema(
     tangent=vectors(),  # and along the surface
     total=floats(),  # N s in the step
     previous=floats(),  # impulse before a pass or a substep
-    opening=floats(),  # m/s at which it may close,
+    target_speed=floats(),  # m/s at which it may close,
     pushing=floats(),  # and the same in the pass that pushes: below 0 where overlap is to open
     loaded=floats(),  # m of sag under the impulse of the last step
     had_impulse=flags(),  # it has pushed in this step
@@ -93,7 +93,7 @@ SOLVER = Schema(
     shift=vectors(),  # m since the step began
     acceleration=vectors(),
     inverse_mass=floats(),
-    heft=floats(),  # kg; 0 for what cannot be moved
+    solver_mass=floats(),  # kg; 0 for what cannot be moved
     mass_ratio=floats(),  # of what it counts as to what it is: 1, less where it is lightened
     spin=vectors(),  # where bodies spin, as in the records of the bodies
     spin_before=vectors(),  # of a substep
@@ -121,7 +121,7 @@ SOLVER = Schema(
     most_change=floats(),  # m/s that forces make in the step
     stiff=floats(),  # 1 / (kg m): largest inverse mass of a row over its extent
     own=floats(),  # 1 / m: the same times the mass of the lighter body
-    strike=floats(),  # extents per step that some row closes
+    approach_extents=floats(),  # extents per step that some row closes
     substeps_of=ints("int32"),
     hard_of=flags(),
     passes=ints("int32"),  # further ones in a substep, at most
@@ -140,7 +140,7 @@ SOLVER = Schema(
     leader=ints("int32"),  # row of its first body
     jointed=flags(),
     driven=flags(),  # by motors or springs, which give energy
-    jolted=flags(),  # so fast struck that its joints need more substeps
+    needs_substeps=flags(),  # so fast struck that its joints need more substeps
     credit=floats(),  # J that joints have taken in this step, and may give back
     at_once=flags(),  # some of its joints are solved at once
     sway=floats(),  # 1/m: how fast light bodies of joints swing that bear heavy ones, see direct
@@ -167,12 +167,12 @@ SOLVER = Schema(
     direct=DIRECT,
 )
 
-ARMS = (
+ARM_COLUMNS = (
     "place", "arm_a", "arm_b", "core_a", "core_b", "tangent_mass", "rolling", "rolled", "mass_a", "mass_b", "inertia_a",
     "inertia_b", "products_a", "products_b", "velocity_a", "velocity_b", "spin_a", "spin_b", "ends",
     "points",
 )  # fmt: skip
-TURNS = (
+TURN_COLUMNS = (
     "spin", "spin_before", "turn", "sine", "versine", "inverse_inertia", "inverse_products", "frame", "inverse_moments",
     "reach",
 )  # fmt: skip

@@ -24,7 +24,7 @@ from ...integration.turning import (
     shares_of_turn,
     twist,
 )  # fmt: skip
-from ..constants import DEEP, DEEPEST, EXCESS, OPEN, SLOPE, VERY_DEEP
+from ..constants import CROWD_OVERLAP, CROWD_PUSH_MAX, CROWD_SLOPE, FULL_PUSH_OVERLAP, GAP_TOLERANCE, STRUCK_EXCESS
 
 NO_ARMS, ARMS, JOINTED = (), (True,), (True, True)
 
@@ -40,14 +40,14 @@ def compliance_along(solver, k, along, arms):
 
 
 @inlined
-def turn_body(solver, q, turn):
+def rotate_body(solver, q, turn):
     """Body q is turned so far since the step began."""
     solver.turn[q] = turn
     solver.sine[q], solver.versine[q] = shares_of_turn(turn)
 
 
 @part
-def turn_on(solver, begin, end, h):
+def integrate_rotation(solver, begin, end, h):
     """Bodies go on turning for a time; several at once where none has turned far."""
     any_far = False
     for q in range(begin, end):
@@ -56,11 +56,11 @@ def turn_on(solver, begin, end, h):
         solver.sine[q], solver.versine[q] = shares_of_small_turn(turn)
         any_far |= not dot(turn, turn) < SERIES
     for q in range(begin, end if any_far else begin):
-        turn_body(solver, q, solver.turn[q])
+        rotate_body(solver, q, solver.turn[q])
 
 
 @inlined
-def room_of(solver, k, arms):
+def separation(solver, k, arms):
     """The gap of row k where its bodies are now."""
     a, b = solver.first[k], solver.second[k]
     way = sub(solver.shift[b], solver.shift[a])
@@ -71,7 +71,7 @@ def room_of(solver, k, arms):
 
 
 @inlined
-def way_by_turns(solver, k, arms):
+def separation_from_rotation(solver, k, arms):
     """How much farther apart row k is along its normal because its bodies are not turned as where the step ends."""
     if len(arms) == 0:
         return 0.0
@@ -100,7 +100,7 @@ def most_compliance(solver, k, arms):
 
 
 @inlined
-def weigh_row(solver, k, arms):
+def compute_effective_mass(solver, k, arms):
     """The masses that row k moves along its normal and its surface."""
     solver.mass[k] = 1.0 / compliance_along(solver, k, solver.normal[k], arms)
     if len(arms) > 0:
@@ -140,32 +140,32 @@ def excess_of(closing, opening, impulse):
 @inlined
 def excess_speed(solver, k, arms):
     """The speed that a pass over row k would still change."""
-    return excess_of(closing_speed(solver, k, arms), solver.opening[k], solver.impulse[k])
+    return excess_of(closing_speed(solver, k, arms), solver.target_speed[k], solver.impulse[k])
 
 
 @inlined
-def ask(solver, k, arms, asks):
+def update_targets(solver, k, arms, asks):
     """What row k asks, see ``measure``, without a branch; returns whether its speed is far from that.
 
     asks: (s in which it may close, of a substep, of a step, springs, stiff).
     """
     ahead, h, dt, springs, stiff = asks
-    room, closing, impulse = room_of(solver, k, arms), closing_speed(solver, k, arms), solver.impulse[k]
+    room, closing, impulse = separation(solver, k, arms), closing_speed(solver, k, arms), solver.impulse[k]
     extent, hard = solver.extent[k], solver.hard[k]
     softness = springs[1][0] if solver.fixed[k] else springs[0][0]
     bias_rate = springs[1][1] if solver.fixed[k] else springs[0][1]
     opening = (room if room > 0.0 else 0.0) / ahead
-    deep, least = -(DEEP * extent + solver.loaded[k]), -DEEPEST * extent
-    beyond = SLOPE * (room + VERY_DEEP * extent)
+    deep, least = -(FULL_PUSH_OVERLAP * extent + solver.loaded[k]), -CROWD_PUSH_MAX * extent
+    beyond = CROWD_SLOPE * (room + CROWD_OVERLAP * extent)
     beyond = beyond if beyond < 0.0 else 0.0
     at_once = room / (h * bias_rate)
     at_once = at_once if at_once > deep else deep
     once = hard and (len(arms) == 0 or len(solver.normal[k]) == 2)  # what stands on three points would rock for ever
     near = at_once if once else room
     push = deep + (beyond if beyond > least else least) if room < deep else near
-    soft = (room <= OPEN * extent) & (not solver.parting[k])  # what was just closed, on either side of rounding
-    wrong = excess_of(closing, opening, impulse) * dt > EXCESS * extent
-    solver.opening[k], solver.pushing[k] = opening, bias_rate * push if soft else opening
+    soft = (room <= GAP_TOLERANCE * extent) & (not solver.parting[k])  # just closed, give or take rounding
+    wrong = excess_of(closing, opening, impulse) * dt > STRUCK_EXCESS * extent
+    solver.target_speed[k], solver.pushing[k] = opening, bias_rate * push if soft else opening
     solver.soft[k] = 0.0 if stiff or hard or not soft else softness
     solver.had_impulse[k] |= impulse > 0.0
     solver.wrong[k] = wrong  # not to be read again here: several rows are asked at once
@@ -270,7 +270,7 @@ def relax_listed(solver, count, arms):
     for e in range(count):
         k = solver.listed[e]
         old = solver.impulse[k]
-        new = max(0.0, old + solver.mass[k] * (closing_speed(solver, k, arms) - solver.opening[k]))
+        new = max(0.0, old + solver.mass[k] * (closing_speed(solver, k, arms) - solver.target_speed[k]))
         apply_impulse(solver, k, scale(solver.normal[k], new - old), arms)
         solver.impulse[k] = new
         if solver.friction[k] != 0.0:

@@ -19,26 +19,35 @@ from ...joints.direct import solve_direct
 from ...joints.rows import add_joints, keep_joints, measure_joints, solve_joints, start_joints, warm_start_joints
 from ..constants import (
     DAMPING_RATIO,
-    DEEP,
+    FRICTION_OVERRELAXATION,
+    FULL_PUSH_OVERLAP,
     LAST_RELAX_PASSES,
-    LOADED,
-    MOST_LOAD,
-    MOST_LOADED,
-    OVER,
+    LOAD_SAG_MAX,
+    LOAD_SAG_SHARE,
     REFINED_PASSES,
     RELAX_PASSES,
-    STIFFER,
-    STILL,
-    TOLD_GAIN,
+    REPORTED_GAIN,
+    REST_TOLERANCE,
+    STATIC_STIFFNESS,
     TURNING_RELAX_PASSES,
+    WARM_START_MAX,
 )  # fmt: skip
 from .chunks import find_chunks
 from .guard import finish_substep, island_of, islands_of, list_driven, open_all
-from .hard import choose_hard, leave_open
-from .overload import lighten, weigh_down
-from .passes import close_in_order, converge, note_impulses, solve_pass
-from .rows import ARMS, JOINTED, NO_ARMS, apply_impulse, ask, turn_body, turn_on, weigh_row
-from .turning import turn_joined
+from .hard import defer_open_contacts, select_rigid
+from .overload import cap_mass_ratio, restore_mass
+from .passes import close_nearest_first, converge, note_impulses, solve_pass
+from .rows import (
+    ARMS,
+    JOINTED,
+    NO_ARMS,
+    apply_impulse,
+    compute_effective_mass,
+    integrate_rotation,
+    rotate_body,
+    update_targets,
+)
+from .turning import integrate_rotation_of_joined
 
 ORDINARY, REFINED, HARD = range(3)  # ranges: with the usual substeps, with more, with contacts that do not sag
 
@@ -56,7 +65,7 @@ def measure(solver, h, springs, dt, stiff, ends, span):
     for t in range(islands[0], islands[1]):
         solver.struck[t] = False
     for k in range(span[0], span[1]):
-        any_struck |= ask(solver, k, span[4], asks)
+        any_struck |= update_targets(solver, k, span[4], asks)
     for k in range(span[0], span[1] if any_struck else span[0]):
         if solver.wrong[k]:
             solver.struck[island_of(solver, k)] = True
@@ -94,7 +103,7 @@ def apply_warm_start(solver, most, span):
 
 
 @part
-def move(solver, h, span):
+def integrate_positions(solver, h, span):
     """Bodies move for a substep; what moves by itself belongs to no special range, but moves with each of them."""
     for q in range(span[2], span[3]):
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], h)
@@ -102,17 +111,17 @@ def move(solver, h, span):
         q = solver.mover[m]
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], h)
         if len(span[4]) > 0:
-            turn_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], h))
-    turn_bodies(solver, h, span)
+            rotate_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], h))
+    integrate_rotations(solver, h, span)
 
 
 @part
-def turn_bodies(solver, h, span):
+def integrate_rotations(solver, h, span):
     """Bodies go on turning for a time."""
     if len(span[4]) > 1 and len(solver.velocity[solver.bodies]) == 3:  # of the world, where there are joints
-        turn_joined(solver, span[2], span[3], h)
+        integrate_rotation_of_joined(solver, span[2], span[3], h)
     elif len(span[4]) > 0:
-        turn_on(solver, span[2], span[3], h)
+        integrate_rotation(solver, span[2], span[3], h)
 
 
 @part
@@ -130,11 +139,11 @@ def relax_passes(solver, kind, ends, span):
 def solve_substep(solver, springs, most, dt, h, kind, ends, span):
     """One substep of a range. springs: see ``spring_of``."""
     start, stop = span[0], span[1]
-    opening, stiff = solver.opening, kind == HARD
+    opening, stiff = solver.target_speed, kind == HARD
     apply_forces(solver, h, span)
     apply_warm_start(solver, most, span)
     if stiff:
-        close_in_order(solver, h, span)
+        close_nearest_first(solver, h, span)
     if len(span[4]) > 1:
         solve_joints(solver, True)
     solve_pass(solver, solver.pushing, True, 1.0, span)
@@ -142,24 +151,24 @@ def solve_substep(solver, springs, most, dt, h, kind, ends, span):
         converge(solver, True, h, span)
     if len(span[4]) > 1 and solver.direct.begin < solver.direct.end and start < stop:
         solve_direct(solver, True)
-    move(solver, h, span)
+    integrate_positions(solver, h, span)
     if solver.lightened:
-        weigh_down(solver, h, span)
+        restore_mass(solver, h, span)
     any_struck = measure(solver, h, springs, dt, stiff, ends, span)
     if ends and solver.any_hard:
-        leave_open(solver, h, span)
+        defer_open_contacts(solver, h, span)
     if len(span[4]) > 1:  # once: more often, chains give way more
         solve_joints(solver, False)
     last = relax_passes(solver, kind, ends, span) - 1
     for one in range(last + 1):
-        solve_pass(solver, opening, False, OVER if one < last else 1.0, span)
+        solve_pass(solver, opening, False, FRICTION_OVERRELAXATION if one < last else 1.0, span)
     if stiff:
         converge(solver, False, h, span)
     if len(span[4]) > 1 and solver.direct.begin < solver.direct.end and start < stop:
         solve_direct(solver, False)
     finish_substep(solver, springs[0][1], any_struck, h, dt, span)
     if solver.lightened:
-        weigh_down(solver, 0.0, span)
+        restore_mass(solver, 0.0, span)
     for k in range(start, stop):
         solver.total[k] += solver.impulse[k]
         solver.had_impulse[k] |= solver.impulse[k] > 0.0
@@ -181,11 +190,11 @@ def is_still(solver, dt, span):
     for q in range(begin, end if len(arms) > 0 else begin):
         around = scale(solver.spin[q], solver.reach[q])
         fastest = max(fastest, dot(around, around))
-    if not math.sqrt(fastest) * dt <= STILL * extent:
+    if not math.sqrt(fastest) * dt <= REST_TOLERANCE * extent:
         return False
     changes = False
     for k in range(start, stop):
-        changes |= abs(solver.impulse[k] - solver.previous[k]) > STILL * solver.impulse[k]
+        changes |= abs(solver.impulse[k] - solver.previous[k]) > REST_TOLERANCE * solver.impulse[k]
     return not changes
 
 
@@ -196,7 +205,7 @@ def repeat_substep(solver, left, h, span):
         solver.total[k] += left * solver.impulse[k]
     for q in range(span[2], span[3]):
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], left * h)
-    turn_bodies(solver, left * h, span)
+    integrate_rotations(solver, left * h, span)
 
 
 @part
@@ -212,12 +221,12 @@ def most_impulse(solver, t, substeps):
     """The most that a substep may start with: what bears the loads of island t, or pushes all of it out. What is more
     was a blow, which does not act again."""
     own = solver.own[t]  # 0: of joints alone
-    pushes = solver.mass_of[t] * solver.push_rate * DEEP / own if own > 0.0 else 0.0
-    return MOST_LOAD * (solver.force_of[t] / substeps + pushes)
+    pushes = solver.mass_of[t] * solver.push_rate * FULL_PUSH_OVERLAP / own if own > 0.0 else 0.0
+    return WARM_START_MAX * (solver.force_of[t] / substeps + pushes)
 
 
 @part
-def spring_of(solver, stiffer, substeps, h):
+def contact_spring(solver, stiffer, substeps, h):
     """(share of its impulse that a soft row gives back, speed per overlap at which it is pushed out).
 
     Where there are more substeps than usual springs are damped by as much more: for the heavy bodies that they bear,
@@ -232,15 +241,15 @@ def spring_of(solver, stiffer, substeps, h):
 def solve_range(solver, substeps, kind, dt, span):
     """The substeps of a range."""
     h, stiff, special = dt / substeps, kind == HARD, kind != ORDINARY
-    springs = spring_of(solver, 1.0, substeps, h), spring_of(solver, STIFFER, substeps, h)
+    springs = contact_spring(solver, 1.0, substeps, h), contact_spring(solver, STATIC_STIFFNESS, substeps, h)
     open_all(solver, span)
     list_driven(solver, span)
     if len(span[4]) > 0:
         find_chunks(solver, span)
     scale_impulses(solver, 1.0 / substeps, span)
     for k in range(span[0], span[1]):
-        sag = LOADED * solver.sag * solver.impulse[k] * h / solver.mass[k]
-        solver.loaded[k] = 0.0 if stiff else min(sag, MOST_LOADED * solver.extent[k])
+        sag = LOAD_SAG_SHARE * solver.sag * solver.impulse[k] * h / solver.mass[k]
+        solver.loaded[k] = 0.0 if stiff else min(sag, LOAD_SAG_MAX * solver.extent[k])
     if len(span[4]) > 1:
         start_joints(solver, h, dt / solver.usual)
     measure(solver, h, springs, dt, stiff, False, span)
@@ -271,23 +280,23 @@ def count_work(state, dt):
             state.restrained_counted += 1
             state.restrained_energy += taken
             step = math.sqrt(2.0 * taken / solver.mass_of[t]) * dt * solver.own[t]
-            if taken > 0.5 * solver.energy[t] and step > TOLD_GAIN:
+            if taken > 0.5 * solver.energy[t] and step > REPORTED_GAIN:
                 if solver.restrained == 0:
                     solver.restrained_row = solver.leader[t]
                 solver.restrained += 1
 
 
 @part
-def advance(state, dt, arms):
+def solve_substeps(state, dt, arms):
     """Advance the bodies by their substeps under their mean acceleration and their contacts."""
     solver = state.solver
     for k in range(solver.contacts):
-        weigh_row(solver, k, arms)
+        compute_effective_mass(solver, k, arms)
         solver.total[k], solver.had_impulse[k] = 0.0, False
     solver.visits, solver.usual = 0, state.substeps
     omega = 2.0 * math.pi * solver.frequency * state.substeps / dt
     solver.push_rate = omega / (2.0 * DAMPING_RATIO + omega * dt / state.substeps)
-    choose_hard(state, dt, zero_of(state), arms)
+    select_rigid(state, dt, zero_of(state), arms)
     start, begin, solver.lightened = 0, 0, False
     for s in range(solver.ranges):
         span = start, solver.row_ends[s], begin, solver.body_ends[s], arms
@@ -297,10 +306,10 @@ def advance(state, dt, arms):
                 q = solver.mover[m]
                 solver.shift[q] = zero_of(state)
                 if len(arms) > 0:
-                    turn_body(solver, q, scale(solver.spin[q], -dt))
+                    rotate_body(solver, q, scale(solver.spin[q], -dt))
             solver.lightened = solver.bears[t] < 1.0
             if solver.lightened:
-                lighten(solver, t, dt, span)
+                cap_mass_ratio(solver, t, dt, span)
         any_joint = False
         if len(arms) > 1:
             solver.joints.begin = solver.joints.end if special else 0
@@ -321,7 +330,7 @@ def advance(state, dt, arms):
 def solve_contacts(state, dt):
     """The contacts of bodies of which none spins."""
     if state.solver.contacts > 0:
-        advance(state, dt, NO_ARMS)
+        solve_substeps(state, dt, NO_ARMS)
     return OK
 
 
@@ -329,7 +338,7 @@ def solve_contacts(state, dt):
 def solve_turning_contacts(state, dt):
     """The contacts of bodies of which some spin."""
     if state.solver.contacts > 0:
-        advance(state, dt, ARMS)
+        solve_substeps(state, dt, ARMS)
     return OK
 
 
@@ -337,5 +346,5 @@ def solve_turning_contacts(state, dt):
 def solve_joined_contacts(state, dt):
     """The joints of bodies, and the contacts where there are joints."""
     if state.solver.contacts > 0 or state.solver.joints.active > 0:
-        advance(state, dt, JOINTED)
+        solve_substeps(state, dt, JOINTED)
     return OK

@@ -13,16 +13,16 @@ from ....framework.compilation import part
 from ....framework.vectors import add_scaled, dot, item, length, scale
 from ...integration.turning import SERIES, change_of_spin
 from ...shapes.free_rotation import diagonalised, energy_of, turn_freely, turn_to_energy
-from ...shapes.poses import NO_INERTIA, momentum_along, triple, tumbles
+from ...shapes.poses import NO_INERTIA, has_unequal_moments, momentum_along, triple
 from ...shapes.quaternions import product, rotate, rotation_in_space, turned_tensor
-from .rows import turn_body
+from .rows import rotate_body
 
 NOT_TUMBLING = 2.0  # in place of the first number of a unit quaternion
-ALONG = 1e-14  # of the trace: what is off the diagonal by less is rounding
+DIAGONAL_ROUNDING = 1e-14  # of the trace: what is off the diagonal by less is rounding
 
 
 @part
-def numbers_of(v):
+def components_of(v):
     return item(v, 0), item(v, 1), item(v, len(v) - 1)
 
 
@@ -31,12 +31,12 @@ def note_frame(state, q):
     """The principal axes of body q of the solver where the flight has turned it, and 1 / moments about them."""
     solver, i = state.solver, state.solver.body_row[q]
     solver.frame[q, 0] = NOT_TUMBLING
-    if not (state.bodies.inverse_mass[i] > 0.0 and tumbles(state, i)):
+    if not (state.bodies.inverse_mass[i] > 0.0 and has_unequal_moments(state, i)):
         return
     frame, v, u = rotation_in_space(state, i), state.bodies.inverse_inertia[i], state.bodies.inverse_products[i]
     back = frame[0], -frame[1], -frame[2], -frame[3]
-    xx, yy, zz, xy, xz, yz = turned_tensor(back, (*numbers_of(v), *numbers_of(u)))
-    least = ALONG * (xx + yy + zz)
+    xx, yy, zz, xy, xz, yz = turned_tensor(back, (*components_of(v), *components_of(u)))
+    least = DIAGONAL_ROUNDING * (xx + yy + zz)
     if abs(xy) > least or abs(xz) > least or abs(yz) > least:
         (xx, yy, zz), own = diagonalised(xx, yy, zz, xy, xz, yz)
         frame = product(frame, own)
@@ -48,7 +48,7 @@ def note_frame(state, q):
 
 
 @part
-def turn_little(frame, m, inverse, h):
+def rotate_by_small_turn(frame, m, inverse, h):
     """As :func:`turn_freely`, by the midpoint rule: for small angles."""
     x, y, z = m[0] * inverse[0], m[1] * inverse[1], m[2] * inverse[2]
     half, energy = 0.5 * h, energy_of(m, inverse)
@@ -65,7 +65,7 @@ def turn_little(frame, m, inverse, h):
 
 
 @part
-def vector_of(like, q):
+def rotation_vector(like, q):
     """The vector by which a unit quaternion turns."""
     sine = math.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     size = 2.0 * math.atan2(math.copysign(sine, q[0]), abs(q[0])) / sine if sine > 0.0 else 0.0
@@ -77,22 +77,22 @@ def quaternion_of(turn):
     """The unit quaternion of a vector by which something turns."""
     size = length(turn)
     sine = math.sin(0.5 * size) / size if size > 0.0 else 0.5
-    x, y, z = numbers_of(turn)
+    x, y, z = components_of(turn)
     return math.cos(0.5 * size), sine * x, sine * y, sine * z
 
 
 @part
-def tumble(solver, q, h):
+def integrate_free_rotation(solver, q, h):
     """Body q turns by itself for a time. What its momentum was before the impulses of the substep stays that, so that
     less of them may act in the end, see guard; but that has no more energy than it had, and what it has less is no
     gain of theirs."""
-    spin, before, inverse = solver.spin[q], solver.spin_before[q], numbers_of(solver.inverse_moments[q])
+    spin, before, inverse = solver.spin[q], solver.spin_before[q], components_of(solver.inverse_moments[q])
     frame = solver.frame[q, 0], solver.frame[q, 1], solver.frame[q, 2], solver.frame[q, 3]
     m = momentum_along(frame, inverse, spin)
     momentum = triple(spin, rotate(frame, momentum_along(frame, inverse, before), False))
     little = h * h * dot(spin, spin) < SERIES and dot(solver.turn[q], solver.turn[q]) < SERIES
     if little:
-        to, m, gained = turn_little(frame, m, inverse, h)
+        to, m, gained = rotate_by_small_turn(frame, m, inverse, h)
     else:
         to, m, gained = turn_freely(frame, m, inverse, h)
     to, m = turn_to_energy(to, m, inverse, gained)
@@ -107,14 +107,14 @@ def tumble(solver, q, h):
     if solver.island[q] >= 0:
         solver.credit[solver.island[q]] += 0.5 * max(0.0, had - has)
     by = product(to, (frame[0], -frame[1], -frame[2], -frame[3]))
-    turn_body(solver, q, vector_of(spin, product(by, quaternion_of(solver.turn[q]))))
+    rotate_body(solver, q, rotation_vector(spin, product(by, quaternion_of(solver.turn[q]))))
 
 
 @part
-def turn_joined(solver, begin, end, h):
+def integrate_rotation_of_joined(solver, begin, end, h):
     """Bodies go on turning for a time where there are joints in space."""
     for q in range(begin, end):
         if solver.frame[q, 0] == NOT_TUMBLING:
-            turn_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], h))
+            rotate_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], h))
         elif length(solver.spin[q]) > 0.0:
-            tumble(solver, q, h)
+            integrate_free_rotation(solver, q, h)

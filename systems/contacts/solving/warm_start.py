@@ -12,7 +12,7 @@ from ....framework.jit.records.record_type import zero_of
 from ....framework.schedule.stages import Rows
 from ....framework.vectors import add_scaled, dot, length, scale, sub
 from ...codes import OK
-from ..constants import MOST_LOAD, NEAR_PLACE, OPEN, TURNED
+from ..constants import GAP_TOLERANCE, SAME_NORMAL, SAME_PLACE_EXTENTS, WARM_START_MAX
 from .guard import island_of
 from .records import WARM_START_ROWS
 
@@ -60,7 +60,7 @@ def start_with(solver, memory, k, several, span):
     only one if there are not several, then or now."""
     now, m = memory.now, span[0]
     if several:
-        nearest, m = NEAR_PLACE * solver.extent[k], -1
+        nearest, m = SAME_PLACE_EXTENTS * solver.extent[k], -1
         for one in range(span[0], span[1]):
             away = length(sub(memory.place[now, one], solver.place[k]))
             if away < nearest and not memory.off[one]:
@@ -69,7 +69,7 @@ def start_with(solver, memory, k, several, span):
             return
         memory.off[m] = True  # each once
     n = solver.normal[k]
-    if dot(memory.normal[now, m], n) > TURNED:
+    if dot(memory.normal[now, m], n) > SAME_NORMAL:
         pull = memory.tangent[now, m]
         solver.impulse[k] = memory.impulse[now, m]
         solver.tangent[k] = add_scaled(pull, n, -dot(pull, n))
@@ -123,13 +123,13 @@ def store_warm_start(state, dt):
     new, count = 1 - memory.now, 0
     for r in range(solver.contacts):
         k, c = solver.slot[r], solver.pair[r]
-        if not solver.total[k] * dt > OPEN * solver.extent[k] * solver.mass[k]:  # of rounding; also nan
+        if not solver.total[k] * dt > GAP_TOLERANCE * solver.extent[k] * solver.mass[k]:  # of rounding; also nan
             continue
         a, b = pairs.a[c], pairs.b[c]
         memory.first[new, count], memory.second[new, count] = a, b
         memory.entity_a[new, count], memory.entity_b[new, count] = entity[a], entity[b]
         last, total = solver.impulse[k], solver.total[k]
-        push, most = scale(solver.normal[k], total), MOST_LOAD * solver.force_of[island_of(solver, k)]
+        push, most = scale(solver.normal[k], total), WARM_START_MAX * solver.force_of[island_of(solver, k)]
         if last > 0.0 and solver.friction[k] != 0.0:
             push = add_scaled(push, solver.tangent[k], min(1.0, total / last))
         memory.push[new, count] = push

@@ -7,9 +7,9 @@ import math
 from ....framework.compilation import inlined, part
 from ....framework.jit.stack_arrays import stack_array
 from ....framework.vectors import dot, negative, row, store
-from .gjk import ROUNDING, corner, edge, norm, refine_direction, support_points
+from .gjk import GJK_ROUNDING, corner, edge, norm, refine_direction, support_points
 
-CORNERS = 64
+POLYGON_CORNERS = 64
 
 
 @inlined
@@ -32,8 +32,8 @@ def polygon_depth(pair, d, of_a, of_b, size):
     upper one; each new corner splits the nearest edge. They meet for polygons; for smooth shapes the answer is the best
     upper bound, refined if there are more corners to find than there is room for.
     """
-    following, heights = stack_array(CORNERS, 0), stack_array(CORNERS, 0.0)
-    normals = stack_array(CORNERS, (0.0, 0.0))
+    following, heights = stack_array(POLYGON_CORNERS, 0), stack_array(POLYGON_CORNERS, 0.0)
+    normals = stack_array(POLYGON_CORNERS, (0.0, 0.0))
     one, two = edge(of_a, of_b, 0, 1, d), edge(of_a, of_b, 0, 2, d)
     turned = 0 if one[0] * two[1] > one[1] * two[0] else 1  # if the corners go round clockwise
     for i in range(3):
@@ -41,15 +41,15 @@ def polygon_depth(pair, d, of_a, of_b, size):
     for i in range(3):
         store_edge(of_a, of_b, following, normals, heights, i, d)
     count, best, depth = 3, d, math.inf
-    for _ in range(2 * CORNERS):
+    for _ in range(2 * POLYGON_CORNERS):
         i = 0
         for k in range(1, count):
             if heights[k] < heights[i]:
                 i = k
-        if not heights[i] < depth - ROUNDING * size:
+        if not heights[i] < depth - GJK_ROUNDING * size:
             break
         outward = row(normals, i, d)
-        if count == CORNERS:
+        if count == POLYGON_CORNERS:
             best, depth = refine_direction(pair, d, best, depth, size)
             break
         point_a, point_b = support_points(pair, negative(outward))

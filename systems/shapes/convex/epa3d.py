@@ -11,11 +11,11 @@ import math
 from ....framework.compilation import inlined, part
 from ....framework.jit.stack_arrays import stack_array
 from ....framework.vectors import add_scaled, divided, dot, negative, row, scale, store
-from .gjk import ROUNDING, corner, cross, edge, face_normal, norm, refine_direction, support_points
+from .gjk import GJK_ROUNDING, corner, cross, edge, face_normal, norm, refine_direction, support_points
 
-CORNERS = 64
-FACES = 128  # a closed surface of triangles has twice as many faces as corners, less 4
-EDGES = 192
+POLYTOPE_CORNERS = 64
+POLYTOPE_FACES = 128  # a closed surface of triangles has twice as many faces as corners, less 4
+POLYTOPE_EDGES = 192
 SAME_WAY = 0.9  # cosine: from faces that look the same way a search ends in the same minimum
 
 
@@ -57,7 +57,7 @@ def remove_visible_faces(surface, count, edges, top, seen_from, slack, d):
             if e < rim:
                 rim -= 1
                 edges[e, 0], edges[e, 1] = edges[rim, 0], edges[rim, 1]
-            elif rim == EDGES:
+            elif rim == POLYTOPE_EDGES:
                 return count, -1
             else:
                 edges[rim, 0], edges[rim, 1] = start, end
@@ -127,9 +127,9 @@ def polytope_depth(pair, d, of_a, of_b, size):
     upper one. They meet for polytopes; for smooth shapes the answer is the best upper bound, refined if
     there are more corners to find than there is room for.
     """
-    faces, edges = stack_array(FACES, (0, 0, 0)), stack_array(EDGES, (0, 0))
-    normals = stack_array(FACES, (0.0, 0.0, 0.0))
-    heights, waiting = stack_array(FACES, 0.0), stack_array(FACES, 0.0)
+    faces, edges = stack_array(POLYTOPE_FACES, (0, 0, 0)), stack_array(POLYTOPE_EDGES, (0, 0))
+    normals = stack_array(POLYTOPE_FACES, (0.0, 0.0, 0.0))
+    heights, waiting = stack_array(POLYTOPE_FACES, 0.0), stack_array(POLYTOPE_FACES, 0.0)
     surface = (faces, normals, heights, waiting)
     turned = 0 if dot(face_normal(of_a, of_b, 0, 1, 2, d), edge(of_a, of_b, 0, 3, d)) > 0.0 else 1
     for f in range(4):  # face f is opposite to corner f
@@ -137,7 +137,7 @@ def polytope_depth(pair, d, of_a, of_b, size):
         faces[f, 1 + (f + turned) % 2] = 2 if f < 2 else 1
         faces[f, 2 - (f + turned) % 2] = 3 if f < 3 else 2
     used, count, rim, best, depth = 4, 0, 4, d, math.inf
-    for _ in range(4 * CORNERS):
+    for _ in range(4 * POLYTOPE_CORNERS):
         for f in range(count, count + rim):  # the new ones
             store_face(of_a, of_b, surface, f, d)
         count, rim = count + rim, 0
@@ -145,10 +145,10 @@ def polytope_depth(pair, d, of_a, of_b, size):
         for f in range(1, count):
             if waiting[f] < waiting[top]:
                 top = f
-        if not waiting[top] < depth - ROUNDING * size:
+        if not waiting[top] < depth - GJK_ROUNDING * size:
             break
         outward = row(normals, top, d)
-        if used == CORNERS:
+        if used == POLYTOPE_CORNERS:
             best, depth = refine_smooth(pair, d, surface, count, best, depth, size)
             break
         point_a, point_b = support_points(pair, negative(outward))
@@ -165,14 +165,14 @@ def polytope_depth(pair, d, of_a, of_b, size):
             if dot(apart, apart) == 0.0:
                 break
             known += 1
-        if known < used or reach - heights[top] <= ROUNDING * size:
+        if known < used or reach - heights[top] <= GJK_ROUNDING * size:
             waiting[top] = math.inf  # as far out as it goes; what is left is rounding
             continue
-        count, rim = remove_visible_faces(surface, count, edges, top, found, ROUNDING * size, d)
-        if rim < 0 or count + rim > FACES:
+        count, rim = remove_visible_faces(surface, count, edges, top, found, GJK_ROUNDING * size, d)
+        if rim < 0 or count + rim > POLYTOPE_FACES:
             break
         for e in range(rim):
             faces[count + e, 0], faces[count + e, 1], faces[count + e, 2] = edges[e, 0], edges[e, 1], used
         used += 1
-    witness = witness_point(of_a, of_b, faces, heights, count, best, depth + ROUNDING * size, d)
+    witness = witness_point(of_a, of_b, faces, heights, count, best, depth + GJK_ROUNDING * size, d)
     return negative(best), depth, witness

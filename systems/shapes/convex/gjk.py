@@ -19,10 +19,10 @@ from ....framework.compilation import inlined, part
 from ....framework.jit.stack_arrays import stack_array
 from ....framework.vectors import add, add_scaled, divided, dot, item, negative, replace, row, scale, store, sub
 
-ROUNDING = 2e-15  # of the coordinates: a few times what one support point may be off
-FLAT = 1e-14  # of the coordinates: a difference thinner than that has no inside, a distance below it no direction
-SMALL, LARGE = 1e-50, 1e50  # coordinates in between can be squared twice
-MAX_STEPS = 64  # boxes take 3 to 8, ellipsoids 15 to 40
+GJK_ROUNDING = 2e-15  # of the coordinates: a few times what one support point may be off
+FLAT_SIMPLEX = 1e-14  # of the coordinates: a thinner difference has no inside, a smaller distance no direction
+SMALL_SCALE, LARGE_SCALE = 1e-50, 1e50  # coordinates in between can be squared twice
+GJK_STEPS = 64  # boxes take 3 to 8, ellipsoids 15 to 40
 REFINEMENTS = 24  # ellipsoids take 6 to 12
 MAX_STALLS = 4  # steps that bring less than the rounding of the coordinates, as from one end of a long edge to another
 
@@ -180,16 +180,16 @@ def closest_simplex(pair, d, of_a, of_b):
         direction = replace(d, 0, 1.0)
     nearest, witness = direction, d
     square, size_square, count, stalls = math.inf, dot(d, d), 0, 0
-    for _ in range(MAX_STEPS):
+    for _ in range(GJK_STEPS):
         point_a, point_b = support_points(pair, direction)
         size_square = max(size_square, max(dot(point_a, point_a), dot(point_b, point_b)))
         if count == 0:
-            if unit == 1.0 and not SMALL * SMALL < size_square < LARGE * LARGE:
+            if unit == 1.0 and not SMALL_SCALE * SMALL_SCALE < size_square < LARGE_SCALE * LARGE_SCALE:
                 return -1, nearest, witness, 0.0
         else:
             # No point of the difference lies farther on this side; what is left is rounding.
             gain = dot(nearest, sub(sub(row(of_b, 0, d), point_b), sub(row(of_a, 0, d), point_a)))
-            if not gain > ROUNDING * math.sqrt(size_square * square):
+            if not gain > GJK_ROUNDING * math.sqrt(size_square * square):
                 break
             store(of_a, count, row(of_a, 0, d))
             store(of_b, count, row(of_b, 0, d))
@@ -201,13 +201,13 @@ def closest_simplex(pair, d, of_a, of_b):
         now = dot(direction, direction)
         if not now < square:
             stalls += 1
-            if stalls > MAX_STALLS or not math.sqrt(now) <= math.sqrt(square) + ROUNDING * math.sqrt(size_square):
+            if stalls > MAX_STALLS or not math.sqrt(now) <= math.sqrt(square) + GJK_ROUNDING * math.sqrt(size_square):
                 break
         square, nearest = now, direction
         witness = scale(row(of_a, 0, d), weights[0])
         for i in range(1, count):
             witness = add_scaled(witness, row(of_a, i, d), weights[i])
-        if square <= FLAT * FLAT * size_square:
+        if square <= FLAT_SIMPLEX * FLAT_SIMPLEX * size_square:
             return count, nearest, witness, math.sqrt(size_square)
     return 0, nearest, witness, math.sqrt(size_square)
 
@@ -258,7 +258,7 @@ def complete_simplex(pair, d, of_a, of_b, count, size):
             if out < height:
                 normal, height = ahead, out
             ahead = negative(ahead)
-        if not farthest > FLAT * size:
+        if not farthest > FLAT_SIMPLEX * size:
             return 0, normal, height
         count += 1
     return count, normal, height
@@ -280,7 +280,7 @@ def refine_direction(pair, d, outward, depth, size):
         slope = add_scaled(found, outward, -reach)
         if reach < least:
             best, least = outward, reach
-        if not dot(slope, slope) > ROUNDING * size * size * 1e-3:  # the square: 1e-9 of the size
+        if not dot(slope, slope) > GJK_ROUNDING * size * size * 1e-3:  # the square: 1e-9 of the size
             break
         if turn > 0:
             way, change = sub(outward, before), sub(slope, slope_before)

@@ -11,13 +11,13 @@ import math
 from ....framework.compilation import part
 from ....framework.jit.stack_arrays import stack_array
 from ....framework.vectors import add, add_scaled, divided, dot, length, replace, scale
-from .epa2d import CORNERS as POLYGON_CORNERS
+from .epa2d import POLYGON_CORNERS as POLYGON_CORNERS
 from .epa2d import polygon_depth
-from .epa3d import CORNERS as POLYTOPE_CORNERS
+from .epa3d import POLYTOPE_CORNERS as POLYTOPE_CORNERS
 from .epa3d import polytope_depth
-from .gjk import LARGE, SMALL, closest_simplex, complete_simplex, support_points
+from .gjk import LARGE_SCALE, SMALL_SCALE, closest_simplex, complete_simplex, support_points
 
-TILT = 1e-6  # radians; edges so close to parallel touch along their length, not at a corner
+SUPPORT_TILT = 1e-6  # radians; edges so close to parallel touch along their length, not at a corner
 SMALLEST_UNIT, LARGEST_UNIT = 1e-300, 1e300
 
 
@@ -29,7 +29,7 @@ def suitable_unit(pair, d):
         axis = replace(scale(d, 0.0), side // 2, 1.0 if side % 2 == 0 else -1.0)
         point_a, point_b = support_points(pair, axis)
         extent = max(extent, max(length(point_a), length(point_b)))
-    if extent == 0.0 or SMALL < extent < LARGE:
+    if extent == 0.0 or SMALL_SCALE < extent < LARGE_SCALE:
         return 2.0
     return min(max(1.0 / extent, SMALLEST_UNIT), LARGEST_UNIT)
 
@@ -43,7 +43,7 @@ def middle_of_overlap(pair, d, normal):
     along = (-normal[1], normal[0])
     level, low, high = -math.inf, -math.inf, math.inf
     for turn in range(2):
-        side = TILT if turn == 0 else -TILT
+        side = SUPPORT_TILT if turn == 0 else -SUPPORT_TILT
         point_a, point_b = support_points(pair, add_scaled(normal, along, side))
         at_a, at_b = dot(along, point_a), dot(along, add(d, point_b))
         level = max(level, dot(normal, point_a))

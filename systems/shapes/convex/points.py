@@ -18,14 +18,14 @@ from ..linking.convex_by_address import convex_at, rounding_by_address, support_
 from .gjk import cross
 
 MOST_POINTS = 4  # of a pair in 3D; 2 in 2D
-SAME = 1e-12  # of the coordinates: corners that are no farther apart are one
-FLAT = 1e-6  # of its size: how far a face may be from flat; what is shared and narrower is a point
+SAME_POINT = 1e-12  # of the coordinates: corners that are no farther apart are one
+FLAT_FACE = 1e-6  # of its size: how far a face may be from flat; what is shared and narrower is a point
 FINER = 0.25  # of the tilt: where several faces are within it the next look is so much narrower, until one lies flat
-LOOKS = 6  # at most
+FACE_LOOKS = 6  # at most
 DIRECTIONS = 8  # around the normal, in 3D: a face of more corners shows so many of them
-START = math.cos(math.pi / 8), math.sin(math.pi / 8)  # the first: off the axes, where boxes have two corners
+START_DIRECTION = math.cos(math.pi / 8), math.sin(math.pi / 8)  # the first: off the axes, where boxes have two corners
 SLANT = math.sqrt(0.5)  # sine and cosine of the way from one to the next
-ROOM = 2 * DIRECTIONS  # each edge of a convex polygon that clips another adds at most one corner
+POINT_ROOM = 2 * DIRECTIONS  # each edge of a convex polygon that clips another adds at most one corner
 STEEP = 0.83  # cosine: a normal nearer to the x axis takes the y axis for its basis
 AS_DEEP = 1e-3  # of the size of what is shared: points are about as deep as each other
 PREFERENCE = 0.01  # how much of that size is worth a place farther
@@ -82,7 +82,7 @@ def may_have_face(state, shape, like):
 def is_same(one, two):
     """Whether two corners are one."""
     way = sub(two, one)
-    return dot(way, way) <= SAME * SAME * dot(one, one)
+    return dot(way, way) <= SAME_POINT * SAME_POINT * dot(one, one)
 
 
 @inlined
@@ -107,15 +107,15 @@ def edge_towards(shape, normal, tilt):
     """Both ends of the core's edge in the direction of a normal; twice the same point if there is a corner."""
     along = (-normal[1], normal[0])
     one = normal
-    for _ in range(LOOKS):
+    for _ in range(FACE_LOOKS):
         one = support_by_address(shape, add_scaled(normal, along, -tilt))
         two = support_by_address(shape, add_scaled(normal, along, tilt))
         way = sub(two, one)
         square = dot(way, way)
-        if square <= SAME * SAME * dot(one, one):
+        if square <= SAME_POINT * SAME_POINT * dot(one, one):
             break
         outward = (way[1], -way[0])
-        if dot(outward, sub(support_by_address(shape, outward), one)) <= FLAT * square:
+        if dot(outward, sub(support_by_address(shape, outward), one)) <= FLAT_FACE * square:
             return one, two
         tilt *= FINER
     return one, one
@@ -146,7 +146,7 @@ def points_2d(pair, d, met, within, places, gaps):
     low_a, high_a, at_a, height_a, slope_a = profile(pair[0], scale(d, 0.0), normal, (1.0, tilt, level + 0.5 * depth))
     low_b, high_b, at_b, height_b, slope_b = profile(pair[1], d, normal, (-1.0, tilt, level - 0.5 * depth))
     low, high = max(low_a, low_b), min(high_a, high_b)
-    if not high - low > FLAT * min(high_a - low_a, high_b - low_b):
+    if not high - low > FLAT_FACE * min(high_a - low_a, high_b - low_b):
         return 0
     for k in range(2):
         at = low if k == 0 else high
@@ -175,7 +175,7 @@ def coordinates(basis, vector):
 
 
 @inlined
-def vector_of(basis, x, y, height):
+def vector_in_basis(basis, x, y, height):
     """The vector of the world with these coordinates."""
     return add_scaled(add_scaled(scale(basis[0], x), basis[1], y), basis[2], height)
 
@@ -184,9 +184,9 @@ def vector_of(basis, x, y, height):
 def corners_around(shape, basis, side, tilt, corners):
     """Write the corners in directions around the normal, counter-clockwise as seen against it; returns how many."""
     count, outward = 0, scale(basis[2], side)
-    x, y = tilt * START[0], tilt * START[1]
+    x, y = tilt * START_DIRECTION[0], tilt * START_DIRECTION[1]
     for _ in range(DIRECTIONS):
-        direction = add(outward, vector_of(basis, x, y, 0.0))
+        direction = add(outward, vector_in_basis(basis, x, y, 0.0))
         found = coordinates(basis, support_by_address(shape, direction))
         if count == 0 or not is_same(row(corners, count - 1, found), found):
             store(corners, count, found)
@@ -214,8 +214,8 @@ def slope_of(shape, basis, face, corners, count):
     square = dot(up, up)
     if not (up[2] > 0.0 and up[2] * up[2] >= (1.0 - 4.0 * tilt * tilt) * square):
         return False, 0.0, 0.0
-    most = FLAT * math.sqrt(square * size)
-    beyond = coordinates(basis, support_by_address(shape, scale(vector_of(basis, up[0], up[1], up[2]), side)))
+    most = FLAT_FACE * math.sqrt(square * size)
+    beyond = coordinates(basis, support_by_address(shape, scale(vector_in_basis(basis, up[0], up[1], up[2]), side)))
     if side * dot(up, sub(beyond, first)) > most:
         return False, 0.0, 0.0
     for k in range(1, count):
@@ -234,7 +234,7 @@ def face_towards(shape, centre, basis, face, corners):
     if shape[0] == 0:
         store(corners, 0, (0.0, 0.0, level))
         return 0, 0.0, 0.0
-    for _ in range(LOOKS):
+    for _ in range(FACE_LOOKS):
         count = corners_around(shape, basis, side, tilt, corners)
         if count == 1:
             break
@@ -249,7 +249,7 @@ def face_towards(shape, centre, basis, face, corners):
 
 
 @inlined
-def size_of(corners, count):
+def face_size(corners, count):
     """How far the others are from the first corner."""
     square = 0.0
     for k in range(1, count):
@@ -264,8 +264,8 @@ def clip(subject, count, clipper, edges):
 
     Both run counter-clockwise. Corners on the rim of the other are inside, and of several close together one is kept.
     """
-    other = stack_array(ROOM, (0.0, 0.0, 0.0))
-    near = FLAT * min(size_of(subject, count), size_of(clipper, edges))
+    other = stack_array(POINT_ROOM, (0.0, 0.0, 0.0))
+    near = FLAT_FACE * min(face_size(subject, count), face_size(clipper, edges))
     like = (0.0, 0.0, 0.0)
     for e in range(edges):
         start, end = row(clipper, e, like), row(clipper, e + 1 if e + 1 < edges else 0, like)
@@ -275,10 +275,10 @@ def clip(subject, count, clipper, edges):
         for k in range(count):
             one, two = row(subject, k, like), row(subject, k + 1 if k + 1 < count else 0, like)
             inside_one, inside_two = dot(inward, sub(one, start)), dot(inward, sub(two, start))
-            if inside_one >= -near and kept < ROOM:
+            if inside_one >= -near and kept < POINT_ROOM:
                 store(other, kept, one)
                 kept += 1
-            if (inside_one >= -near) != (inside_two >= -near) and kept < ROOM:
+            if (inside_one >= -near) != (inside_two >= -near) and kept < POINT_ROOM:
                 share = min(max(inside_one / (inside_one - inside_two), 0.0), 1.0)
                 store(other, kept, add_scaled(one, sub(two, one), share))
                 kept += 1
@@ -300,7 +300,7 @@ def points_of_edges(of_a, of_b, width, within, found, gaps):
     like = (0.0, 0.0, 0.0)
     a, b = row(of_a, 0, like), row(of_b, 0, like)
     way_a, way_b = sub(row(of_a, 1, like), a), sub(row(of_b, 1, like), b)
-    long_a, long_b = size_of(of_a, 2), size_of(of_b, 2)
+    long_a, long_b = face_size(of_a, 2), face_size(of_b, 2)
     turned = (way_a[0] * way_b[1] - way_a[1] * way_b[0]) / (long_a * long_b)
     if not abs(turned) <= tilt:
         return 0
@@ -311,7 +311,7 @@ def points_of_edges(of_a, of_b, width, within, found, gaps):
     at_a, at_b, reach_a, reach_b = dot(along, a), dot(along, b), dot(along, way_a), dot(along, way_b)
     low = max(min(at_a, at_a + reach_a), min(at_b, at_b + reach_b))
     high = min(max(at_a, at_a + reach_a), max(at_b, at_b + reach_b))
-    narrow = FLAT * min(long_a, long_b)
+    narrow = FLAT_FACE * min(long_a, long_b)
     if not high - low > narrow:
         return 0
     for k in range(2):
@@ -346,7 +346,7 @@ def reduce(found, gaps, count, preferred):
 
     Of those that are about as deep the one farthest out: edges that nearly lie on each other cross anywhere.
     """
-    values, scores, size = stack_array(ROOM, 0.0), stack_array(ROOM, 0.0), size_of(found, count)
+    values, scores, size = stack_array(POINT_ROOM, 0.0), stack_array(POINT_ROOM, 0.0), face_size(found, count)
     x = y = 0.0
     for k in range(count):
         x, y = x + found[k, 0] / count, y + found[k, 1] / count
@@ -357,14 +357,14 @@ def reduce(found, gaps, count, preferred):
     x, y = found[one, 0], found[one, 1]
     for k in range(count):
         values[k] = (found[k, 0] - x) * (found[k, 0] - x) + (found[k, 1] - y) * (found[k, 1] - y)
-    two = best_of(values, scores, count, FLAT * size * size)
+    two = best_of(values, scores, count, FLAT_FACE * size * size)
     along_x, along_y = found[two, 0] - x, found[two, 1] - y
     for k in range(count):
         values[k] = along_x * (found[k, 1] - y) - along_y * (found[k, 0] - x)
-    left = best_of(values, scores, count, FLAT * size * size)
+    left = best_of(values, scores, count, FLAT_FACE * size * size)
     for k in range(count):
         values[k] = -values[k]
-    right, kept = best_of(values, scores, count, FLAT * size * size), 0
+    right, kept = best_of(values, scores, count, FLAT_FACE * size * size), 0
     for k in range(count):
         if k in (one, two, left, right):
             store(found, kept, row(found, k, preferred))
@@ -379,8 +379,8 @@ def points_3d(pair, d, met, within, places, gaps):
     depth, normal, point = met
     margin, tilt = within
     basis, level = basis_of(normal), dot(normal, point)
-    of_a, of_b = stack_array(ROOM, (0.0, 0.0, 0.0)), stack_array(ROOM, (0.0, 0.0, 0.0))
-    apart = stack_array(ROOM, 0.0)
+    of_a, of_b = stack_array(POINT_ROOM, (0.0, 0.0, 0.0)), stack_array(POINT_ROOM, (0.0, 0.0, 0.0))
+    apart = stack_array(POINT_ROOM, 0.0)
     face = (1.0, tilt, level + 0.5 * depth)
     count_a, slope_ax, slope_ay = face_towards(pair[0], scale(d, 0.0), basis, face, of_a)
     if count_a == 1:
@@ -410,6 +410,6 @@ def points_3d(pair, d, met, within, places, gaps):
     if count > MOST_POINTS:
         count = reduce(found, apart, count, coordinates(basis, PREFERRED))
     for k in range(count):
-        store(places, k, vector_of(basis, found[k, 0], found[k, 1], found[k, 2]))
+        store(places, k, vector_in_basis(basis, found[k, 0], found[k, 1], found[k, 2]))
         gaps[k] = apart[k]
     return count
