@@ -51,7 +51,7 @@ class RecordBuffers:
 
     def _make_room(self, simulation: Any) -> None:
         stage = simulation.program.stages[self._state.stage]
-        make_room(stage, self._state, simulation.extensions.own(stage), self._scene.make)
+        make_room(stage, self._state, simulation.plugin_stages.own(stage), self._scene.make)
 
     def _find_candidates(self, simulation: Any, dt: float) -> None:
         """Trees, which from now on hold whole motions, or the broad phase of a plugin."""

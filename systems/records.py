@@ -14,9 +14,9 @@ from ..components import Collider, RigidBody
 from ..framework.jit.records.schema import Schema, Section, flag, flags, floats, integer, ints, number, vectors
 from ..framework.schedule.stages import PROGRAM_FIELDS
 from .broad_phase.records import GRID
-from .compounds.records import COMPOUNDS, PARTS
 from .contacts.solving.records import ARM_COLUMNS, RESTED, SOLVER, TURN_COLUMNS, WARM_START
 from .impacts.records import IMPACTS
+from .parts.records import PART_COLUMNS, PARTS
 
 
 def default_of(field: Any) -> Any:
@@ -141,7 +141,7 @@ SLEEPING = Section(
 # Columns of the records alone: no rows, or one for each of the table from when something asks for them.
 BODY_SECTIONS = (
     START_COLUMNS, QUARANTINE, COLLISIONS, PREDICTED, REST_COLUMNS, CURVES, SWEEP_COLUMNS, EVALUATIONS, SPINS,
-    COMPOUNDS, UNDO_COLUMNS, UNDO_FORCE,
+    PART_COLUMNS, UNDO_COLUMNS, UNDO_FORCE,
     SLEEPING,
 )  # fmt: skip
 
@@ -316,7 +316,7 @@ STATE = Schema(
     "State",
     **PROGRAM_FIELDS,
     links=ints(),  # addresses of parts of stages, see linking.parts
-    extensions=ints(),  # by stage: the address of what it has of its own, see systems/extensions
+    plugin_stages=ints(),  # by stage: the address of what it has of its own, see systems/plugin_stages
     needed=integer(),  # rows that a stage asks for
     checked=ints(),  # addresses of records of CHECKED
     sleeping=flag(),  # the settings say so
@@ -344,7 +344,7 @@ STATE = Schema(
     slot_count=integer(),  # types of colliders in the stacks
     has_force_systems=flag(),
     rotated=flag(),  # some body is, or may be before the step ends
-    compound=flag(),  # bodies have parts: ``bodies.owner`` and what goes with it have rows
+    has_parts=flag(),  # bodies have parts: ``bodies.owner`` and what goes with it have rows
     spinning=flag(),  # some body spins: ``bodies.spin`` and what goes with it have rows
     limits_speed=flag(),
     others_write=flag(),  # code that is not carom's runs in the step

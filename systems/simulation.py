@@ -28,7 +28,7 @@ from .codes import AFTERWARDS, CHECK_COLUMNS, CHECK_FLIGHT, LOOK, WAKE, WAKE_TOU
 from .contacts.events import ContactEvents, RecordedContacts
 from .contacts.response import Response
 from .contacts.solving.records import WARM_START_ROWS
-from .extensions.extensions import Extensions
+from .double_buffers import CONTACT_NUMBERS, WARM_START_NUMBERS, put_joints_back, put_rows_back, saved_rows
 from .forces.accumulation import ForceAccumulation
 from .inspection.counters import counters_of, reset, set_counters
 from .inspection.energies import kinetic_energy, momentum, potential_energy
@@ -39,7 +39,7 @@ from .integration.turns import TURNS
 from .linking.preparation import evaluate_forces, keep_ready, link_needed
 from .linking.steps import StepLinks
 from .narrow_phase.system import NarrowPhase
-from .opening import KEEPS_WRITTEN
+from .plugin_stages.plugin_stages import PluginStages
 from .quarantine.quarantine import Quarantine
 from .queries.system import Queries
 from .record_buffers import RecordBuffers
@@ -51,7 +51,7 @@ from .shapes.geometry_levels import LevelCheck, check_sensors
 from .shapes.pair_coverage import check_pairs
 from .sleeping.sleepers import Sleepers
 from .stage_list import CLOSING, KEPT, OPENING, STAGES, SYSTEM_OF_STAGE
-from .tracking import CONTACT_NUMBERS, WARM_START_NUMBERS, put_joints_back, put_rows_back, saved_rows
+from .step_stages import KEEPS_WRITTEN
 
 
 class Simulation:
@@ -121,9 +121,9 @@ class Simulation:
             self.program, source, self.contacts, self._membership, lambda: world.settings
         )
         self.parts_version = 0
-        self.extensions = Extensions(self.state, self.scene, self.adoption, world.registry)
-        self.integration.turns = self.extensions.record(TURNS)
-        self.links = StepLinks(self.scene, self.program, self.integration, self.search, self.extensions)
+        self.plugin_stages = PluginStages(self.state, self.scene, self.adoption, world.registry)
+        self.integration.turns = self.plugin_stages.record(TURNS)
+        self.links = StepLinks(self.scene, self.program, self.integration, self.search, self.plugin_stages)
         self.must_check = False  # in every step: sensors among levels, pairs that no plugin has
         self.copies = ColumnCopies(self.table)
         self._words = self.state.words
@@ -132,7 +132,7 @@ class Simulation:
         self.contacts_before: Any = None  # contacts that no RESPONSE has replaced, at the start of the step
         self._generation = self.table.generation
         self.take_deferred = self.contacts.take_deferred
-        self.settled = lambda: self.adoption.settled() and not self.extensions.adopters  # no plugin moves bodies
+        self.settled = lambda: self.adoption.settled() and not self.plugin_stages.adopters  # no plugin moves bodies
 
     @property
     def systems(self) -> tuple[System, ...]:
@@ -163,7 +163,7 @@ class Simulation:
         """Bring the table in step with esper."""
         self.take_deferred()
         self.adoption.synchronize()
-        for follow in self.extensions.adopters:
+        for follow in self.plugin_stages.adopters:
             follow(self._world)
 
     def open_window(self, step: int) -> None:
@@ -187,7 +187,7 @@ class Simulation:
         """Everything that depends on which bodies and systems there are."""
         table, scene, words = self.table, self.scene, self._words
         words[self._step_number] = self.table.clock.step_count  # first: what fails here goes back to before this step
-        for follow in self.extensions.followers:
+        for follow in self.plugin_stages.followers:
             follow(self._world)
         self.contacts_before = self.contacts.columns_now() if words[self._found_current] else None
         if self._structure() != scene.structure or table.static_version != scene.static_version:
@@ -216,7 +216,7 @@ class Simulation:
     def _refresh(self) -> None:
         """Follow which bodies and colliders there are."""
         scene, state, table = self.scene, self.state, self.table
-        if self._structure() != scene.structure and self.extensions.follow(self.program):
+        if self._structure() != scene.structure and self.plugin_stages.follow(self.program):
             self.links.forget()
             self.parts_version += 1
         if scene.refresh():
@@ -300,7 +300,7 @@ class Simulation:
                 kept = slice(state.kept_first, getattr(state, rows))
                 getattr(bodies, column)[kept] = getattr(bodies, copy)[kept]
         if state.kept & KEEPS_WRITTEN:
-            self.extensions.written.put_back()
+            self.plugin_stages.written.put_back()
         self.copies.kept = False
         put_joints_back(state)
         if state.kept:
@@ -326,7 +326,7 @@ class Simulation:
         self.table.in_step = False
 
     def end_step(self) -> None:
-        for finish in self.extensions.finishers:  # while there is a way back
+        for finish in self.plugin_stages.finishers:  # while there is a way back
             finish(self._world)
         self.table.in_step = False
         self.copies.kept = False
@@ -415,7 +415,7 @@ class Simulation:
         return planned_kernels(self.program)
 
     def planned_columns(self) -> Iterable[PlannedColumn]:
-        copies = dict((*self.extensions.written.sizes(), *self.copies.sizes()))
+        copies = dict((*self.plugin_stages.written.sizes(), *self.copies.sizes()))
         return planned_columns(self.state, self.table, self.scene, copies)
 
     def counters(self) -> dict[str, int]:
@@ -444,7 +444,7 @@ class Simulation:
         evaluate_forces(self.table, self.bodies, self._world)
 
     def record(self, schema: Schema) -> Record:
-        return self.extensions.record(schema)
+        return self.plugin_stages.record(schema)
 
     def _running_step(self) -> int | None:
         return self._world.step_count if self.table.in_step else None

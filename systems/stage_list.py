@@ -10,21 +10,21 @@ from .broad_phase.boxes import bound_searches, box_rest_of_step, box_standing
 from .broad_phase.system import BroadPhase
 from .ccd.refresh_pairs import ROOM_TO_MERGE, merge_pairs
 from .ccd.time_of_impact import first_touch
-from .compounds.records import COMPOUNDS
-from .compounds.stages import begin_parts
 from .contacts.events import ContactEvents
 from .contacts.response import Response
-from .extensions.kept import keep_written
 from .forces.accumulation import ForceAccumulation
 from .impacts.together import resolve_simultaneous
 from .integration.system import Integration
 from .linking.parts import BOUND_SEARCHES, FIRST_TOUCH, TAKE_TOGETHER
 from .narrow_phase.manifolds import finish_found
 from .narrow_phase.system import NarrowPhase
-from .opening import KEEPS_FORCE, KEEPS_START, KEEPS_VELOCITY, close_step, keep_state, read_bodies
+from .parts.records import PART_COLUMNS
+from .parts.stages import begin_parts
+from .plugin_stages.kept import keep_written
 from .quarantine.columns import check_columns
 from .records import BODIES, COLLIDERS, STATE, TABLE_COLUMNS, all_rows
 from .sleeping.stages import update_sleep
+from .step_stages import KEEPS_FORCE, KEEPS_START, KEEPS_VELOCITY, close_step, keep_state, read_bodies
 
 OPENING = (
     Stage(keep_state, "keeps what a failed step puts back", ("linear_velocity",), ("kept", "kept_velocity")),
@@ -35,7 +35,7 @@ OPENING = (
     ),
     Stage(
         begin_parts, "which rows are parts of one body; where the game has moved it they follow", (),
-        ("position", "linear_velocity", "rotation"), "parts", room=(Rows("bodies", COMPOUNDS, all_rows),),
+        ("position", "linear_velocity", "rotation"), "parts", room=(Rows("bodies", PART_COLUMNS, all_rows),),
     ),
     Stage(
         read_bodies, "1 / mass of what moves freely; whether any speed is limited, any body swept or rotated",

@@ -27,7 +27,7 @@ def make_quiet_step(pipeline: Any, physics: Any) -> Callable[[], bool] | None:
     contents, clock, faults, profiler = pipeline.contents, pipeline.clock, pipeline.faults, pipeline.profiler
     changes, dead, registry, name = contents.log, contents.dead, pipeline.world.registry, pipeline.world.name
     table, scene, links, sleepers = physics.table, physics.scene, physics.links, physics.sleepers
-    unsettled = physics.extensions.unsettled
+    unsettled = physics.plugin_stages.unsettled
     contacts, copies, words, alarm = physics.contacts, physics.copies, program.state.words, program.alarm
     number, others_write, found, pushed = map(
         program.state.word_of, ("step_number", "others_write", "found_current", "pushed")

@@ -12,7 +12,7 @@ from ...framework.jit.records.record import Record, make_record
 from ...framework.jit.records.record_type import record_at
 from ...framework.plugins.checks import shown
 from ...systems.contacts.solving.records import SOLVER
-from ...systems.joints.given import call_given
+from ...systems.joints.custom import call_given
 from ...systems.joints.linked import linked_joint
 from ...systems.joints.own import OwnJoint, Placed, custom_numbers, custom_parameters, rows_of, sample_of
 from ...systems.shapes.rotation import axes_of

@@ -12,6 +12,7 @@ from ...components.part_of import Changes as PartChanges
 from ...components.part_of import PartOf
 from ...components.spin import Spin
 from ...framework import NoPhysicsError, Plugin, World
+from ...systems.double_buffers import BEFORE_STEP
 from ...systems.joints.own import Placed, rows_of
 from ...systems.joints.records import (
     CUSTOM,
@@ -25,7 +26,6 @@ from ...systems.joints.records import (
     SPRING,
     TURN,
 )  # fmt: skip
-from ...systems.tracking import BEFORE_STEP
 from .arms import arm_of, moment
 from .joint import WORLD, Driven, Joint, Place, Row, whole_body
 from .kinds import KINDS, Ball, Cone, Distance, Hinge, Motor, MousePull, Slider, Weld, Wheel
@@ -91,9 +91,9 @@ class Joints(Plugin):
         self._breaking = False
         self._contents.log.followers.append(self._touched)
         world.events.define("joint_lost", "joint_broken")
-        self._physics.extensions.followers.append(self._follow)
-        self._physics.extensions.finishers.append(self._finish)
-        self._physics.extensions.waiting.append(self._waits)
+        self._physics.plugin_stages.followers.append(self._follow)
+        self._physics.plugin_stages.finishers.append(self._finish)
+        self._physics.plugin_stages.waiting.append(self._waits)
         super().install(world)
 
     def __len__(self) -> int:

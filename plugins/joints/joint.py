@@ -36,7 +36,7 @@ class Row(NamedTuple):
     damping_ratio: float = 0.0
     axis: Any = None  # along the axes of a, of what slides or turns
     ends: Any = None  # of angles in space: unit vectors along the axes of a and of b
-    part: int = 0  # of a GIVEN: which row of its function
+    part: int = 0  # of a CUSTOM: which row of its function
 
 
 class Place(NamedTuple):

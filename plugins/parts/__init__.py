@@ -11,7 +11,7 @@ from ...components.part_of import Changes, PartOf, rows_of_parts
 from ...components.rigid_body import WEIGHTLESS
 from ...components.spin import Spin, mass_of_shape
 from ...framework import NoPhysicsError, Plugin, World
-from ...systems.compounds.records import PARTS
+from ...systems.parts.records import PARTS
 from .outline import Outline, Piece, parts_from_outline
 from .poses import Pose, turned_by
 
@@ -57,8 +57,8 @@ class Parts(Plugin):
         self._rows_version = -1
         self._looked_at: list[str] = []  # columns of their colliders
         world.events.define("part_lost")
-        self._physics.extensions.adopters.append(self._follow)
-        self._physics.extensions.waiting.append(lambda: self._now() != self._seen)
+        self._physics.plugin_stages.adopters.append(self._follow)
+        self._physics.plugin_stages.waiting.append(lambda: self._now() != self._seen)
         super().install(world)
 
     def of(self, body: int) -> list[int]:

@@ -25,8 +25,8 @@ class Rotation(Plugin):
         super().install(world)
         if world.physics is not None:
             slips = Slips(world.physics.table)
-            world.physics.extensions.followers.append(slips)
-            world.physics.extensions.waiting.append(slips.waits)
+            world.physics.plugin_stages.followers.append(slips)
+            world.physics.plugin_stages.waiting.append(slips.waits)
 
 
 class Slips:

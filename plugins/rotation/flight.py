@@ -12,9 +12,9 @@ import math
 from ...components.spin import UNKNOWN, inertia_about
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
-from ...systems.compounds.inertia import inertia_of_compound
-from ...systems.compounds.rows import has_parts
 from ...systems.integration.stages import CUBIC, LINE, phi1, phi2
+from ...systems.parts.inertia import inertia_with_parts
+from ...systems.parts.rows import has_parts
 from ...systems.shapes.dispatch import second_moments
 from ...systems.shapes.free_rotation import diagonalised, turn_freely, turn_to_energy
 from ...systems.shapes.quaternions import product, rotate, rotation_in_space, set_rotation
@@ -49,7 +49,7 @@ def inertia_of(state, spin, i):
     shape = bodies.levels[0, i] if state.collides else -1
     lost = shape < 0 and spin.gyration[i, 0] == spin.gyration[i, 0]
     if has_parts(state, i):
-        return inertia_of_compound(state, i, gyration_of(state, spin, i) if lost else NO_EXTENT)
+        return inertia_with_parts(state, i, gyration_of(state, spin, i) if lost else NO_EXTENT)
     if lost:
         xx, yy, zz, xy, xz, yz = gyration_of(state, spin, i)
         m = bodies.mass[i]

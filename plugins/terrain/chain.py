@@ -70,7 +70,7 @@ class Facing:
 
     @classmethod
     def of(cls, world: Any) -> Facing:
-        followers = world.physics.extensions.followers
+        followers = world.physics.plugin_stages.followers
         found = next((follower for follower in followers if type(follower) is cls), None)
         if found is None:
             found = cls()

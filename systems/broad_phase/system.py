@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from ...framework.schedule.phases import Phase
 from ...framework.schedule.plan import PlannedKernel
 from ...framework.schedule.stages import Program, Stage
-from ..compounds.stages import leave_out_parts
 from ..joints.bodies import leave_out_joined
+from ..parts.stages import leave_out_parts
 from ..sleeping.stages import leave_out_still
-from ..staged import StagedSystem
+from ..stage_system import StagedSystem
 from .boxes import box_motions, box_statics, fixed_count
 from .brute_force import BRUTE_FORCE_MAX
 from .plan import planned_passes

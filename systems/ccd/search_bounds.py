@@ -71,7 +71,7 @@ def rest_edge(state, a, b, dt):
 
 @inlined
 def limits_of_sweep(state, a, b, travel, threshold, dt):
-    """Limits of the search for the touch of a swept pair that travels so far in the step (see first_touch)."""
+    """Limits of the search for the touch of a swept pair that travels so far in the step (see time_of_impact)."""
     stride = FAST * smaller_extent(state.bodies, a, b) / travel * dt if travel > 0.0 else dt
     return rest_edge(state, a, b, dt), stride, threshold, -math.inf
 

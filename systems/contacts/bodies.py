@@ -8,12 +8,12 @@ from ...framework.schedule.stages import Rows
 from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..ccd.turning_touch import turn_of_path
 from ..codes import OK
-from ..compounds.rows import has_parts, next_row, owner_of, place_of
-from ..compounds.stages import copy_to_parts
 from ..integration.trajectory import along, path_of
 from ..integration.turning import size_of_turn
 from ..joints.bodies import build_joint_rows
 from ..joints.records import DIRECT_BODIES
+from ..parts.rows import has_parts, next_row, owner_of, place_of
+from ..parts.stages import copy_to_parts
 from ..records import REST_COLUMNS, SOLVER_ARMS, SOLVER_BODIES, SOLVER_CONTACTS, SOLVER_SPINS
 from .constants import FREQUENCY, SAG, TIPPING_FREQUENCY, TIPPING_SAG
 from .points import points_of

@@ -15,7 +15,7 @@ from ...framework.settings import Settings
 from ...framework.world.contacts import ContactRows, Contacts
 from ...framework.world.events import CONTACT_EVENTS
 from ..sleeping.stored import merged
-from ..staged import StagedSystem
+from ..stage_system import StagedSystem
 from .event_stages import ROOM_FOR_FOUND, compare_contacts
 
 Columns = dict[str, np.ndarray]

@@ -11,23 +11,24 @@ from ...framework.schedule.phases import Phase
 from ...framework.schedule.stages import Program, PythonPart, Rows, Stage
 from ...framework.settings import Settings
 from ...framework.world.contacts import Contacts
-from ..compounds.stages import place_parts
 from ..impacts.stages import ROOM_FOR_IMPACTS, begin_impacts, resolve_impacts
 from ..joints.bodies import count_turns
-from ..staged import StagedSystem
+from ..parts.stages import place_parts
+from ..stage_system import StagedSystem
 from .bodies import ROOM_AT_REST, gather, put_back
 from .event_stages import ROOM_FOR_CONTACTS, publish_contacts
 from .events import disabled_pairs
 from .response_stages import begin_response
 from .resting import find_resting, find_touching, linearise
 from .solving.prediction import ROOM_FOR_SUPPORT, predict_rest
+from .solving.records import RESTED
 from .solving.solver import solve_contacts, solve_joined_contacts, solve_turning_contacts
 from .solving.warm_start import ROOM_TO_STORE, match_warm_start, store_warm_start
 from .static_penetration import resolve_static_penetration
 
 MOVED_COLUMNS = ("position", "linear_velocity", "path_velocity")
 EITHER = "colliders or joints"
-BODIES_NEAR, REST, RESTED = "bodies are near each other", "contacts rest", "contacts rested in the step before"
+BODIES_NEAR, REST = "bodies are near each other", "contacts rest"
 
 
 class Response(StagedSystem):

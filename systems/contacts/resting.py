@@ -10,7 +10,6 @@ from ...framework.vectors import add_scaled, dot, item, length, replace, sub
 from ..ccd.search_bounds import FAST, is_swept, turns_far
 from ..ccd.turning_touch import first_touch_of_turn, is_followed
 from ..codes import OK
-from ..compounds.rows import owner_of
 from ..impacts.impulses import STOPPED, is_beyond_cap, is_trapped
 from ..integration.turning import arms_to, closing_by_spin, size_of_turn
 from ..narrow_phase.manifolds import (
@@ -26,6 +25,7 @@ from ..narrow_phase.manifolds import (
     is_at_manifold,
     make_manifold,
 )  # fmt: skip
+from ..parts.rows import owner_of
 from ..shapes.dispatch import both_convex, friction_of, restitution_of
 from ..shapes.tolerances import (
     SAME_PLACE,

@@ -19,7 +19,6 @@ from ..broad_phase.boxes import find_extents
 from ..ccd.search_bounds import FAST, turns_far
 from ..ccd.turning_touch import first_touch_of_turn, turn_of_path
 from ..codes import OK
-from ..compounds.rows import next_row, owner_of
 from ..impacts.impulses import STOPPED
 from ..integration.trajectory import along, path_of
 from ..integration.turning import turn_of_arm
@@ -31,6 +30,7 @@ from ..narrow_phase.manifolds import (
     evaluate_pair,
 )  # fmt: skip
 from ..narrow_phase.stages import is_solid_pair, layers_meet
+from ..parts.rows import next_row, owner_of
 from ..shapes.tolerances import SAME_PLACE, smaller_extent, way_of_turning
 from .approach import first_touch_on_segment, segment_start
 from .bodies import note_squeezed

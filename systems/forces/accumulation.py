@@ -15,9 +15,9 @@ from ...framework.jit.records.record import Record
 from ...framework.schedule.phases import ForceSystem, Phase
 from ...framework.schedule.plan import PlannedKernel
 from ...framework.schedule.stages import Program, PythonPart, Rows, Stage, asked
-from ..compounds.stages import carry_forces
+from ..parts.stages import carry_forces
 from ..sleeping.stages import AWAKE
-from ..staged import StagedSystem
+from ..stage_system import StagedSystem
 from .stages import limit_velocities, sum_forces
 
 LARGEST_TORQUE = 1e150  # N m: squares of it are finite
@@ -75,7 +75,7 @@ class ForceAccumulation(StagedSystem):
         """Sum all forces at the state in the columns; ``time`` in seconds."""
         self._program.run_span(sum_forces.__name__, self.world.settings.dt)
         self.add_systems(time)
-        if self._state.compound:
+        if self._state.has_parts:
             self._program.run_one(carry_forces.__name__, self.world.settings.dt)
 
     def kind(self) -> tuple[int, bool]:

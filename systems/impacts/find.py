@@ -12,7 +12,6 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST, is_swept, limits_of_sweep, rest_edge, turns_far
 from ..ccd.time_of_impact import APART, AT_CORNER, TOUCHES, bounds_stay_disjoint, clear_of_rounding
-from ..compounds.rows import owner_of
 from ..integration.trajectory import (
     ROUNDING,
     along,
@@ -26,6 +25,7 @@ from ..integration.turning import arms_to, closing_by_spin, is_turned
 from ..linking.parts import FIRST_TOUCH, call_first_touch
 from ..narrow_phase.manifolds import is_at_manifold
 from ..narrow_phase.stages import rank_rows
+from ..parts.rows import owner_of
 from ..shapes.dispatch import both_convex, evaluate, friction_of, has_corner_rule, is_corner_touch, restitution_of
 from ..shapes.poses import advance_pose, motion_of, set_motion
 from ..shapes.tolerances import is_turning, slop_of, smaller_extent, turning_travel
@@ -75,7 +75,7 @@ def leaves_touch_at(state, c, path, since, t):
 
 @part
 def regraze_depth(state, a, b, restitution):
-    """By how many grazes two bodies that turn are deeper at their next touch; -inf: at any depth. After GRAZES
+    """By how many grazes two bodies that turn are deeper at their next touch; -inf: at any depth. After REGRAZE_IMPACTS
     impacts of both in a step it is one of those that follow each other at once: a corner that slides along a face parts
     slowly, and is turned back into it. Where they may sink in first elastic ones part faster, fly for
     longer, and lose nothing; others come to the end of the step before the cap.
@@ -91,8 +91,8 @@ def regraze_depth(state, a, b, restitution):
 
 @part
 def find_touch(state, c, a, b, path, since, restitution, dt):
-    """(NO_TOUCH, OVERLAPS_AT_END or SWEPT; (time, normal, point, from a's centre to b's)) of the pair's next touch from
-    a time on. What is not swept, or touches at a corner, has none unless it overlaps where the step ends."""
+    """(NO_TOUCH, OVERLAPS_AT_END or FOUND_BY_SWEEP; (time, normal, point, from a's centre to b's)) of the pair's next
+    touch from a time on. What is not swept, or touches at a corner, has none unless it overlaps at the step's end."""
     impacts, bodies, zero = state.impacts, state.bodies, zero_of(state)
     swept, overlaps, end_normal, nothing = False, False, zero, (dt, zero, zero, zero)
     turning = state.spinning and is_turning(state, dt, a, b)
@@ -187,7 +187,7 @@ def is_held(state, a, b):
 
 @part
 def approach_speed(state, c, path, touch, kind, dt):
-    """Of a solid pair: (NONE, HAND_OVER if it lands, too slow to bounce, or IMPACT; speed along the normal)."""
+    """Of a solid pair: (NO_EVENT, HAND_OVER if it lands, too slow to bounce, or IMPACT; speed along the normal)."""
     bodies, impacts, (t, normal, point, apart) = state.bodies, state.impacts, touch
     a, b = state.pairs.a[c], state.pairs.b[c]
     speed = dot(rate_along(path, t), normal)
@@ -231,7 +231,7 @@ def correct_speed(state, a, b, touch, speed, dt):
 @part
 def kind_beyond_cap(state, a, b, path, t, speed, restitution, dt):
     """What becomes of a pair of which a body has had all the impacts it may have: HAND_OVER; IMPACT, once more, but
-    without restitution, if impacts that lose energy follow each other at once; NONE, if it goes too little further."""
+    without restitution, if impacts that lose energy follow each other at once; NO_EVENT, if it goes on too little."""
     bodies = state.bodies
     count, inverse_mass = bodies.impact_count, bodies.inverse_mass
     still = (count[a] >= STOPPED or inverse_mass[a] == 0.0) and (count[b] >= STOPPED or inverse_mass[b] == 0.0)

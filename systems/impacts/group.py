@@ -16,9 +16,9 @@ import math
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, scale, sub
-from ..compounds.rows import owner_of
 from ..integration.trajectory import rate_along, relative_path
 from ..integration.turning import compliance, is_turned, velocity_by_spin
+from ..parts.rows import owner_of
 from ..shapes.dispatch import friction_of
 from .exact_sum import exact_sum
 from .impulses import count_impact, deflect, is_counted, is_immovable, log_impact, note_trapped

@@ -13,9 +13,9 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST
-from ..compounds.rows import next_row, owner_of
 from ..integration.trajectory import along, path_of, rate_along
 from ..narrow_phase.manifolds import forget_manifold
+from ..parts.rows import next_row, owner_of
 from ..shapes.dispatch import restitution_of
 from .turning import arms_of, kinematic_normal_speed, turn_by_impact
 

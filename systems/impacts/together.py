@@ -13,8 +13,8 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import dot
 from ..ccd.time_of_impact import clear_of_rounding
 from ..codes import NEED_ROOM, OK
-from ..compounds.rows import owner_of
 from ..integration.trajectory import rate_along, relative_path
+from ..parts.rows import owner_of
 from .group import WORK, is_affordable, is_shooting, is_turning_group, push_group, solve_group
 from .heap import heap_pop, heap_push, is_current
 from .impulses import HAND_OVER, IMPACT, bounce_pair

@@ -14,9 +14,9 @@ import math
 
 from ...framework.compilation import part
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, scale, sub
-from ..compounds.rows import next_row, owner_of
 from ..integration.trajectory import along, path_of
 from ..integration.turning import arms_to, change_of_spin, compliance, cross_spin, lever, twist, velocity_by_spin
+from ..parts.rows import next_row, owner_of
 from ..shapes.poses import advance_pose, has_unequal_moments, motion_of, rotate_pose, set_motion, turn_shape
 
 PIECES = 6  # slides, sticks or turns round, and each once more for the restitution

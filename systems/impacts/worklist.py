@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from ...framework.compilation import inlined, part
 from ..ccd.search_bounds import FAST, leaves_bounds_at
-from ..compounds.rows import next_row, owner_of
+from ..parts.rows import next_row, owner_of
 from ..shapes.tolerances import smaller_extent
 from .find import bounce_threshold
 from .impulses import STOPPED

@@ -16,9 +16,9 @@ from ...framework.schedule.stages import Rows
 from ...framework.vectors import add, add_scaled, divided, dot, item, scale, sub
 from ..codes import CHECK_FLIGHT, OK
 from ..forces.stages import within
-from ..opening import KEEPS_FORCE, KEEPS_START, LARGEST_FLOAT
 from ..quarantine.columns import are_columns_sound
 from ..records import CURVES, UNDO_FORCE
+from ..step_stages import KEEPS_FORCE, KEEPS_START, LARGEST_FLOAT
 
 LINE, PARABOLA, CUBIC = 1, 2, 3  # degree of the path within the step
 

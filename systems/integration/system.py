@@ -16,13 +16,13 @@ from ...framework.schedule.phases import Phase
 from ...framework.schedule.plan import PlannedKernel, kernels_of
 from ...framework.schedule.stages import Program, PythonPart, Rows, Stage
 from ...framework.settings import Settings
-from ..compounds.stages import carry_forces, move_parts
 from ..forces.accumulation import ForceAccumulation
 from ..joints.bodies import begin_joints
+from ..parts.stages import carry_forces, move_parts
 from ..records import COLLISIONS, SPINS, all_rows
 from ..scene import Scene
 from ..sleeping.stages import look_at_sleepers, rest_sleepers
-from ..staged import StagedSystem
+from ..stage_system import StagedSystem
 from .integrators import STANDARD_INTEGRATORS, Flight, Integrator
 from .motion import Motion
 from .stages import (

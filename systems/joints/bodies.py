@@ -8,11 +8,11 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 from ..codes import OK
-from ..compounds.rows import next_row, owner_of
 from ..contacts.solving.rows import rotate_body
 from ..contacts.solving.warm_start import row_of
 from ..integration.turning import change_of_spin, cross_spin
 from ..narrow_phase.stages import layers_meet
+from ..parts.rows import next_row, owner_of
 from .coupling import first_of
 from .records import CUSTOM, DRIVE, FREE, POINT, SLIDE, TURN, TWIST
 from .rows import turn_about

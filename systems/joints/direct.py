@@ -6,7 +6,7 @@ measure of kinetic energy, and what goes into the joints, which are soft springs
 where it does not. In the measure u with v = R u, where R R' are the inverse masses, this is (1 + J' W J) u = J' W b.
 
 Bodies with few neighbours go first: in trees no other pair of bodies than those of joints appears. An island in which
-a body would have more than MOST neighbours is solved by passes, as all others are.
+a body would have more than MOST_NEIGHBOURS neighbours is solved by passes, as all others are.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 from ..contacts.constants import DIRECT_RELAX_STIFFNESS, DIRECT_STIFFNESS_MAX
 from ..integration.turning import change_of_spin, cross_spin, twist
-from .given import speed_of_custom
+from .custom import speed_of_custom
 from .order import NO_BLOCK, block_of, freedoms
 from .records import CUSTOM, HELD_AT_ONCE, LIMITED_AT_ONCE, POINT, TURN
 
@@ -237,8 +237,8 @@ def speed_of(solver, j):
 def note_rows(solver, what):
     """What rows ask for, as impulses of their bodies; in the end these are the impulses that they get.
 
-    what: ERRORS, of the errors that they push out alone; PUSHES and RELAXES with the velocities as they are; RESULT_OF
-    either with those of the solution.
+    what: ERRORS, of the errors that they push out alone; PUSH_PASS and RELAX_PASS with the velocities as they are;
+    RESULT_OF either with those of the solution.
     """
     joints, direct = solver.joints, solver.direct
     errors, pushes, ends = what == ERRORS, what % 2 == 0, what >= RESULT_OF

@@ -10,7 +10,7 @@ from ...framework.jit.linking import CACHE_SIZE, Linked
 from ...framework.jit.source import source_module
 from ...framework.vectors import add, dot
 from ..shapes.linking.user_functions import user_function
-from .given import custom_signature
+from .custom import custom_signature
 from .own import OwnJoint, Placed, fields_of, seen_columns
 from .rows import turned_with
 

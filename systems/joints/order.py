@@ -7,9 +7,9 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import length
-from ..compounds.rows import place_of
 from ..contacts.constants import DIRECT_STIFFNESS, FRAME_BEND, MOST_RATIO
 from ..islands import root_of
+from ..parts.rows import place_of
 from .records import (
     BY_PASSES,
     DRIVE,

@@ -1,9 +1,9 @@
 """Rows of joints in the passes of the solver: what holds two points, a length, a way or an angle.
 
-A joint is a few rows, which stand next to each other. POINT holds two anchors together, LINE the length between them,
+A joint is a few rows, which stand next to each other. POINT holds two anchors together, ROD the length between them,
 SLIDE how far b's anchor is along an axis of a. Others are angles: TURN about an axis; in space ALIGN, by how much an
 axis of b leads away from one of a in one direction, CONE, by how much in all, and TWIST, behind a CONE, how far b turns
-about its axis beyond the shortest way there. GIVEN is what a plugin says, see given. A row HOLDs its value, keeps it
+about its axis beyond the shortest way there. CUSTOM is what a plugin says, see custom. A row HOLDs its value, keeps it
 within LIMITs, DRIVEs it at a speed, brings it there as a SERVO, or is a SPRING; what is FREE has an angle that is
 counted, and no more. Whole turns count: in space against the angle that the joint had before. What holds is as soft as
 a spring of a frequency that follows the rate of the substeps, and is solved without that in the passes that do not
@@ -32,8 +32,8 @@ from .coupling import (
     response_at,
     symmetric_product,
 )
+from .custom import measure_custom, push_custom, speed_of_custom
 from .direct import bound_push, factorise, solve_all_limited, solve_direct
-from .given import measure_custom, push_custom, speed_of_custom
 from .order import is_rigid
 from .records import ALIGN, BY_PASSES, CUSTOM, DRIVE, HELD_AT_ONCE, LIMIT, POINT, SERVO, SLIDE, TURN, TWIST
 
@@ -197,7 +197,7 @@ def update_joint_targets(joints, j, value):
     if rule == DRIVE:
         joints.target_speed[j] = joints.pushing[j] = joints.target[j]
     elif rule == SERVO:
-        joints.pushing[j] = joints.low[j] - value  # see brake
+        joints.pushing[j] = joints.low[j] - value  # see servo_speed
     elif rule != LIMIT:
         joints.pushing[j] = -joints.push_rate[j] * (value - joints.low[j])
     else:

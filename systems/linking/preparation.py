@@ -28,9 +28,9 @@ from ...framework.jit.tick_counter import TICKS_NOW
 from ...framework.schedule.stages import RUN_STAGES, Program, Stage, linked_stage
 from ...framework.world.world import World
 from ..broad_phase.tree.passes import tree_passes
-from ..extensions.extensions import NEEDED
 from ..forces.accumulation import required_bodies
 from ..integration.system import Integration
+from ..plugin_stages.plugin_stages import NEEDED
 from ..queries.kernels import query_kernels
 from ..records import STATE
 from ..scene import Scene
@@ -52,9 +52,9 @@ def kind_of_world(scene: Scene, integration: Integration, program: Program) -> K
     """What can be needed depends on this alone; the same for all worlds alike."""
     linked, registry, dimensions = scene.linked, scene.registry, scene.state.dimensions
     stages = program.stages
-    extensions = [stage.name for stage in stages if stage.plugin]
-    conditions = frozenset(("", "dynamic bodies", *integration.stages_possible, *extensions))
-    if extensions:
+    of_plugins = [stage.name for stage in stages if stage.plugin]
+    conditions = frozenset(("", "dynamic bodies", *integration.stages_possible, *of_plugins))
+    if of_plugins:
         conditions |= {NEEDED}
     if any(plugin.name == "joints" for plugin in registry.plugins):  # which may come at any time
         conditions |= {"joints", "colliders or joints"}

@@ -12,8 +12,8 @@ from ...framework.jit.linking import Called, Linked
 from ...framework.schedule.stages import Program, Stage
 from ..broad_phase.search import CandidateSearch
 from ..ccd.search_bounds import DISCRETE
-from ..extensions.extensions import Extensions
 from ..integration.system import Integration
+from ..plugin_stages.plugin_stages import PluginStages
 from ..records import SWEEP_COLUMNS
 from ..scene import Scene
 from ..stage_list import LINKED_PARTS
@@ -27,10 +27,15 @@ class StepLinks:
     """Follows the scene: which stages, parts of stages and functions of shapes its steps need."""
 
     def __init__(
-        self, scene: Scene, program: Program, integration: Integration, search: CandidateSearch, extensions: Extensions
+        self,
+        scene: Scene,
+        program: Program,
+        integration: Integration,
+        search: CandidateSearch,
+        plugin_stages: PluginStages,
     ) -> None:
         self._scene, self._state, self._program = scene, scene.state, program
-        self._integration, self._search, self._extensions = integration, search, extensions
+        self._integration, self._search, self._plugin_stages = integration, search, plugin_stages
         self._joints, self._parts = self._state.solver.joints, self._state.parts
         self._state.links = np.zeros(len(PLACES), np.int64)
         self.version = NEVER_LINKED  # of the scene
@@ -75,7 +80,7 @@ class StepLinks:
         usual = (
             scene.linked, scene.registry.version, scene.table.capacity, force_systems, sweeps, collides,
             state.several_levels, state.dynamic > 0, self._search.needs_grids(), state.sleeping,
-            self._extensions.present(), joined,
+            self._plugin_stages.present(), joined,
         )  # fmt: skip
         if self._key is not None and usual == self._usual and collides:  # bodies have come or gone, no more
             self.link_shapes()  # there may have been a query meanwhile, with other shapes
@@ -129,7 +134,7 @@ class StepLinks:
             "sleeping": collides and state.sleeping,
             **dict.fromkeys(self._integration.stages_needed, moves),
         }
-        return {**met, **self._extensions.conditions(met)}
+        return {**met, **self._plugin_stages.conditions(met)}
 
     def _functions_of_shapes(self) -> Iterator[Linked | Called]:
         linked = self._scene.linked

@@ -11,7 +11,7 @@ from ...framework.schedule.stages import Program, PythonPart, Stage
 from ..ccd.search_bounds import sweep_pairs
 from ..scene import Scene
 from ..sleeping.stages import find_touched, measure_force_changes
-from ..staged import StagedSystem
+from ..stage_system import StagedSystem
 from .filters import filtered
 from .level_stages import evaluate_levels
 from .stages import (

@@ -15,9 +15,9 @@ from ..bits import lowest_bit
 from ..broad_phase.tree.cells import cells_of, cover, parts_of, uncertainty
 from ..broad_phase.uniform_grid import LANES, cells_around, outline
 from ..shapes.query import query_half_extents
+from ..shapes.tolerances import ENDLESS
 from .candidates import box_at, box_rounding, frame_of, is_wanted, may_be_near_at, nan_vector, places_of, row_at
 from .first_touch import LAST_STEP, Path, first_touch_of_cast
-from .records import ENDLESS
 
 SLICE_SLACK = 1.0 + 4.0 * LAST_STEP  # so that bodies at the nearest distance are all tested, in whatever order
 

@@ -15,11 +15,11 @@ import math
 
 from ...framework.compilation import inlined, part, pasted
 from ...framework.vectors import add_scaled, dot, length, scale
+from ..integration.trajectory import ROUNDING
 from ..shapes.query import evaluate_against, sweep_against
 from .candidates import to_collider
 
 CAST_STEPS = 100  # a graze takes about 30; what still approaches after that counts as touching
-ROUNDING = 4e-16  # of the distance between the centres: a gap smaller than that is none
 LAST_STEP = 1e-9  # of the way: the most that rounding is made up for
 LONGEST_SPAN = 1e200  # m; on the way past bodies without end
 SPAN_RATIO = 1e6  # the way that a sweep is given may be so many times longer than needed

@@ -11,6 +11,7 @@ from ..bits import lowest_bit
 from ..broad_phase.tree.cells import cells_of, cover, parts_of, uncertainty
 from ..broad_phase.uniform_grid import LANES, cells_around, outline
 from ..shapes.query import evaluate_against
+from ..shapes.tolerances import ENDLESS
 from .candidates import (
     box_at,
     box_rounding,
@@ -22,7 +23,6 @@ from .candidates import (
     row_at,
     to_collider,
 )
-from .records import ENDLESS
 
 FIRST_BOX = 0.5  # half the size of the first box, in cells of the finest level; measured: 1 takes longer, as does 0.2
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from ...framework.jit.records.schema import Schema, Section, flag, floats, integer, ints, number, vectors
 from ..shapes.query import QUERY
 
-ENDLESS = 1e300  # m; in place of infinity, which times zero is nan
-
 # Queries are rows 0..m-1. Overlaps and neighbours write any number of hits per query, those of query q before
 # ``end[q]``. So does a cast of one shape for all that it meets. Nearest surfaces and first hits are in row q.
 QUERIES = Section(

@@ -17,7 +17,7 @@ from ...framework.plugins.registry import Registry, Shape
 from .linking.signatures import ALONE, OUT_OF_TIME
 
 BUILT_IN = "standard shapes"  # the plugin of carom's own shapes
-NOTHING_TESTED = -1
+NOTHING_TESTED = -1  # in place of a row: no pair has been tested yet
 
 
 class ErrorAttribution:

@@ -39,7 +39,7 @@ def turn_shape(state, i, angle):
 
 @part
 def motion_of(state, i):
-    """What :func:`lead_on` changes of body i."""
+    """What :func:`advance_pose` changes of body i."""
     bodies = state.bodies
     return bodies.spin[i], bodies.inverse_inertia[i], bodies.inverse_products[i]
 

@@ -12,11 +12,11 @@ from ...framework.data.table import Table
 from ...framework.jit.records.record import Record
 from ...framework.schedule.stages import Program
 from ..contacts.solving.records import WARM_START_ROWS
+from ..double_buffers import CONTACT_NUMBERS as CONTACT_NUMBERS
+from ..double_buffers import WARM_START_NUMBERS, put_rows_back, saved_rows
 from ..records import CONTACT_ROWS, SLEEP_COLUMNS, SLEEPING
 from ..scene import ZERO_WHERE_STATIC, Scene
-from ..tracking import CONTACT_NUMBERS as CONTACT_NUMBERS
-from ..tracking import WARM_START_NUMBERS, put_rows_back, saved_rows
-from .lent_columns import ExposedColumns
+from .exposed_columns import ExposedColumns
 from .links import links_with_falling
 from .stages import ASLEEP, AWAKE, FALLING_ASLEEP, WAKING
 from .stored import CONTACT_COLUMNS, IMPULSE_COLUMNS, Stored

@@ -8,12 +8,12 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import dot, item, length, sub
 from ..codes import LOOK, OK, WAKE, WAKE_TOUCHED
-from ..compounds.rows import has_parts, next_row, owner_of
 from ..forces.stages import is_zero
 from ..islands import join_roots, root_of
+from ..parts.rows import has_parts, next_row, owner_of
 from ..shapes.tolerances import contact_margin
 
-# Values of ``bodies.still``. FALLING: its first step asleep is the next one. What cannot be moved is still, too.
+# Values of ``bodies.sleep_state``. FALLING_ASLEEP: its first step asleep is the next one. Static bodies are ASLEEP.
 AWAKE, ASLEEP, FALLING_ASLEEP, WAKING = 0, 1, 2, -1
 
 # Stages without which nothing can sleep, as bits of ``state.sleep_stages``: a game may have replaced their systems.
@@ -251,7 +251,7 @@ def count_rest(state, dt, needed):
             if bodies.rest_steps[i] <= 1:
                 bodies.rest_position[i] = bodies.position[i]
             ripe |= bodies.rest_steps[i] >= needed and i < last
-    for k in range(state.parts.count if state.compound else 0):  # parts rest as their bodies do
+    for k in range(state.parts.count if state.has_parts else 0):  # parts rest as their bodies do
         i, body = state.parts.row[k], state.parts.body_row[k]
         if body >= 0 and state.first <= i < state.moving:
             bodies.rest_steps[i], bodies.rest_position[i] = bodies.rest_steps[body], bodies.rest_position[body]
@@ -283,7 +283,7 @@ def join_islands(state, dt, needed):
         awake = b < state.dynamic and still[a] == AWAKE and still[b] == AWAKE
         if awake and pairs.is_solid[c] and (pairs.near_contact[c] or wakes(state, dt, c, reach)):
             join_roots(root, a, b)
-    for i in range(state.first, state.dynamic if state.compound else state.first):
+    for i in range(state.first, state.dynamic if state.has_parts else state.first):
         if owner_of(state, i) != i:
             keeps_awake[i] = False
             join_roots(root, i, owner_of(state, i))

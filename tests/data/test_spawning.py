@@ -11,7 +11,7 @@ from carom.framework.data.column_copies import ColumnCopies
 from carom.plugins import Physics
 from carom.plugins.rotation import BoxCollider, Rotation
 from carom.systems import scene
-from carom.systems.extensions.extensions import Extensions
+from carom.systems.plugin_stages.plugin_stages import PluginStages
 from carom.systems.quarantine.quarantine import Checked
 
 STATICS = 400  # enough for a grid of their own
@@ -105,7 +105,7 @@ def test_of_bodies_that_turn_only_those_that_come_are_looked_at(d, n, monkeypatc
 
     turning = Turning(d, n)
     count(scene, "axes_of", "axes", lambda rotation, dimensions: len(rotation))
-    count(Extensions, "_bind", "stages bound")
+    count(PluginStages, "_bind", "stages bound")
     count(Checked, "bad", "columns checked")
     count(ColumnCopies, "_bind_columns", "copies bound")
     turning.spawn()
@@ -138,7 +138,7 @@ def test_what_is_kept_of_bodies_that_turn_is_what_would_be_made_again(d):
                 each.world.bodies.dynamic.linear_velocity[2] = 0.0
         physics = again.world.physics
         physics.scene.forget()
-        physics.extensions._bound = None
+        physics.plugin_stages._bound = None
         kept.world.step()
         again.world.step()
         assert kept.world.state_hash() == again.world.state_hash()

@@ -45,8 +45,8 @@ CROWDED_CELLS, SUITS = 0, 1  # what a pass over all boxes returns
 def directory_size(count: int) -> int:
     """Entries that the directory of ``count`` boxes may need.
 
-    Level 0 has at most CELLS_PER_BOX * count + 64 cells; all coarser levels together at most 1.5 times that, if none of
-    them has its least number, 27 in 3D; guard rows add two thirds at most.
+    Level 0 has at most TREE_CELLS_PER_BOX * count + 64 cells; all coarser levels together at most 1.5 times that, if
+    none of them has its least number, 27 in 3D; guard rows add two thirds at most.
     """
     return int(6 * TREE_CELLS_PER_BOX * count) + 150 * (MAX_LEVELS + 2)
 

@@ -4,8 +4,8 @@ Boxes that may overlap a given one lie in a few rows of cells, and a row of cell
 Pass 1 writes these ranges, pass 2 tests their members. Neither pass branches on the result of a test: range and pair
 are always written, and the counter moves on or not. A mispredicted branch costs more than the test it would avoid.
 
-Pass 2 looks at the boxes' codes first (see :func:`.build.place_boxes`): one subtraction rules out most candidates, and
-exact corners are compared only for the others.
+Pass 2 looks at the boxes' codes first (see :func:`.build.place_in_tree`): one subtraction rules out most candidates,
+and exact corners are compared only for the others.
 """
 
 from __future__ import annotations
@@ -207,7 +207,7 @@ def test_ranges(tree, owners, members, stop, swapped, with_codes):
 
 
 def find_ranges_within(tree, _):
-    """Pass 1 for the pairs of one tree. There must be room for RANGES_PER_BOX per box, and SPARE."""
+    """Pass 1 for the pairs of one tree. There must be room for RANGES_PER_BOX per box, and SPARE_RANGES."""
     found, in_use = 0, 0
     for level in range(tree.levels + 1):
         found = ranges_of_level(tree, level, found)

@@ -12,7 +12,7 @@ import math
 from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, dot, scale, sub
 from ...integration.turning import cross_spin, momentum_of_spin
-from ...joints.given import rates_of_custom
+from ...joints.custom import rates_of_custom
 from ...joints.records import CUSTOM, POINT, TURN
 from ...joints.rows import relax_open
 from ..constants import (
@@ -187,7 +187,7 @@ def energy_budget(solver, bias_rate, h, dt, span, islands):
 
 @inlined
 def excess_scale(solver, t):
-    """How many times better than EXCESS the rows of a struck island are solved, as many passes as it may have."""
+    """How many times better than STRUCK_EXCESS the rows of a struck island are solved."""
     return max(1.0, solver.passes[t] / FINER_PASSES)
 
 

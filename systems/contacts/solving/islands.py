@@ -16,12 +16,12 @@ from ....framework.compilation import part
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add, dot, length, sub
 from ...bits import lowest_bit
-from ...compounds.rows import owner_of, place_of
 from ...integration.turning import arms_to, velocity_by_spin
 from ...islands import join_roots, root_of
 from ...joints.order import choose_direct, order_direct
 from ...joints.records import LIMIT, TURN
 from ...narrow_phase.manifolds import centre_offset_at_start
+from ...parts.rows import owner_of, place_of
 from ...shapes.tolerances import smaller_extent
 from ..constants import (
     AT_ONCE_WORK,

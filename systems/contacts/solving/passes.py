@@ -15,7 +15,7 @@ FEW_ROWS = 6  # rows of a chunk: fewer are as fast one by one, with the same bit
 
 @part
 def solve_pass(solver, bias, pushes, over, span):
-    """One pass over the rows of a range: along their normals and along their surfaces. over: see OVER."""
+    """One pass over the rows of a range, normals and friction. over: see FRICTION_OVERRELAXATION."""
     if len(span[4]) > 0 and solver.has_rolling:
         solve_rolling(solver, span)
     if len(span[4]) > 0 and (solver.end_chunk - solver.first_chunk) * FEW_ROWS < span[1] - span[0]:
@@ -36,7 +36,7 @@ def note_impulses(solver, span):
 
 @part
 def least_change(solver, h, span):
-    """The change of a speed that matters in a hard island, m/s for each m of extent; see AGREED_SHARE."""
+    """The change of a speed that matters in a hard island, m/s for each m of extent; see CONVERGED_SHARE."""
     fastest = 0.0
     for q in range(span[2], span[3]):
         fastest = max(fastest, length(solver.acceleration[q]) * h)

@@ -14,9 +14,9 @@ from ....framework.jit.records.record_type import zero_of
 from ....framework.schedule.stages import Rows
 from ....framework.vectors import add, add_scaled, dot, length, scale, sub
 from ...codes import OK
-from ...compounds.rows import owner_of
-from ...compounds.stages import copy_prediction_to_parts
 from ...joints.bodies import push_joined
+from ...parts.rows import owner_of
+from ...parts.stages import copy_prediction_to_parts
 from ...records import CURVES, PREDICTED
 from .warm_start import find_rows, scale_to
 

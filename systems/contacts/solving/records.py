@@ -178,7 +178,7 @@ TURN_COLUMNS = (
 )  # fmt: skip
 
 # Impulses of the contacts at rest, for the next step: [now, i] is the memory, [1 - now, i] is written.
-RESTED = "contacts have rested"
+RESTED = "contacts rested in the step before"
 WARM_START_ROWS = Section(
     "contact", "contacts at rest", RESTED,
     entity_a=ints(stacked=True),

@@ -211,7 +211,7 @@ def solve_normals(solver, bias, pushes, span):
 @inlined
 def solve_friction_of(solver, k, over, arms):
     """Stop what slides at row k, with at most ``friction`` times the normal impulse (Coulomb). over: times the impulse
-    that stops it; see OVER."""
+    that stops it; see FRICTION_OVERRELAXATION."""
     n, old, w = solver.normal[k], solver.tangent[k], relative_velocity(solver, k, arms)
     mass = over * (solver.tangent_mass[k] if len(arms) > 0 else solver.mass[k])
     limit = solver.friction[k] * solver.impulse[k]

@@ -137,7 +137,7 @@ def relax_passes(solver, kind, ends, span):
 
 @part
 def solve_substep(solver, springs, most, dt, h, kind, ends, span):
-    """One substep of a range. springs: see ``spring_of``."""
+    """One substep of a range. springs: see ``contact_spring``."""
     start, stop = span[0], span[1]
     opening, stiff = solver.target_speed, kind == HARD
     apply_forces(solver, h, span)

@@ -16,7 +16,7 @@ PARTS = Schema(
     row=ints("int32"),
     body_row=ints("int32"),
 )
-COMPOUNDS = Section(
+PART_COLUMNS = Section(
     "body", "compound bodies", "bodies have parts",
     owner=ints("int32"),  # the row of the body that a row belongs to; itself, where it is none's part
     next_part=ints("int32"),  # the rows of a body are a chain that begins with its own; -1: the last one

@@ -5,5 +5,5 @@ and path, and the rotation that the part has against it. So all geometry, and ho
 collider beside its body's centre. What is done to a row by impacts is done to all rows of its body; the solver and the
 groups of impacts know the body's row alone (``owner_of``).
 
-Reads and writes all that moves bodies; ``state.compound`` says whether there are any such.
+Reads and writes all that moves bodies; ``state.has_parts`` says whether there are any such.
 """

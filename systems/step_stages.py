@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from ..framework.compilation import part
+from .ccd.search_bounds import DISCRETE
 from .codes import NEED_SWEEPS, OK, ROTATE
-from .compounds.stages import add_masses_of_parts
+from .parts.stages import add_masses_of_parts
+from .shapes.attribution import NOTHING_TESTED
 
-DISCRETE = 0
 OPENED, KEEPS_VELOCITY, KEEPS_START, KEEPS_FORCE, KEEPS_WRITTEN = 1, 2, 4, 8, 16  # bits of state.kept
-NOTHING_TESTED = -1  # in place of a row: no pair has been tested yet
 LARGEST_FLOAT = 1.7976931348623157e308  # of all finite numbers
 
 
@@ -43,7 +43,7 @@ def keep_state(state, dt):
     If nothing changes the velocity before keep_start, start_velocity has it too.
     """
     bodies, pairs, impacts = state.bodies, state.pairs, state.impacts
-    state.unforced, state.pushed, state.moved, state.compound = False, True, False, False
+    state.unforced, state.pushed, state.moved, state.has_parts = False, True, False, False
     state.forces_summed = state.candidates_ready = state.contacts_ready = False
     state.event_count, state.flight_usual = 0, False
     pairs.count = pairs.found = pairs.resting_count = pairs.disabled_count = pairs.touching_count = 0

@@ -67,7 +67,7 @@ def compiled_stage(stage: PluginStage, dimensions: int) -> Any:
     names = [f"own.{name}" for name in own_schema(stage, dimensions).fields]
     if names:
         scope["own_at"] = record_at(own_schema(stage, dimensions), dimensions)
-        lines.append("    own = own_at(state.extensions[state.stage])")
+        lines.append("    own = own_at(state.plugin_stages[state.stage])")
     call = f"function({', '.join(('state', 'dt', *names))})"
     if True in answers(plain_function(stage.function)):
         short = " or ".join(f"state.needed > len(own.{record}.{name})" for record, name in own_columns(stage))

@@ -52,7 +52,7 @@ def begin_parts(state, dt):
     parts = state.parts
     if parts.rows_version != state.version:
         find_part_rows(state)
-    state.compound = True
+    state.has_parts = True
     for k in range(parts.count):
         if takes_part(state, k):
             place_part(state, k)
@@ -63,7 +63,7 @@ def begin_parts(state, dt):
 def add_masses_of_parts(state):
     """Rows of parts are moved as their bodies are."""
     bodies, parts = state.bodies, state.parts
-    for k in range(parts.count if state.compound else 0):
+    for k in range(parts.count if state.has_parts else 0):
         if takes_part(state, k):
             bodies.inverse_mass[parts.row[k]] = bodies.inverse_mass[parts.body_row[k]]
 
@@ -119,7 +119,7 @@ def leave_out_parts(state, dt):
 def copy_prediction_to_parts(state):
     """What was done to bodies before anything is known of the step was done to their parts."""
     bodies, parts = state.bodies, state.parts
-    for k in range(parts.count if state.compound else 0):
+    for k in range(parts.count if state.has_parts else 0):
         i, body = parts.row[k], parts.body_row[k]
         if body >= 0 and state.first <= i < state.moving:
             bodies.warm_started[i] = bodies.warm_started[body]
@@ -134,7 +134,7 @@ def copy_prediction_to_parts(state):
 def copy_to_parts(state):
     """Parts are where their bodies are, and as fast, and have turned as far."""
     bodies, parts = state.bodies, state.parts
-    for k in range(parts.count if state.compound else 0):
+    for k in range(parts.count if state.has_parts else 0):
         if takes_part(state, k):
             i, body = parts.row[k], parts.body_row[k]
             bodies.position[i], bodies.linear_velocity[i] = bodies.position[body], bodies.linear_velocity[body]

@@ -16,8 +16,8 @@ from ...framework.jit.records.record import Record, make_record
 from ...framework.jit.records.schema import Schema
 from ...framework.plugins.registry import PluginStage, Registry
 from ...framework.schedule.stages import Program, Stage
-from ..compounds.records import PARTS
 from ..joints.records import JOINTS
+from ..parts.records import PARTS
 from ..records import BODY_COLUMNS
 from ..scene import Scene
 from ..stage_list import MADE_AGAIN
@@ -27,7 +27,7 @@ from .placement import OF_TABLE, check_plugin_stages, placed
 NEEDED = "stages of plugins"  # the condition of what all of them need
 
 
-class Extensions:
+class PluginStages:
     """Follows the registry and the table.
 
     written
@@ -102,7 +102,7 @@ class Extensions:
                 else:
                     self._show(source, getattr(own, name))
         addresses[program.index["keep_written"]] = self.written.address
-        self._state.extensions = addresses
+        self._state.plugin_stages = addresses
 
     def _show(self, component: type[Component], record: Record) -> None:
         """Let the record of a component show the table's columns."""

@@ -29,7 +29,7 @@ def inertia_of_row(state, i, mass):
 
 
 @part
-def inertia_of_compound(state, i, gyration):
+def inertia_with_parts(state, i, gyration):
     """The same of a body and all its parts, along its own axes. What of its mass is not that of parts is spread over
     its own collider; without one it has that inertia per mass. If parts have more than the whole, they count for
     less."""

@@ -1,6 +1,0 @@
-"""Extensions: stages of plugins in a step.
-
-``placement`` checks where they may run and puts them between the built-in stages, ``kept`` copies what they write so
-that a failed step can put it back, ``extensions`` follows for one world which plugins and columns there are. Reads the
-registry and the list of stages; writes ``state.extensions``, and makes the columns that the stages name.
-"""
