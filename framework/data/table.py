@@ -215,7 +215,7 @@ class Table(TableColumns):
 
     def asleep(self, rows: slice) -> np.ndarray:
         """Mask of the dynamic bodies among these rows that sleep, a copy."""
-        still = self.arrays.get("_still")
+        still = self.arrays.get("_sleep_state")
         if still is None:
             return np.zeros(rows.stop - rows.start, bool)
         return (still[rows] > 0) & (np.arange(rows.start, rows.stop) < self.stops[0])

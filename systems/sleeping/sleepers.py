@@ -201,7 +201,7 @@ class Sleepers:
 
     def _mark(self, rows: np.ndarray) -> None:
         """What is still in these rows is disturbed."""
-        still = self._table.arrays.get("_still")
+        still = self._table.arrays.get("_sleep_state")
         if still is None or not len(rows) or not len(rows := rows[still[rows] > AWAKE]):
             return
         still[rows] = WAKING
@@ -215,7 +215,7 @@ class Sleepers:
         if key in PUSH_COLUMNS:
             self._pushed = True
             return
-        still = self._table.arrays.get("_still")
+        still = self._table.arrays.get("_sleep_state")
         if still is not None and still.item(row) > AWAKE and (key == "" or self._table.is_other(key, row, value)):
             still[row], self._disturbed = WAKING, True
 

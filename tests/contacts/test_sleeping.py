@@ -35,7 +35,7 @@ def test_off_by_default_and_nothing_sleeps():
         world.step()
     assert not any(is_asleep(world, *boxes))
     assert not world.bodies.asleep.any()
-    assert "_still" not in world.physics.table.arrays
+    assert "_sleep_state" not in world.physics.table.arrays
     assert not any(name in str(world.plan()) for name in ("rest_sleepers", "update_sleep", "leave_out_still"))
 
 

@@ -67,7 +67,7 @@ def test_a_world_that_does_not_sleep_goes_on_from_a_snapshot_of_one_that_does():
     assert not any(is_asleep(other, *boxes))
     assert len(other.contacts) == 3
     assert len(other.contacts.begin) == len(other.contacts.end) == 0
-    assert "_still" in other.physics.table.arrays
+    assert "_sleep_state" in other.physics.table.arrays
     world.restore(other.snapshot())
     assert not any(is_asleep(world, *boxes))
     sleep(world, *boxes)
