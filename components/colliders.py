@@ -63,11 +63,15 @@ class Collider(Component, abstract=True):
         "offset", "restitution", "friction", "sensor", "layer", "mask", "group",
     )  # fmt: skip
 
-    offset: VectorField = special_column(default=0.0, item="vector", kw_only=True, on_demand=True, also=("centre",))
-    restitution: float = special_column(
-        default=0.0, minimum=0.0, kw_only=True, on_demand=True, also=("bounce", "bounciness", "elasticity")
+    offset: VectorField = special_column(
+        unit="m", default=0.0, item="vector", kw_only=True, on_demand=True, also=("centre",)
     )
-    friction: float | None = special_column(default=None, optional=True, minimum=0.0, kw_only=True, on_demand=True)
+    restitution: float = special_column(
+        unit="1", default=0.0, minimum=0.0, kw_only=True, on_demand=True, also=("bounce", "bounciness", "elasticity")
+    )
+    friction: float | None = special_column(
+        unit="1", default=None, optional=True, minimum=0.0, kw_only=True, on_demand=True
+    )
     sensor: bool = special_column(default=False, dtype=bool, kw_only=True, on_demand=True, also=("trigger",))
     layer: int = special_column(
         default=1, dtype=int, kw_only=True, on_demand=True, also=("category",),
@@ -99,7 +103,7 @@ class SphereCollider(Collider):
 
     __slots__ = ()
 
-    radius: float = special_column(minimum=0.0, also=("size", "diameter"))
+    radius: float = special_column(unit="m", minimum=0.0, also=("size", "diameter"))
 
     @staticmethod
     def bounds(shape, dimensions):
@@ -134,7 +138,9 @@ class AABBCollider(Collider):
 
     __slots__ = ()
 
-    half_extents: VectorField = special_column(item="vector", minimum=0.0, also=("size", "extents", "half_size"))
+    half_extents: VectorField = special_column(
+        unit="m", item="vector", minimum=0.0, also=("size", "extents", "half_size")
+    )
 
     @classmethod
     def from_bounds(cls, lower: Vector, upper: Vector, **common: Unpack[MaterialFields]) -> Self:

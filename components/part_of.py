@@ -48,16 +48,20 @@ class PartOf(Component):
     }
 
     body: int = special_column(dtype=int, minimum=1, on_write=_note)
-    position: VectorField = special_column(default=0.0, item="vector", largest=FARTHEST, on_write=_note)
-    rotation: RotationField = special_column(default=0.0, item="rotation", on_write=_note)
-    mass: float | None = special_column(default=None, optional=True, minimum=0.0, kw_only=True, on_write=_note)
+    position: VectorField = special_column(unit="m", default=0.0, item="vector", largest=FARTHEST, on_write=_note)
+    rotation: RotationField = special_column(unit="rad or 1", default=0.0, item="rotation", on_write=_note)
+    mass: float | None = special_column(
+        unit="kg", default=None, optional=True, minimum=0.0, kw_only=True, on_write=_note
+    )
     # Not for the constructor: what it adds to which body, and its rotation against that; 0: it has no place yet.
-    added: float = special_column(default=0.0, init=False)
+    added: float = special_column(unit="kg", default=0.0, init=False)
     holder: int = special_column(default=0, dtype=int, init=False)
-    turn: RotationField = special_column(default=0.0, item="rotation", init=False)
+    turn: RotationField = special_column(unit="rad or 1", default=0.0, item="rotation", init=False)
     # As in Spin: of the collider that it had last.
-    gyration: float | np.ndarray | None = special_column(default=None, item="angular", optional=True, init=False)
-    gyration_products: float | np.ndarray = special_column(default=0.0, item="angular", init=False)
+    gyration: float | np.ndarray | None = special_column(
+        unit="m^2", default=None, item="angular", optional=True, init=False
+    )
+    gyration_products: float | np.ndarray = special_column(unit="m^2", default=0.0, item="angular", init=False)
 
     def check_in(self, contents: Any, entity: int | None, beside: Collection[type[Any]] = ()) -> None:
         """ValueError if its body is none, or is a part of this entity."""

@@ -76,28 +76,28 @@ class RigidBody(Component, flat=True):
     makes_body: ClassVar[bool] = True
     until_frame_ends: ClassVar[tuple[str, ...]] = ("applied_force", "applied_frame")
 
-    mass: float = special_column(default=1.0, positive=True)
+    mass: float = special_column(unit="kg", default=1.0, positive=True)
     linear_velocity: VectorField = special_column(
-        default=0.0, item="vector", largest=FASTEST, also=("velocity", "speed")
+        unit="m/s", default=0.0, item="vector", largest=FASTEST, also=("velocity", "speed")
     )
     constant_force: VectorField = special_column(
-        default=0.0, item="vector", kw_only=True, on_demand=True, also=("force",)
+        unit="N", default=0.0, item="vector", kw_only=True, on_demand=True, also=("force",)
     )
-    gravity_scale: float = special_column(default=1.0, kw_only=True, on_demand=True, also=("gravity",))
+    gravity_scale: float = special_column(unit="1", default=1.0, kw_only=True, on_demand=True, also=("gravity",))
     linear_damping: float = special_column(
-        default=0.0, minimum=0.0, kw_only=True, on_demand=True, also=("damping", "drag")
+        unit="1/s", default=0.0, minimum=0.0, kw_only=True, on_demand=True, also=("damping", "drag")
     )
     kind: Kind = special_column(
         default="dynamic", choices=KINDS, kw_only=True, on_write=_kind_written, also=("type", "body_type")
     )
     max_linear_speed: float | None = special_column(
-        default=None, optional=True, minimum=0.0, kw_only=True, on_demand=True, also=("max_speed",)
+        unit="m/s", default=None, optional=True, minimum=0.0, kw_only=True, on_demand=True, also=("max_speed",)
     )
     ccd: bool = special_column(default=False, dtype=bool, kw_only=True, on_demand=True, also=("bullet", "continuous"))
     # Not for the constructor: pushes until the frame ends, the frame they are of, and pushes for one step.
-    applied_force: VectorField = special_column(default=0.0, item="vector", on_demand=True, init=False)
+    applied_force: VectorField = special_column(unit="N", default=0.0, item="vector", on_demand=True, init=False)
     applied_frame: int = special_column(default=-1, dtype=int, on_demand=True, init=False, on_write=force_applied)
-    step_force: VectorField = special_column(default=0.0, item="vector", on_demand=True, init=False)
+    step_force: VectorField = special_column(unit="N", default=0.0, item="vector", on_demand=True, init=False)
 
     @classmethod
     def _unknown(cls, name: str) -> TypeError:

@@ -77,26 +77,27 @@ class Spin(Component):
     until_frame_ends: ClassVar[tuple[str, str]] = ("applied_torque", "applied_frame")
 
     angular_velocity: Angular = special_column(
-        default=0.0, item="angular", largest=FASTEST_TURN, also=("velocity", "speed", "omega")
+        unit="rad/s", default=0.0, item="angular", largest=FASTEST_TURN, also=("velocity", "speed", "omega")
     )
     inertia: Angular | None = InertiaColumn(  # type: ignore[assignment]
+        unit="kg m^2",
         default=None, item="angular", optional=True, positive=True, also=("moment",)
     )
-    angular_damping: float = special_column(default=0.0, minimum=0.0, kw_only=True, also=("damping",))
+    angular_damping: float = special_column(unit="1/s", default=0.0, minimum=0.0, kw_only=True, also=("damping",))
     max_angular_speed: float | None = special_column(
-        default=None, optional=True, minimum=0.0, kw_only=True, also=("max_speed",)
+        unit="rad/s", default=None, optional=True, minimum=0.0, kw_only=True, also=("max_speed",)
     )
-    rolling_friction: float = special_column(default=0.0, minimum=0.0, kw_only=True)
+    rolling_friction: float = special_column(unit="m", default=0.0, minimum=0.0, kw_only=True)
     constant_torque: Angular = special_column(
-        default=0.0, item="angular", largest=MOST_TORQUE, kw_only=True, also=("torque",)
+        unit="N m", default=0.0, item="angular", largest=MOST_TORQUE, kw_only=True, also=("torque",)
     )
     # Not for the constructor, as in RigidBody.
-    applied_torque: Angular = special_column(default=0.0, item="angular", init=False)
+    applied_torque: Angular = special_column(unit="N m", default=0.0, item="angular", init=False)
     applied_frame: int = special_column(default=-1, dtype=int, init=False, on_write=force_applied)
-    step_torque: Angular = special_column(default=0.0, item="angular", init=False)
+    step_torque: Angular = special_column(unit="N m", default=0.0, item="angular", init=False)
     # m^2, of the collider that it had last: inertia per mass, in 3D xx, yy, zz and xy, xz, yz.
-    gyration: Angular | None = special_column(default=None, item="angular", optional=True, init=False)
-    gyration_products: Angular = special_column(default=0.0, item="angular", init=False)
+    gyration: Angular | None = special_column(unit="m^2", default=None, item="angular", optional=True, init=False)
+    gyration_products: Angular = special_column(unit="m^2", default=0.0, item="angular", init=False)
 
     def apply_torque(self, torque: Angular) -> None:
         """Turn with ``torque``, N m; in 3D (3,), along the world's axes. How long it acts: as a force does, see

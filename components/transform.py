@@ -34,9 +34,9 @@ class Transform(Component, flat=True):
 
     __slots__ = ()
 
-    position: VectorField = special_column(item="vector", on_write=_teleport, also=("pos", "location"))
+    position: VectorField = special_column(unit="m", item="vector", on_write=_teleport, also=("pos", "location"))
     rotation: RotationField = special_column(
-        default=0.0, item="rotation", on_demand=True, on_write=_turn_at_once, also=("angle",)
+        unit="rad or 1", default=0.0, item="rotation", on_demand=True, on_write=_turn_at_once, also=("angle",)
     )
 
     def _fill(self, given: Mapping[str, Any]) -> None:

@@ -33,8 +33,8 @@ class CapsuleCollider(Collider):
     __slots__ = ()
 
     rotates = True
-    radius: float = column(minimum=0.0)
-    half_height: float = column(minimum=0.0)
+    radius: float = column(unit="m", minimum=0.0)
+    half_height: float = column(unit="m", minimum=0.0)
 
     @staticmethod
     def bounds(shape, dimensions):

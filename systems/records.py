@@ -28,20 +28,20 @@ TABLE_SECTIONS = (
     Section("body", "the table", "the entity of each row", entity=ints()),
     Section(
         "body", "the table", "the start of the step: for drawing between steps, and for going back",
-        previous_position=vectors(),
+        previous_position=vectors(unit="m"),
     ),
-    Section("body", "the table", "the sum of forces", force=vectors(default=0.0)),
-    Section("body", "the table", "0 for what cannot be moved", inverse_mass=floats()),
+    Section("body", "the table", "the sum of forces", force=vectors(default=0.0, unit="N")),
+    Section("body", "the table", "0 for what cannot be moved", inverse_mass=floats(unit="1/kg")),
     Section(  # fields of components, of which the plan shows what the game has set
-        position=vectors(),
-        linear_velocity=vectors(),
-        mass=floats(),
-        gravity_scale=floats(default=default_of(RigidBody.gravity_scale)),
-        linear_damping=floats(default=default_of(RigidBody.linear_damping)),
-        max_linear_speed=floats(default=default_of(RigidBody.max_linear_speed)),  # nan: no limit
-        constant_force=vectors(default=default_of(RigidBody.constant_force)),
-        applied_force=vectors(default=default_of(RigidBody.applied_force)),
-        step_force=vectors(default=default_of(RigidBody.step_force)),
+        position=vectors(unit="m"),
+        linear_velocity=vectors(unit="m/s"),
+        mass=floats(unit="kg"),
+        gravity_scale=floats(default=default_of(RigidBody.gravity_scale), unit="1"),
+        linear_damping=floats(default=default_of(RigidBody.linear_damping), unit="1/s"),
+        max_linear_speed=floats(default=default_of(RigidBody.max_linear_speed), unit="m/s"),  # nan: no limit
+        constant_force=vectors(default=default_of(RigidBody.constant_force), unit="N"),
+        applied_force=vectors(default=default_of(RigidBody.applied_force), unit="N"),
+        step_force=vectors(default=default_of(RigidBody.step_force), unit="N"),
         ccd=flags(default=default_of(RigidBody.ccd)),
     ),
 )  # fmt: skip
@@ -52,16 +52,16 @@ SLEEP_COLUMNS = Section(
     sleep_state=ints("int8", default=0),  # AWAKE and the like, see sleeping.stages
     rest_steps=ints("int32"),  # for how many steps it has been at rest
     island=ints(),  # entity id of the first body of those that sleep together; 0: none
-    rest_position=vectors(),
-    rest_force=vectors(),
-    flown_position=vectors(),  # where free flight leads it from there
-    flown_velocity=vectors(),
+    rest_position=vectors(unit="m"),
+    rest_force=vectors(unit="N"),
+    flown_position=vectors(unit="m"),  # where free flight leads it from there
+    flown_velocity=vectors(unit="m/s"),
 )  # fmt: skip
 
 # Columns of the bodies that are made within a step or when rows have moved.
 START_COLUMNS = Section(
     "body", "the step", "velocity at the start of the step, for the path",
-    start_velocity=vectors(),
+    start_velocity=vectors(unit="m/s"),
 )  # fmt: skip
 QUARANTINE = Section(
     "body", "the step", "a body had a value that cannot be: it takes no part",
@@ -70,13 +70,13 @@ QUARANTINE = Section(
 # Flight: x(t) = origin + path_velocity t + path_second t^2 + path_third t^3 within the step.
 COLLISIONS = Section(
     "body", "collisions", "some body has a collider: boxes, extents, the path in the step, the response",
-    origin=vectors(),
-    path_velocity=vectors(),
-    half_extents=vectors(),  # of the box around the shape; nan without one
-    min_extent=floats(),  # smallest full extent of the shape; 0 for what has no end
-    force_speed_change=floats(),  # by which forces change the speed in this step
-    lower=vectors(),  # boxes around the motion
-    upper=vectors(),
+    origin=vectors(unit="m"),
+    path_velocity=vectors(unit="m/s"),
+    half_extents=vectors(unit="m"),  # of the box around the shape; nan without one
+    min_extent=floats(unit="m"),  # smallest full extent of the shape; 0 for what has no end
+    force_speed_change=floats(unit="m/s"),  # by which forces change the speed in this step
+    lower=vectors(unit="m"),  # boxes around the motion
+    upper=vectors(unit="m"),
     rank=ints("int32"),  # place in the order of entity ids
     collider_slot=ints("int8"),  # slot of the collider that gives layer, mask and material
     impact_count=ints("int32"),
@@ -85,53 +85,53 @@ COLLISIONS = Section(
 PREDICTED = Section(
     "body", "collisions", RESTED,
     warm_started=flags(default=False),  # the resting prediction has changed its velocity
-    warm_start_velocity=vectors(),
-    to_hold=vectors(),  # m/s, at which it closes on what pushes it
+    warm_start_velocity=vectors(unit="m/s"),
+    to_hold=vectors(unit="m/s"),  # at which it closes on what pushes it
 )  # fmt: skip
 REST_COLUMNS = Section(
     "body", "collisions", RESTED,
     held=flags(default=False),  # a contact at rest has pushed it
     place=ints("int32", default=-1),  # among the bodies of the solver; -1 between steps
-    contact_travel=floats(),  # m, by which these have turned its points, where bodies spin
+    contact_travel=floats(unit="m"),  # by which these have turned its points, where bodies spin
 )  # fmt: skip
 CURVES = Section(
     "body", "curved paths", "the integrator's paths are curved",
-    path_second=vectors(),
-    path_third=vectors(),
+    path_second=vectors(unit="m/s^2"),
+    path_third=vectors(unit="m/s^3"),
 )  # fmt: skip
 SWEEP_COLUMNS = Section(
     "body", "swept bodies", "bodies are swept along their paths: how far impacts may send them",
-    search_margin=floats(),
-    search_lower=vectors(),  # where the centre may be while all neighbours are known
-    search_upper=vectors(),
+    search_margin=floats(unit="m"),
+    search_lower=vectors(unit="m"),  # where the centre may be while all neighbours are known
+    search_upper=vectors(unit="m"),
     trapped_impacts=ints("int32"),  # impacts one after the other with what cannot be moved
-    last_impact=floats(),  # s since the start of the step
+    last_impact=floats(unit="s"),  # since the start of the step
 )  # fmt: skip
 EVALUATIONS = Section(
     "body", "integrator", "the integrator evaluates forces more than once, or flies exactly",
-    acceleration=vectors(),
-    flight_velocity=vectors(),  # of an event-driven world, after the first half kick
-    rk_middle=vectors(),
-    rk_speeds=vectors(),
-    rk_kicks=vectors(),
+    acceleration=vectors(unit="m/s^2"),
+    flight_velocity=vectors(unit="m/s"),  # of an event-driven world, after the first half kick
+    rk_middle=vectors(unit="m"),
+    rk_speeds=vectors(unit="m/s"),
+    rk_kicks=vectors(unit="m/s"),
 )  # fmt: skip
 SPINS = Section(
     "body", "rotation", "bodies spin: a plugin's stages say how fast, and contacts change that",
-    spin=vectors(),  # rad/s; in 2D the first component
-    inverse_inertia=vectors(),  # 1 / (kg m^2): in 2D the first component; in 3D xx, yy, zz along the world's axes,
-    inverse_products=vectors(),  # and xy, xz, yz; 0: contacts do not turn it
-    rolling_radius=floats(default=0.0),  # m: of a round body; 0: its surface moves as its centre
-    rolling_friction=floats(),  # m
-    turn=vectors(),  # rad, in the step
+    spin=vectors(unit="rad/s"),  # in 2D the first component
+    inverse_inertia=vectors(unit="1/(kg m^2)"),  # in 2D the first component; in 3D xx, yy, zz along the world's axes,
+    inverse_products=vectors(unit="1/(kg m^2)"),  # and xy, xz, yz; 0: contacts do not turn it
+    rolling_radius=floats(default=0.0, unit="m"),  # of a round body; 0: its surface moves as its centre
+    rolling_friction=floats(unit="m"),
+    turn=vectors(unit="rad"),  # in the step
     # m: how far turning moves points of the last level that has been measured, per rad, at most; only of what turns
-    reach=floats(),
-    driven=floats(default=0.0),  # m, by which motors may move it, about where joints hold it, farther than that
-    driven_turn=floats(default=0.0),  # rad, by which they may turn it
+    reach=floats(unit="m"),
+    driven=floats(default=0.0, unit="m"),  # by which motors may move it, about where joints hold it, farther than that
+    driven_turn=floats(default=0.0, unit="rad"),  # by which they may turn it
     joined=flags(default=False),  # by joints, if any are active
 )  # fmt: skip
 FAILS = "the start of the step, for one that fails"
-UNDO_COLUMNS = Section("body", "going back", FAILS, kept_previous=vectors(), kept_velocity=vectors())
-UNDO_FORCE = Section("body", "going back", FAILS, kept_step_force=vectors())
+UNDO_COLUMNS = Section("body", "going back", FAILS, kept_previous=vectors(unit="m"), kept_velocity=vectors(unit="m/s"))
+UNDO_FORCE = Section("body", "going back", FAILS, kept_step_force=vectors(unit="N"))
 SLEEPING = Section(
     "body", "sleeping", "bodies may sleep: islands, and whether anything has changed them",
     rest_root=ints("int32"),
@@ -157,22 +157,22 @@ BODIES = Schema(
     "Bodies", *TABLE_SECTIONS, SLEEP_COLUMNS, *BODY_SECTIONS,
     Section(
         "body", "rotation", "some body is rotated, or a shape reads its axes",
-        axes=floats(),  # rotation matrices (n, d, d), flat,
-        axes_rotation=floats(),  # and the rotations that they are of
+        axes=floats(unit="1"),  # rotation matrices (n, d, d), flat,
+        axes_rotation=floats(unit="rad or 1"),  # and the rotations that they are of
     ),
     Section(
         "body", "shapes", "which shapes a body has, and where they are",
         levels=ints("int8", stacked=True),  # shapes, cheapest first, the last one repeated
-        level_offsets=vectors(stacked=True),
+        level_offsets=vectors(stacked=True, unit="m"),
     ),
     Section(
         "static body", "collisions", "where it stood when its box was made",
-        static_position=vectors(),  # from row 0
+        static_position=vectors(unit="m"),  # from row 0
     ),
-    rotation=floats(),  # one angle, in 3D four numbers per body; without rows no body is rotated
-    previous_rotation=floats(),  # the same at the start of the step, in worlds where bodies turn: for drawing
+    rotation=floats(unit="rad or 1"),  # one angle, in 3D four numbers per body; without rows no body is rotated
+    previous_rotation=floats(unit="rad or 1"),  # at the start of the step, in worlds where bodies turn: for drawing
     shape=ints("int8"),  # of the last level; -1: none
-    offset=vectors(),  # of the last level, in the world
+    offset=vectors(unit="m"),  # of the last level, in the world
     level_not_enclosing=flags(),  # a rotated level may reach out of the one around it
 )  # fmt: skip
 
@@ -195,9 +195,9 @@ CHECKED = Schema(
 # Fields that every collider has, by the slot of its type and the row.
 COLLIDERS = Schema(
     "Colliders",
-    offset=vectors(stacked=True, default=default_of(Collider.offset)),
-    restitution=floats(stacked=True, default=default_of(Collider.restitution)),
-    friction=floats(stacked=True, default=default_of(Collider.friction)),
+    offset=vectors(stacked=True, default=default_of(Collider.offset), unit="m"),
+    restitution=floats(stacked=True, default=default_of(Collider.restitution), unit="1"),
+    friction=floats(stacked=True, default=default_of(Collider.friction), unit="1"),
     sensor=flags(stacked=True, default=default_of(Collider.sensor)),
     layer=ints(stacked=True, default=default_of(Collider.layer)),
     mask=ints(stacked=True, default=default_of(Collider.mask)),
@@ -250,14 +250,14 @@ PAIR_COLUMNS = Section(
     hit=flags(),
     near_contact=flags(),  # the response may concern them
     crossed=flags(),
-    impulse=floats(),
-    struck=floats(),  # s, time of its last impact in this step, where there is an impulse
+    impulse=floats(unit="N s"),
+    struck=floats(unit="s"),  # time of its last impact in this step, where there is an impulse
     parting=ints("uint8"),
     # the manifold, made once in a step: what the pair's function says of
-    at=vectors(),  # this way from the centre of a's shape to that of b's; nan: of none
-    depth=floats(),
-    normal=vectors(),
-    point=vectors(),  # relative to the centre of a's shape
+    at=vectors(unit="m"),  # this way from the centre of a's shape to that of b's; nan: of none
+    depth=floats(unit="m"),
+    normal=vectors(unit="1"),
+    point=vectors(unit="m"),  # relative to the centre of a's shape
     early=flags(),  # it was made where the step starts, as the two rested in the step before
     found=integer(),  # contacts of the narrow phase: hits
     hits=ints("int32"),
@@ -277,10 +277,10 @@ CONTACT_ROWS = Section(
     "contact", "contacts", "bodies have touched",
     entity_a=ints(stacked=True),
     entity_b=ints(stacked=True),
-    point=vectors(stacked=True),
-    normal=vectors(stacked=True),
-    depth=floats(stacked=True),
-    impulse=floats(stacked=True),
+    point=vectors(stacked=True, unit="m"),
+    normal=vectors(stacked=True, unit="1"),
+    depth=floats(stacked=True, unit="m"),
+    impulse=floats(stacked=True, unit="N s"),
     enabled=flags(stacked=True),
     rested=flags(stacked=True),
     ended=ints("int32"),
@@ -337,7 +337,7 @@ STATE = Schema(
     version=integer(),  # of the table's rows
     ranks_version=integer(),  # of the rows that ``bodies.rank`` is of
     support_version=integer(),  # of the rows of which no static one is marked as ``bodies.warm_started``
-    gravity=vectors(),  # one row
+    gravity=vectors(unit="m/s^2"),  # one row
     collides=flag(),
     several_levels=flag(),
     level_count=integer(),
@@ -349,11 +349,11 @@ STATE = Schema(
     limits_speed=flag(),
     others_write=flag(),  # code that is not carom's runs in the step
     # settings
-    dt_cubed=number(),
+    dt_cubed=number(unit="s^3"),
     substeps=integer(),
     mode=integer(),
-    slop=number(),  # below 0: from the sizes
-    restitution_threshold=number(),  # below 0: from the forces
+    slop=number(unit="m"),  # below 0: from the sizes
+    restitution_threshold=number(unit="m/s"),  # below 0: from the forces
     max_impacts=integer(),
     restitution_rule=integer(),
     friction_rule=integer(),
@@ -369,12 +369,12 @@ STATE = Schema(
     sweeping=flag(),
     path_degree=integer(),
     usual_path_degree=integer(),  # of the integrator
-    force_travels=number(),
+    force_travels=number(unit="m"),
     step_number=integer(),
-    neighbours_known_until=number(),
+    neighbours_known_until=number(unit="s"),
     any_warm_started=flag(),
-    heavy_damping=number(),
-    heavy_step=number(),
+    heavy_damping=number(unit="1/s"),
+    heavy_step=number(unit="s"),
     rk_stage=integer(),
     drifted=flag(),
     damped=flag(),
@@ -384,15 +384,15 @@ STATE = Schema(
     statics_version=integer(),  # another whenever a static body may have changed; and the one that these are of:
     read_version=integer(),  # inverse masses, checked columns,
     boxed_version=integer(),  # boxes,
-    frame=floats(),  # extent of the moving bodies' boxes
+    frame=floats(unit="m"),  # extent of the moving bodies' boxes
     pair_search=integer(),  # what finds candidates in this step, see broad_phase.stages
     response_idle=flag(),  # nothing is near anything, and nothing rested
     ids_changed=flag(),  # ids mean other entities than in the last step
     contacts_version=integer(),
     motion_version=integer(),  # changes whenever bodies may have moved
     stay_wanted=flag(),  # contact_stay has a handler
-    thinnest_static=number(),  # m, the smallest extent of a static body, but for those without any
-    thinnest_moving=number(),
+    thinnest_static=number(unit="m"),  # the smallest extent of a static body, but for those without any
+    thinnest_moving=number(unit="m"),
     too_fast_for_discrete=flag(),  # a body is so fast that discrete collisions may miss what it passes:
     too_fast_row=integer(),
     turns_too_far=integer(),  # 1 + the row of a body that may turn past others within the step; 0: none
@@ -416,7 +416,7 @@ STATE = Schema(
     refined_counted=integer(),  # islands with more substeps than usual
     solved_counted=integer(),  # rows in all passes
     restrained_counted=integer(),  # islands that the guard has taken energy from,
-    restrained_energy=number(),  # and how much, J
+    restrained_energy=number(unit="J"),  # and how much, J
     impacts_counted=integer(),
     capped_counted=integer(),
     refreshes_counted=integer(),

@@ -45,6 +45,7 @@ class Column:
     kw_only: bool = False  # and whether only by name
     also: tuple[str, ...] = ()  # what others call it; only for messages about a wrong name
     on_write: Callable[[Any, int], None] | None = None  # called with (table, row) after a handle has written
+    unit: str = ""
     on_demand: bool = False  # no memory in a table while all rows hold the default and nothing can write in place
     name: str = ""
     owner: str = ""
@@ -344,6 +345,7 @@ def column(
     optional: bool = False,
     choices: tuple[str, ...] = (),
     kw_only: bool = False,
+    unit: str = "",
 ) -> Any:
     """A field of a component: one number per entity (or one vector: ``item="vector"``), stored as a column.
 
@@ -358,6 +360,10 @@ def column(
         checks: above zero; not below; None allowed; one of these strings
     kw_only
         whether the constructor takes it by name only
+    unit
+        "m", "N s"; "1" of a ratio: printed by ``world.plan()``
+
+    Raises ValueError for an ``item`` or a ``dtype`` that there is not.
     """
     if item not in LENGTHS:
         raise ValueError(f"column item must be {', '.join(list(LENGTHS)[:-1])} or rotation, got {item!r}")
@@ -369,7 +375,7 @@ def column(
         raise ValueError(f"column dtype must be float, int or bool, got {dtype!r}")
     return Column(
         default=default, item=item, dtype=dtype, positive=positive, minimum=minimum, optional=optional, choices=choices,
-        kw_only=kw_only,
+        kw_only=kw_only, unit=unit,
     )  # fmt: skip
 
 

@@ -19,18 +19,22 @@ class PlannedKernel:
 
     when
         what has to happen for it to be called, and so to be compiled; empty: in every step
+    reads, writes
+        the columns of a stage
     """
 
     kernel: str
     reason: str
     when: str = ""
+    reads: tuple[str, ...] = ()
+    writes: tuple[str, ...] = ()
 
 
 def kernels_of(segment: Any) -> Iterator[PlannedKernel]:
     """The stages of a segment that are needed in this scene."""
     for stage in segment.program.stages[segment.start : segment.stop]:
         if segment.program.is_linked(stage.name):
-            yield PlannedKernel(stage.name, stage.why, stage.when)
+            yield PlannedKernel(stage.name, stage.why, stage.when, stage.reads, stage.writes)
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,8 @@ class PlannedColumn:
         the component whose field it is, or what uses it
     bytes
         for one of them
+    unit
+        "m", "N s"; "1" of a ratio; empty of counts, flags and what has several units
     """
 
     column: str
@@ -52,6 +58,7 @@ class PlannedColumn:
     group: str
     bytes: int
     reason: str
+    unit: str = ""
 
     @property
     def name(self) -> str:
@@ -127,7 +134,7 @@ class Plan:
                 yield ""
                 yield f"{f'columns, bytes per {of}':<28}{total:>4}"
             size = sum(column.bytes for column in columns)
-            names = ", ".join(column.name for column in columns)
+            names = ", ".join(f"{c.name} [{c.unit}]" if c.unit not in ("", "1") else c.name for c in columns)
             yield from textwrap.wrap(
                 f"{names}: {key[2]}", WIDTH, initial_indent=f"  {key[1]:<26}{size:>4}  ", subsequent_indent=" " * 34
             )

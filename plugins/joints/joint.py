@@ -98,18 +98,20 @@ class Joint(Component, abstract=True):
     a: int | None
     b: int | None
     collide_connected: bool = special_column(default=False, dtype=bool, kw_only=True)
-    breaking_force: float | None = special_column(default=None, optional=True, positive=True, kw_only=True)
-    breaking_torque: float | None = special_column(default=None, optional=True, positive=True, kw_only=True)
+    breaking_force: float | None = special_column(unit="N", default=None, optional=True, positive=True, kw_only=True)
+    breaking_torque: float | None = special_column(unit="N m", default=None, optional=True, positive=True, kw_only=True)
     attached: bool = special_column(default=False, init=False, dtype=bool)
     changed: bool = special_column(default=True, init=False, dtype=bool)  # since the last step: its bodies wake
-    at_a: Vector = special_column(default=0.0, init=False, item="vector")  # the anchors, along the axes of each body
-    at_b: Vector = special_column(default=0.0, init=False, item="vector")
-    start: float = special_column(default=0.0, init=False)  # m or rad: the value of the row that has one
+    # the anchors, along the axes of each body
+    at_a: Vector = special_column(unit="m", default=0.0, init=False, item="vector")
+    at_b: Vector = special_column(unit="m", default=0.0, init=False, item="vector")
+    # m or rad: the value of the row that has one
+    start: float = special_column(unit="m or rad", default=0.0, init=False)
     # in space: the axis, and a direction at right angles to it, along the axes of each body
-    axis_a: Vector = special_column(default=0.0, init=False, item="vector")
-    axis_b: Vector = special_column(default=0.0, init=False, item="vector")
-    side_a: Vector = special_column(default=0.0, init=False, item="vector")
-    side_b: Vector = special_column(default=0.0, init=False, item="vector")
+    axis_a: Vector = special_column(unit="1", default=0.0, init=False, item="vector")
+    axis_b: Vector = special_column(unit="1", default=0.0, init=False, item="vector")
+    side_a: Vector = special_column(unit="1", default=0.0, init=False, item="vector")
+    side_b: Vector = special_column(unit="1", default=0.0, init=False, item="vector")
 
     def __init_subclass__(cls, **options: Any) -> None:
         for name, column in list(vars(cls).items()):
@@ -343,14 +345,16 @@ class Driven(Joint, abstract=True):
 
     __slots__ = ()
 
-    lower: float | None = special_column(default=None, optional=True, largest=MOST, kw_only=True)
-    upper: float | None = special_column(default=None, optional=True, largest=MOST, kw_only=True)
-    motor_speed: float | None = special_column(default=None, optional=True, largest=MOST, kw_only=True)
-    frequency: float | None = special_column(
-        default=None, optional=True, positive=True, largest=MOST, kw_only=True
+    lower: float | None = special_column(unit="m or rad", default=None, optional=True, largest=MOST, kw_only=True)
+    upper: float | None = special_column(unit="m or rad", default=None, optional=True, largest=MOST, kw_only=True)
+    motor_speed: float | None = special_column(
+        unit="m/s or rad/s", default=None, optional=True, largest=MOST, kw_only=True
     )
-    damping_ratio: float = special_column(default=0.0, minimum=0.0, largest=MOST, kw_only=True)
-    rest: float = special_column(default=0.0, kw_only=True, largest=MOST)
+    frequency: float | None = special_column(
+        unit="Hz", default=None, optional=True, positive=True, largest=MOST, kw_only=True
+    )
+    damping_ratio: float = special_column(unit="1", default=0.0, minimum=0.0, largest=MOST, kw_only=True)
+    rest: float = special_column(unit="m or rad", default=0.0, kw_only=True, largest=MOST)
 
     limits = ends_of("limits")
 

@@ -52,7 +52,7 @@ class Distance(Joint):
     least: float | None = optional(minimum=0.0, largest=MOST)
     most: float | None = optional(minimum=0.0, largest=MOST)
     frequency: float | None = optional(positive=True, largest=MOST)
-    damping_ratio: float = special_column(default=0.0, minimum=0.0, largest=MOST, kw_only=True)
+    damping_ratio: float = special_column(unit="1", default=0.0, minimum=0.0, largest=MOST, kw_only=True)
     # whether it has hold of each body where that was taken: what is moved is one of the two
     held_a: bool = special_column(default=False, init=False, dtype=bool)
     held_b: bool = special_column(default=False, init=False, dtype=bool)
@@ -131,8 +131,8 @@ class Hinge(Driven):
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
-    anchor: Vector = special_column(item="vector", largest=MOST)
-    axis: Vector = special_column(default=0.0, item="vector", largest=MOST, kw_only=True)
+    anchor: Vector = special_column(unit="m", item="vector", largest=MOST)
+    axis: Vector = special_column(unit="1", default=0.0, item="vector", largest=MOST, kw_only=True)
     max_torque: float | None = optional(minimum=0.0)
 
     def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:
@@ -158,7 +158,7 @@ class Ball(Joint):
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
-    anchor: Vector = special_column(item="vector", largest=MOST)
+    anchor: Vector = special_column(unit="m", item="vector", largest=MOST)
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, self.anchor)
@@ -174,7 +174,7 @@ class Weld(Joint):
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
-    anchor: Vector = special_column(item="vector", largest=MOST)
+    anchor: Vector = special_column(unit="m", item="vector", largest=MOST)
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, self.anchor)
@@ -202,7 +202,7 @@ class Slider(Driven):
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
-    direction: Vector = special_column(item="vector", largest=MOST)
+    direction: Vector = special_column(unit="1", item="vector", largest=MOST)
     max_force: float | None = optional(minimum=0.0)
 
     def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:
@@ -249,9 +249,9 @@ class Wheel(Driven):
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
-    anchor: Vector = special_column(item="vector", largest=MOST)
-    direction: Vector = special_column(item="vector", largest=MOST)
-    axis: Vector = special_column(default=0.0, item="vector", largest=MOST, kw_only=True)
+    anchor: Vector = special_column(unit="m", item="vector", largest=MOST)
+    direction: Vector = special_column(unit="1", item="vector", largest=MOST)
+    axis: Vector = special_column(unit="1", default=0.0, item="vector", largest=MOST, kw_only=True)
     max_torque: float | None = optional(minimum=0.0)
 
     def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:
@@ -301,7 +301,7 @@ class Motor(Joint):
     speed: float | None = optional(largest=MOST)
     angle: float | None = optional(largest=MOST)
     max_torque: float | None = optional(minimum=0.0)
-    axis: Vector = special_column(default=0.0, item="vector", largest=MOST, kw_only=True)
+    axis: Vector = special_column(unit="1", default=0.0, item="vector", largest=MOST, kw_only=True)
 
     def check(self) -> None:
         if (self.speed is None) == (self.angle is None):
@@ -337,9 +337,9 @@ class Cone(Joint):
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
-    anchor: Vector = special_column(item="vector", largest=MOST)
-    axis: Vector = special_column(item="vector", largest=MOST)
-    swing: float = special_column(default=math.pi, minimum=0.0, kw_only=True)
+    anchor: Vector = special_column(unit="m", item="vector", largest=MOST)
+    axis: Vector = special_column(unit="1", item="vector", largest=MOST)
+    swing: float = special_column(unit="rad", default=math.pi, minimum=0.0, kw_only=True)
     lower: float | None = optional(largest=MOST)
     upper: float | None = optional(largest=MOST)
     twist = ends_of("twist")
@@ -382,11 +382,11 @@ class MousePull(Joint):
     fixed: ClassVar[tuple[str, ...]] = ("grip",)
 
     b: int | None = special_column(dtype=int, minimum=0)
-    grip: Vector = special_column(item="vector", largest=MOST)
-    target: Vector = special_column(item="vector", largest=MOST)
+    grip: Vector = special_column(unit="m", item="vector", largest=MOST)
+    target: Vector = special_column(unit="m", item="vector", largest=MOST)
     max_force: float | None = optional(minimum=0.0)
-    frequency: float = special_column(default=5.0, largest=MOST, positive=True, kw_only=True)
-    damping_ratio: float = special_column(default=1.0, minimum=0.0, largest=MOST, kw_only=True)
+    frequency: float = special_column(unit="Hz", default=5.0, largest=MOST, positive=True, kw_only=True)
+    damping_ratio: float = special_column(unit="1", default=1.0, minimum=0.0, largest=MOST, kw_only=True)
     a: int | None = special_column(default=WORLD, init=False, dtype=int)
 
     def check(self) -> None:

@@ -22,7 +22,9 @@ class BoxCollider(Collider):
     __slots__ = ()
 
     rotates = True
-    half_extents: VectorField = special_column(item="vector", minimum=0.0, also=("size", "extents", "half_size"))
+    half_extents: VectorField = special_column(
+        unit="m", item="vector", minimum=0.0, also=("size", "extents", "half_size")
+    )
 
     @staticmethod
     def bounds(shape, dimensions):

@@ -19,8 +19,8 @@ GRID_BOXES = Section(  # one entry per box
 GRID_STATICS = Section(  # static grid alone: the rows in the grid with copies of their boxes
     "body", "broad phase, grid", "more bodies than are tested pair by pair",
     rows=ints("int32"),
-    lower=vectors(),
-    upper=vectors(),
+    lower=vectors(unit="m"),
+    upper=vectors(unit="m"),
 )  # fmt: skip
 GRID = Schema(
     "Grid", GRID_BOXES, GRID_STATICS,
@@ -29,15 +29,15 @@ GRID = Schema(
     version=integer(),  # ``state.version`` when it was built; static grid: ``state.statics_version``, -1: never
     first=integer(),  # the first row that moves; static grid: the first static row, of which the others are counted
     # cells are numbered x + y * row + z * layer, with one empty cell around the outermost
-    inverse_cell=number(),  # 1/m
+    inverse_cell=number(unit="1/m"),
     row=integer(),
     layer=integer(),
     total=integer(),
-    frame=floats(),  # extent of the boxes in the grid, as ``state.frame``
-    scale=vectors(),  # one row; integers of a code per metre
+    frame=floats(unit="m"),  # extent of the boxes in the grid, as ``state.frame``
+    scale=vectors(unit="1/m"),  # one row; integers of a code per metre
     directory=ints("int32"),  # where each cell begins in ``order``
     notes=table("int32", 4),  # what has to be tested, see uniform_grid.look_around
-    longest=floats(),  # static grid: the longest edges, ascending
+    longest=floats(unit="m"),  # static grid: the longest edges, ascending
     outside_count=integer(),
     outside=ints("int32"),  # rows that are not in the grid: static ones that are too long, moving ones that have left
 )  # fmt: skip
@@ -51,25 +51,25 @@ TREE = Schema(
     # the boxes to build it of: rows start..stop-1 of these columns, which belong to the caller
     start=integer(),
     stop=integer(),
-    lower=vectors(),
-    upper=vectors(),
+    lower=vectors(unit="m"),
+    upper=vectors(unit="m"),
     # cells of level 0
-    finest_cell=number(),  # m; 0 for a tree of one cell
-    inverse_cell=number(),  # 1/m
-    origin=vectors(),  # one row; m
-    extent=vectors(),  # one row; what the directory covers from there, m
-    width=vectors(),  # one row; the same in cells
-    lowest=vectors(),  # one row; the centres' bounds in cells from the origin, boxes of the top level aside
-    highest=vectors(),
-    smallest_box=number(),  # of the sample
-    crowding=number(),  # sum of squared numbers of boxes in a cell
+    finest_cell=number(unit="m"),  # 0 for a tree of one cell
+    inverse_cell=number(unit="1/m"),
+    origin=vectors(unit="m"),  # one row; m
+    extent=vectors(unit="m"),  # one row; what the directory covers from there, m
+    width=vectors(unit="1"),  # one row; the same in cells
+    lowest=vectors(unit="1"),  # one row; the centres' bounds in cells from the origin, boxes of the top level aside
+    highest=vectors(unit="1"),
+    smallest_box=number(unit="m"),  # of the sample
+    crowding=number(unit="1"),  # sum of squared numbers of boxes in a cell
     extremes=table("float64", 3),  # of the sample: the lowest values of each quantity and of its negative
     # levels
     level_base=ints(),  # first cell in the directory
     level_cells=ints(),
     level_shift=ints(),  # number of the cell at the origin
     level_stride=table("int64", 3),  # what a cell's number grows by per axis
-    level_scale=floats(),  # size of a cell of level 0 over that of this level; 0: top
+    level_scale=floats(unit="1"),  # size of a cell of level 0 over that of this level; 0: top
     level_begin=ints(),  # in ``order``
     level_end=ints(),
     directory=ints("int32"),  # where each cell begins in ``order``

@@ -11,15 +11,15 @@ EVENTS = Section(
     event_count_a=ints(),  # impact_count of both bodies when the event was made
     event_count_b=ints(),
     event_kind=ints("int8"),
-    event_time=floats(),
+    event_time=floats(unit="s"),
     event_key=ints(),
-    event_change=floats(),  # of the speed along the normal
-    event_normal=vectors(),
-    event_point=vectors(),
-    event_pull=vectors(),  # change of velocity along the surface
+    event_change=floats(unit="m/s"),  # of the speed along the normal
+    event_normal=vectors(unit="1"),
+    event_point=vectors(unit="m"),
+    event_pull=vectors(unit="m/s"),  # change of velocity along the surface
     heap=ints("int32", numbered=True),  # a permutation
     worklist=ints("int32"),  # pairs to search for their next impact,
-    listed_since=floats(),  # each from this time on
+    listed_since=floats(unit="s"),  # each from this time on
     links=ints("int32"),  # to a body's next pair
 )  # fmt: skip
 HEADS = Section("impact", "impacts", BOUNCED, heads=ints("int32"))  # the first pair of each body
@@ -30,25 +30,25 @@ MEMBERS = Section(
     member=ints("int32"),
     group=ints("int32"),
     is_left=flags(),
-    share=floats(),  # impulses along the normals, N s
-    before=floats(),
-    ahead=floats(),
-    weight=floats(),
-    terms=floats(),
-    friction_impulse=vectors(),  # impulses along the surfaces
+    share=floats(unit="N s"),  # impulses along the normals, N s
+    before=floats(unit="N s"),
+    ahead=floats(unit="N s"),
+    weight=floats(unit="kg"),
+    terms=floats(unit="N s or J"),
+    friction_impulse=vectors(unit="N s"),  # impulses along the surfaces
 )  # fmt: skip
 BODIES_OF_MEMBERS = Section(
     "impact", "impacts", BOUNCED,
     first_member=ints("int32"),
-    gained=vectors(),  # change of velocity
+    gained=vectors(unit="m/s"),  # change of velocity
 )  # fmt: skip
 LOG = Section(
     "impact", "impacts", BOUNCED,
     log_pair=ints("int32"),
-    log_time=floats(),
-    log_impulse=floats(),
-    log_normal=vectors(),
-    log_point=vectors(),
+    log_time=floats(unit="s"),
+    log_impulse=floats(unit="N s"),
+    log_normal=vectors(unit="1"),
+    log_point=vectors(unit="m"),
 )  # fmt: skip
 IMPACTS = Schema(
     "Impacts", EVENTS, HEADS, MEMBER_LISTS, MEMBERS, BODIES_OF_MEMBERS, LOG,
@@ -62,9 +62,9 @@ IMPACTS = Schema(
     may_sink=flag(),  # through something thin, at the speed of contacts at rest
     pending=integer(),  # the event that waits for room or code, off the queue; -1: none
     touchdown_pair=integer(),  # the last one of whose bodies landings were searched
-    touchdown_time=number(),  # the time of its impact while they are searched, else 0
-    now=number(),
-    until=number(),
+    touchdown_time=number(unit="s"),  # the time of its impact while they are searched, else 0
+    now=number(unit="s"),
+    until=number(unit="s"),
     # impacts at the same time
     together=integer(),  # for how many there must be room
     group_visits=integer(),  # impacts in all passes over groups of this step

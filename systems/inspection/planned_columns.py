@@ -57,12 +57,15 @@ def _sections(record: Record, sections: Sequence[Section], least: int = 1) -> It
                 rows //= 4
             if rows >= least:
                 shown = f"_{name}" if section is SLEEP_COLUMNS else name
-                yield from _column(shown, section.of, section.group, array, rows, section.why)
+                unit = section.fields[name].unit
+                yield from _column(shown, section.of, section.group, array, rows, section.why, unit)
 
 
-def _column(name: str, of: str, group: str, array: np.ndarray, rows: int, reason: str) -> Iterator[PlannedColumn]:
+def _column(
+    name: str, of: str, group: str, array: np.ndarray, rows: int, reason: str, unit: str = ""
+) -> Iterator[PlannedColumn]:
     if array.nbytes and rows:
-        yield PlannedColumn(name, of, group, array.nbytes // rows, reason)
+        yield PlannedColumn(name, of, group, array.nbytes // rows, reason, unit)
 
 
 def _fields(table: Table) -> Iterator[PlannedColumn]:
@@ -79,4 +82,6 @@ def _fields(table: Table) -> Iterator[PlannedColumn]:
         for columns, reason in ((used, FIELDS), (unused, DEFAULTS)):
             for column in columns:
                 array = table.arrays[column.key]
-                yield from _column(column.key, "body", component.__name__, array, table.capacity, reason)
+                yield from _column(
+                    column.key, "body", component.__name__, array, table.capacity, reason, column.unit
+                )

@@ -16,8 +16,9 @@ ROTATION_STAGES = {
 # three numbers, of which a plane uses the first: what the step began with, torque and momentum at the start of the
 # part, sums of RK4; and whether torques have changed within the step, and a body turns fast.
 TURNS = Schema(
-    "Turns", part=integer(), begins=flag(), within=flag(), torque=floats(), start_rotation=table("float64", 4),
-    start_spin=table("float64", 3), pushed=table("float64", 3), gained=floats(), changed=flags(), fast=flags(),
+    "Turns", part=integer(), begins=flag(), within=flag(), torque=floats(unit="N m"),
+    start_rotation=table("float64", 4, unit="rad or 1"), start_spin=table("float64", 3, unit="rad/s"),
+    pushed=table("float64", 3, unit="rad/s"), gained=floats(unit="rad/s"), changed=flags(), fast=flags(),
     turned=table("float64", 3), momentum=table("float64", 3), middle=table("float64", 3), speeds=table("float64", 3),
     kicks=table("float64", 3),
 )  # fmt: skip

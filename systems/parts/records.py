@@ -9,9 +9,9 @@ PARTS = Schema(
     count=integer(),
     entity=ints(),  # ascending
     body=ints(),  # the entity of the body that it belongs to, and moves with
-    mass=floats(),  # kg
-    turn=table("float64", 4),  # its rotation against the body: an angle, in space a quaternion w, x, y, z
-    kept=table("float64", 6),  # m^2, of the collider that it had last, as Spin.gyration; nan: of none
+    mass=floats(unit="kg"),
+    turn=table("float64", 4, unit="rad or 1"),  # against the body: an angle, in space a quaternion w, x, y, z
+    kept=table("float64", 6, unit="m^2"),  # of the collider that it had last, as Spin.gyration; nan: of none
     rows_version=integer(),  # of the rows of bodies
     row=ints("int32"),
     body_row=ints("int32"),

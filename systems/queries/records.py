@@ -8,11 +8,11 @@ from ..shapes.query import QUERY
 # Queries are rows 0..m-1. Overlaps and neighbours write any number of hits per query, those of query q before
 # ``end[q]``. So does a cast of one shape for all that it meets. Nearest surfaces and first hits are in row q.
 QUERIES = Section(
-    centre=vectors(),
-    half=vectors(),  # overlaps: half extents
-    direction=vectors(),  # casts: unit vector, 0 if the shape does not move
-    limit=floats(),  # m; how far to look
-    search_limit=floats(),  # of a cast: limit, or distance of the nearest hit so far
+    centre=vectors(unit="m"),
+    half=vectors(unit="m"),  # overlaps: half extents
+    direction=vectors(unit="1"),  # casts: unit vector, 0 if the shape does not move
+    limit=floats(unit="m"),  # how far to look
+    search_limit=floats(unit="m"),  # of a cast: limit, or distance of the nearest hit so far
     excluded=ints(),  # entity to leave out; -1: none
     body=ints(),  # neighbours: the row of the body itself
     end=ints(),
@@ -20,10 +20,10 @@ QUERIES = Section(
 RESULTS = Section(
     row=ints(),  # -1: nothing found
     entity=ints(),
-    distance=floats(),
-    fraction=floats(),
-    normal=vectors(),
-    point=vectors(),
+    distance=floats(unit="m"),
+    fraction=floats(unit="1"),
+    normal=vectors(unit="1"),
+    point=vectors(unit="m"),
 )
 QUERY_BATCH = Schema(
     "QueryBatch",
@@ -34,10 +34,10 @@ QUERY_BATCH = Schema(
     mask=integer(),  # layers
     only_nearest=flag(),  # casts
     is_ray=flag(),
-    radius=number(),  # neighbours, m
+    radius=number(unit="m"),  # neighbours, m
     # memory of a cast
     hit_count=integer(),
     slice_level=ints(),  # levels of the tree in use
-    slice_begin=floats(),  # and where the next slice of each begins, m
-    span=number(),  # m; length of the way that sweeps are given
+    slice_begin=floats(unit="m"),  # and where the next slice of each begins, m
+    span=number(unit="m"),  # length of the way that sweeps are given
 )

@@ -9,6 +9,7 @@ A schema is a list of named fields. :class:`~carom.framework.jit.records.record.
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -22,9 +23,10 @@ WORD = 8  # bytes: a scalar or the address of another record takes one word, a c
 
 @dataclass(frozen=True)
 class Scalar:
-    """One number: ``dtype`` is float64, int64 or bool."""
+    """One number: ``dtype`` is float64, int64 or bool; ``unit`` as of a column."""
 
     dtype: str
+    unit: str = dataclasses.field(default="", repr=False)
     words = 1
 
 
@@ -46,6 +48,8 @@ class Column:
         it has to have rows
     numbered
         fresh rows hold their own numbers
+    unit
+        "m", "N s"; "1" of a ratio; empty of counts, flags and what has several units. ``world.plan()`` prints it
     """
 
     dtype: str = "float64"
@@ -55,6 +59,7 @@ class Column:
     stacked: bool = False
     default: float | None = None
     numbered: bool = False
+    unit: str = dataclasses.field(default="", repr=False)  # not in the digest: compiled code does not depend on it
     words = 2
 
     def item_shape(self, dimensions: int) -> tuple[int, ...]:
@@ -127,9 +132,9 @@ class Schema:
 Field: TypeAlias = Scalar | Column | Schema
 
 
-def number() -> Scalar:
+def number(unit: str = "") -> Scalar:
     """A float."""
-    return Scalar("float64")
+    return Scalar("float64", unit)
 
 
 def integer() -> Scalar:
@@ -164,9 +169,9 @@ def vectors(**options: Any) -> Column:
 
 def axes() -> Column:
     """A column of rotation matrices (n, d, d); kernels see the body's axes, a tuple of d vectors."""
-    return Column("float64", "axes")
+    return Column("float64", "axes", unit="1")
 
 
-def table(dtype: str, width: int, per_dimension: bool = False) -> Column:
+def table(dtype: str, width: int, per_dimension: bool = False, unit: str = "") -> Column:
     """A column of ``width`` numbers per row, times d if ``per_dimension``."""
-    return Column(dtype, "table", width, per_dimension)
+    return Column(dtype, "table", width, per_dimension, unit=unit)

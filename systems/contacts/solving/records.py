@@ -30,24 +30,24 @@ SOLVER = Schema(
     driven_rows=integer(),
     first=ints("uint32"),  # places of the two bodies
     second=ints("uint32"),
-    normal=vectors(),
-    gap=floats(),  # m, along the normal, where the step starts; below 0: overlap
+    normal=vectors(unit="1"),
+    gap=floats(unit="m"),  # along the normal, where the step starts; below 0: overlap
     apart=flags(),  # there is a gap where the step starts
     varies=flags(),  # its normal stands for several faces
     parting=flags(),  # it bounces: no overlap to be pushed out
-    mass=floats(),  # kg, see effective_mass
-    friction=floats(),
-    extent=floats(),
-    impulse=floats(),  # N s in a substep, along the normal,
-    tangent=vectors(),  # and along the surface
-    total=floats(),  # N s in the step
-    previous=floats(),  # impulse before a pass or a substep
-    target_speed=floats(),  # m/s at which it may close,
-    pushing=floats(),  # and the same in the pass that pushes: below 0 where overlap is to open
-    loaded=floats(),  # m of sag under the impulse of the last step
+    mass=floats(unit="kg"),  # see effective_mass
+    friction=floats(unit="1"),
+    extent=floats(unit="m"),
+    impulse=floats(unit="N s"),  # in a substep, along the normal,
+    tangent=vectors(unit="N s"),  # and along the surface
+    total=floats(unit="N s"),  # in the step
+    previous=floats(unit="N s"),  # impulse before a pass or a substep
+    target_speed=floats(unit="m/s"),  # at which it may close,
+    pushing=floats(unit="m/s"),  # and the same in the pass that pushes: below 0 where overlap is to open
+    loaded=floats(unit="m"),  # of sag under the impulse of the last step
     had_impulse=flags(),  # it has pushed in this step
     wrong=flags(),  # its speed is far from what it asks
-    soft=floats(),  # share of its impulse that it gives back in the pass that pushes
+    soft=floats(unit="1"),  # share of its impulse that it gives back in the pass that pushes
     fixed=flags(),  # it has several points, and one of its bodies cannot be moved
     hard=flags(),
     any_hard=flag(),
@@ -55,25 +55,25 @@ SOLVER = Schema(
     tips=flag(),  # some pair has several points
     has_rolling=flag(),
     # where bodies spin:
-    place=vectors(),  # of the point, from the centre of the first shape
-    arm_a=vectors(),  # from the centres of mass to the surfaces there,
-    arm_b=vectors(),
-    core_a=vectors(),  # and to what of the shapes turns: a rounding stays along the normal
-    core_b=vectors(),
-    tangent_mass=floats(),  # kg, that an impulse along the surface moves
-    rolling=floats(),  # m, of rolling friction
-    rolled=vectors(),  # N m s in a substep, by that
+    place=vectors(unit="m"),  # of the point, from the centre of the first shape
+    arm_a=vectors(unit="m"),  # from the centres of mass to the surfaces there,
+    arm_b=vectors(unit="m"),
+    core_a=vectors(unit="m"),  # and to what of the shapes turns: a rounding stays along the normal
+    core_b=vectors(unit="m"),
+    tangent_mass=floats(unit="kg"),  # that an impulse along the surface moves
+    rolling=floats(unit="m"),  # of rolling friction
+    rolled=vectors(unit="N m s"),  # in a substep, by that
     # of the bodies of each pair while its chunk is solved, where the row of its first point is:
-    mass_a=floats(),  # inverse masses,
-    mass_b=floats(),
-    inertia_a=vectors(),  # inverse moments,
-    inertia_b=vectors(),
-    products_a=vectors(),
-    products_b=vectors(),
-    velocity_a=vectors(),  # and motions
-    velocity_b=vectors(),
-    spin_a=vectors(),
-    spin_b=vectors(),
+    mass_a=floats(unit="1/kg"),  # inverse masses,
+    mass_b=floats(unit="1/kg"),
+    inertia_a=vectors(unit="1/(kg m^2)"),  # inverse moments,
+    inertia_b=vectors(unit="1/(kg m^2)"),
+    products_a=vectors(unit="1/(kg m^2)"),
+    products_b=vectors(unit="1/(kg m^2)"),
+    velocity_a=vectors(unit="m/s"),  # and motions
+    velocity_b=vectors(unit="m/s"),
+    spin_a=vectors(unit="rad/s"),
+    spin_b=vectors(unit="rad/s"),
     ends=ints("int32"),  # where each chunk ends,
     points=ints("int8"),  # and how many rows each of its pairs has
     chunks=integer(),
@@ -88,52 +88,52 @@ SOLVER = Schema(
     number=ints("int32"),
     island=ints("int32"),  # -1: cannot be moved
     group=ints("int32"),  # of what joints join
-    velocity=vectors(),
-    velocity_before=vectors(),  # of a substep, without contacts
-    shift=vectors(),  # m since the step began
-    acceleration=vectors(),
-    inverse_mass=floats(),
-    solver_mass=floats(),  # kg; 0 for what cannot be moved
-    mass_ratio=floats(),  # of what it counts as to what it is: 1, less where it is lightened
-    spin=vectors(),  # where bodies spin, as in the records of the bodies
-    spin_before=vectors(),  # of a substep
-    turn=vectors(),
-    sine=floats(),  # shares of that, see shares_of_turn
-    versine=floats(),
-    inverse_inertia=vectors(),
-    inverse_products=vectors(),
-    frame=table("float64", 4),  # where there are joints in space: its principal axes, a quaternion, see turning
-    inverse_moments=vectors(),  # about these
-    reach=floats(),  # m, of its shape from its centre of mass
+    velocity=vectors(unit="m/s"),
+    velocity_before=vectors(unit="m/s"),  # of a substep, without contacts
+    shift=vectors(unit="m"),  # since the step began
+    acceleration=vectors(unit="m/s^2"),
+    inverse_mass=floats(unit="1/kg"),
+    solver_mass=floats(unit="kg"),  # 0 for what cannot be moved
+    mass_ratio=floats(unit="1"),  # of what it counts as to what it is: 1, less where it is lightened
+    spin=vectors(unit="rad/s"),  # where bodies spin, as in the records of the bodies
+    spin_before=vectors(unit="rad/s"),  # of a substep
+    turn=vectors(unit="rad"),
+    sine=floats(unit="1"),  # shares of that, see shares_of_turn
+    versine=floats(unit="1"),
+    inverse_inertia=vectors(unit="1/(kg m^2)"),
+    inverse_products=vectors(unit="1/(kg m^2)"),
+    frame=table("float64", 4, unit="1"),  # principal axes, a quaternion, with joints in space: see turning
+    inverse_moments=vectors(unit="1/(kg m^2)"),  # about these
+    reach=floats(unit="m"),  # of its shape from its centre of mass
     open_body=ints("int32"),  # those of islands that further passes go over: so many
     opened=integer(),
     mover=ints("int32"),  # bodies that move by themselves
     movers=integer(),
     shared=flags(),  # something presses on it
-    way=vectors(),  # sum of the normals of what holds it
-    held=floats(),  # N s, by its strongest hard contact
+    way=vectors(unit="1"),  # sum of the normals of what holds it
+    held=floats(unit="N s"),  # by its strongest hard contact
     # islands
     islands=integer(),
     size_of=ints("int32"),  # rows
-    mass_of=floats(),  # kg
-    force_of=floats(),  # N s that forces give in the step
-    lightest=floats(),  # inverse mass of the heaviest body
-    most_change=floats(),  # m/s that forces make in the step
-    stiff=floats(),  # 1 / (kg m): largest inverse mass of a row over its extent
-    own=floats(),  # 1 / m: the same times the mass of the lighter body
-    approach_extents=floats(),  # extents per step that some row closes
+    mass_of=floats(unit="kg"),
+    force_of=floats(unit="N s"),  # that forces give in the step
+    lightest=floats(unit="1/kg"),  # inverse mass of the heaviest body
+    most_change=floats(unit="m/s"),  # that forces make in the step
+    stiff=floats(unit="1/(kg m)"),  # largest inverse mass of a row over its extent
+    own=floats(unit="1/m"),  # the same times the mass of the lighter body
+    approach_extents=floats(unit="1"),  # extents per step that some row closes
     substeps_of=ints("int32"),
     hard_of=flags(),
     passes=ints("int32"),  # further ones in a substep, at most
-    bears=floats(),  # share of its heaviest body that it can bear
+    bears=floats(unit="1"),  # share of its heaviest body that it can bear
     range_of=ints("int32"),
-    slope=floats(),  # J, see guard.weigh
-    curvature=floats(),
-    energy=floats(),
-    momentum=vectors(),
-    allowed=floats(),
-    share=floats(),
-    taken=floats(),  # J that the guard has taken in this step
+    slope=floats(unit="J"),  # see guard.weigh
+    curvature=floats(unit="J"),
+    energy=floats(unit="J"),
+    momentum=vectors(unit="kg m/s"),
+    allowed=floats(unit="J"),
+    share=floats(unit="1"),
+    taken=floats(unit="J"),  # that the guard has taken in this step
     struck=flags(),  # some row is far from solved
     unsolved=flags(),
     listed_of=ints("int32"),  # rows of it that further passes go over
@@ -141,16 +141,16 @@ SOLVER = Schema(
     jointed=flags(),
     driven=flags(),  # by motors or springs, which give energy
     needs_substeps=flags(),  # so fast struck that its joints need more substeps
-    credit=floats(),  # J that joints have taken in this step, and may give back
+    credit=floats(unit="J"),  # that joints have taken in this step, and may give back
     at_once=flags(),  # some of its joints are solved at once
-    sway=floats(),  # 1/m: how fast light bodies of joints swing that bear heavy ones, see direct
+    sway=floats(unit="1/m"),  # how fast light bodies of joints swing that bear heavy ones, see direct
     links=ints("int32"),  # rows of joints
     # ranges: the ordinary islands, then each special one
     ranges=integer(),
     usual=integer(),  # substeps,
-    frequency=number(),  # of the springs, times the rate of the substeps,
-    sag=number(),  # and what follows from it
-    push_rate=number(),  # 1 / s: overlap that they push out of itself
+    frequency=number(unit="1"),  # of the springs, times the rate of the substeps,
+    sag=number(unit="1"),  # and what follows from it
+    push_rate=number(unit="1/s"),  # overlap that they push out of itself
     special=ints("int32"),  # island of a range
     row_ends=ints("int32"),
     body_ends=ints("int32"),
@@ -183,12 +183,12 @@ WARM_START_ROWS = Section(
     "contact", "contacts at rest", RESTED,
     entity_a=ints(stacked=True),
     entity_b=ints(stacked=True),
-    place=vectors(stacked=True),  # of the point, where bodies spin
-    normal=vectors(stacked=True),
-    impulse=floats(stacked=True),  # N s of the last substep, as if the step were one,
-    tangent=vectors(stacked=True),  # and along the surface
-    push=vectors(stacked=True),  # what it gave in the step, with its friction,
-    closing=floats(stacked=True),  # m/s at which the two closed along that in the end
+    place=vectors(stacked=True, unit="m"),  # of the point, where bodies spin
+    normal=vectors(stacked=True, unit="1"),
+    impulse=floats(stacked=True, unit="N s"),  # of the last substep, as if the step were one,
+    tangent=vectors(stacked=True, unit="N s"),  # and along the surface
+    push=vectors(stacked=True, unit="N s"),  # what it gave in the step, with its friction,
+    closing=floats(stacked=True, unit="m/s"),  # at which the two closed along that in the end
     first=ints("int32", stacked=True),  # rows of the pairs, for ``rows_version``
     second=ints("int32", stacked=True),
     off=flags(),  # of no use in this step
@@ -199,5 +199,5 @@ WARM_START = Schema(
     before=integer(),  # ``now`` at the start of the step
     counts=ints(),
     rows_version=ints(),
-    step=floats(),  # s that the impulses are for
+    step=floats(unit="s"),  # that the impulses are for
 )  # fmt: skip
