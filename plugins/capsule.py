@@ -14,6 +14,8 @@ from ..framework.vectors import absolute, add, add_scaled, divided, dot, item, l
 from .segment_box import box_gap, box_overlap, place_along
 from .standard_sweeps import LATER, ball, down_at
 
+__all__ = ["CapsuleCollider"]
+
 plugin = Plugin("capsule", version="1.0")
 
 CROSSING = 1e-8  # sine of the angle below which two segments count as parallel, because rounding dominates

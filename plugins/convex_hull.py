@@ -14,6 +14,8 @@ from ..framework import Plugin, array_column
 from ..framework.typing import ArrayField
 from ..framework.vectors import add_scaled, dot, item, replace, scale
 
+__all__ = ["ConvexHullCollider"]
+
 NARROWEST = 1e-150  # m: squares of it are not 0, which its inertia needs
 MOST_POINTS = 64
 FLAT = 1e-6  # of the size: points so near to a plane lie in it

@@ -13,6 +13,8 @@ from ..framework import Plugin, array_column, column
 from ..framework.typing import ArrayField
 from ..framework.vectors import add_scaled, dot, scale
 
+__all__ = ["ConvexPolygonCollider"]
+
 STRAIGHT = 1e-12  # sine of the turn at a corner; below it the corner counts as straight
 FULL_TURN = 2.0 * math.pi
 

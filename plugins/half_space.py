@@ -12,6 +12,8 @@ from ..framework import Column, Convex, Plugin
 from ..framework.typing import VectorField
 from ..framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, scale, sub
 
+__all__ = ["HalfSpaceCollider"]
+
 plugin = Plugin("half_space", version="1.0")
 
 TILT = 1e-6  # radians; a face tilted by less lies flat on the plane and does not touch with one corner

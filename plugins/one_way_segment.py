@@ -20,6 +20,8 @@ from ..framework import Phase, Plugin, System, World, column
 from ..framework.typing import VectorField
 from ..framework.vectors import add_scaled, dot, item, scale
 
+__all__ = ["OneWaySegmentCollider"]
+
 plugin = Plugin("one_way_segment", version="1.0")
 
 SLACK = 0.02  # of its height: a body that begins to touch at most this deep counts as coming from the front

@@ -18,6 +18,8 @@ import numpy as np
 
 from ..framework import Bodies, CaromError, ForceSystem, NoPhysicsError, Phase, Plugin, System, World
 
+__all__ = ["Spring", "Springs"]
+
 FIELDS = ("rest_length", "stiffness", "damping", "only_pulls")
 STABLE = 2.0  # above it no explicit integrator holds a spring, see Springs
 

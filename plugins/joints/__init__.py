@@ -14,21 +14,18 @@ from ...components.spin import Spin
 from ...framework import NoPhysicsError, Plugin, World
 from ...systems.double_buffers import BEFORE_STEP
 from ...systems.joints.own import Placed, rows_of
-from ...systems.joints.records import (
-    CUSTOM,
-    DRIVE,
-    FREE,
-    HOLD,
-    JOINTS,
-    LIMIT,
-    POINT,
-    SERVO,
-    SPRING,
-    TURN,
-)  # fmt: skip
-from .arms import arm_of, moment
-from .joint import WORLD, Driven, Joint, Place, Row, whole_body
-from .kinds import KINDS, Ball, Cone, Distance, Hinge, Motor, MousePull, Slider, Weld, Wheel
+from ...systems.joints.records import CUSTOM, FREE, HOLD, JOINTS, POINT, TURN
+from ...systems.joints.records import DRIVE as DRIVE  # for those who write a joint
+from ...systems.joints.records import LIMIT as LIMIT
+from ...systems.joints.records import SERVO as SERVO
+from ...systems.joints.records import SPRING as SPRING
+from .arms import arm_of as arm_of
+from .arms import moment as moment
+from .joint import WORLD, Joint, Place, whole_body
+from .joint import Driven as Driven
+from .joint import Row as Row
+from .kinds import KINDS as KINDS
+from .kinds import Ball, Cone, Distance, Hinge, Motor, MousePull, Slider, Weld, Wheel
 from .measures import Holds, anchors, holds, measure, moving
 from .rows import KEPT, KEY, OF_PLUGINS, JointRows, by_row, put_kept
 
@@ -437,27 +434,5 @@ def _matrix(q: Any) -> np.ndarray:
 
 
 __all__ = [
-    "CUSTOM",
-    "DRIVE",
-    "HOLD",
-    "KINDS",
-    "LIMIT",
-    "SERVO",
-    "SPRING",
-    "Ball",
-    "Cone",
-    "Distance",
-    "Driven",
-    "Hinge",
-    "Joint",
-    "JointState",
-    "Joints",
-    "Motor",
-    "MousePull",
-    "Row",
-    "Slider",
-    "Weld",
-    "Wheel",
-    "arm_of",
-    "moment",
+    "Ball", "Cone", "Distance", "Hinge", "JointState", "Joints", "Motor", "MousePull", "Slider", "Weld", "Wheel",
 ]  # fmt: skip

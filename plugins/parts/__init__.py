@@ -12,7 +12,9 @@ from ...components.rigid_body import WEIGHTLESS
 from ...components.spin import Spin, mass_of_shape
 from ...framework import NoPhysicsError, Plugin, World
 from ...systems.parts.records import PARTS
-from .outline import Outline, Piece, parts_from_outline
+from .outline import Outline as Outline
+from .outline import Piece as Piece
+from .outline import parts_from_outline
 from .poses import Pose, turned_by
 
 FIELDS = ("body", "position", "rotation", "mass")
@@ -378,4 +380,4 @@ def _set(handle: Any, name: str, value: Any) -> None:
         setattr(handle, name, value)
 
 
-__all__ = ["Outline", "PartOf", "Parts", "Piece", "parts_from_outline"]
+__all__ = ["PartOf", "Parts", "parts_from_outline"]

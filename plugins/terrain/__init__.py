@@ -2,7 +2,8 @@
 
 from .chain import create_chain
 from .mesh import create_height_field, create_triangle_mesh
-from .segment import ChainSegmentCollider, plugin
+from .segment import ChainSegmentCollider
+from .segment import plugin as plugin
 from .triangle import TerrainTriangleCollider
 
 __all__ = [
@@ -11,5 +12,4 @@ __all__ = [
     "create_chain",
     "create_height_field",
     "create_triangle_mesh",
-    "plugin",
 ]

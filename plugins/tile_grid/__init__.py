@@ -6,11 +6,12 @@ exist. The rectangle with the deepest overlap gives the contact.
 
 from ...framework import Convex
 from .cells import cells_of_text
-from .collider import TileGridCollider, plugin
+from .collider import TileGridCollider
+from .collider import plugin as plugin
 from .contact import deepest_contact
 from .sweep import first_touch
 
-__all__ = ["TileGridCollider", "cells_of_text", "plugin"]
+__all__ = ["TileGridCollider", "cells_of_text"]
 
 
 @plugin.pair(TileGridCollider, Convex)

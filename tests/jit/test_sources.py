@@ -1,11 +1,16 @@
-"""Sources: no circle of imports, kernels take few arguments and are short."""
+"""Sources: no circle of imports, kernels take few arguments and are short, names have one meaning, columns a unit."""
 
 from __future__ import annotations
 
 import ast
+from collections import defaultdict
+from collections.abc import Iterator
 from pathlib import Path
 
 from helpers_folders import FLOORS, ROOT, imported, package_of
+
+from carom.framework.jit.records.schema import Schema
+from carom.systems.records import STATE
 
 
 def modules() -> dict[str, Path]:
@@ -73,3 +78,36 @@ def test_kernels_take_few_arguments_and_are_short():
         if arguments > ARGUMENTS or lines > LINES
     ]
     assert not offenders, "\n".join(offenders)
+
+
+def defined_in_systems() -> Iterator[tuple[str, str]]:
+    """(name, module) of all functions and constants of the modules of systems."""
+    for path in sorted((ROOT / "systems").rglob("*.py")):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef):
+                yield node.name, str(path)
+            elif isinstance(node, (ast.Assign, ast.AnnAssign)):
+                names = {name.id for name in ast.walk(node) if isinstance(name, ast.Name) and type(name.ctx) is ast.Store}
+                yield from ((name, str(path)) for name in names if name.isupper())
+
+
+def test_a_constant_or_function_of_systems_has_one_meaning():
+    places = defaultdict(list)
+    for name, path in defined_in_systems():
+        places[name].append(path)
+    assert len(places) > 1000
+    assert {name: found for name, found in places.items() if len(found) > 1} == {}
+
+
+SEVERAL_UNITS = {"Joints.numbers", "Direct.root", "Direct.diagonal", "Direct.solution", "Direct.values"}
+
+
+def test_columns_and_numbers_of_the_records_carry_their_unit():
+    schemas, bare = [STATE], set()
+    for schema in schemas:  # grows
+        for name, field in schema.fields.items():
+            if isinstance(field, Schema):
+                schemas.append(field)
+            elif field.dtype == "float64" and not field.unit:
+                bare.add(f"{schema.name}.{name}")
+    assert bare == SEVERAL_UNITS
