@@ -37,9 +37,11 @@ clean:
 	rm -rf .venv .kernels .coverage build dist out *.egg-info src/*.egg-info .pytest_cache .ruff_cache .hypothesis
 
 .venv/checks: pyproject.toml | .venv/bin/python
+	@echo "installing carom, and all that its checks need, into .venv"
 	$(PIP) install --quiet --no-compile -e ".[test,dev]"
 	touch .venv/test .venv/dev $@
 .venv/%: pyproject.toml | .venv/bin/python  # the extras of pyproject.toml
+	@echo "installing carom with its extra $* into .venv"
 	$(PIP) install --quiet --no-compile -e ".[$*]"
 	touch $@
 .venv/bin/python:

@@ -46,4 +46,6 @@ def pytest_sessionstart(session):
     is_worker, several = hasattr(config, "workerinput"), (getattr(config.option, "numprocesses", None) or 1) > 1
     if is_worker or not several or os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
         return
-    subprocess.run([sys.executable, "-m", "carom", "warm-up"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    with config.pluginmanager.getplugin("capturemanager").global_and_fixture_disabled():
+        print(f"kernels that most tests need: loading or compiling, kept in {CACHE.name}", file=sys.stderr, flush=True)
+        subprocess.run([sys.executable, "-m", "carom", "warm-up"], stdout=subprocess.DEVNULL)  # says how many are left
