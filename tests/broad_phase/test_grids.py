@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers_boxes import STATIC_GRID_ALONE, UNIFORM_GRID_ALONE, Boxes, overlapping, pair_set
+from broad_phase.helpers_boxes import STATIC_GRID_ALONE, UNIFORM_GRID_ALONE, Boxes, overlapping, pair_set
+from broad_phase.helpers_statics import level
 from helpers_pairwise import pairwise
-from helpers_statics import level
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import both_dimensions

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers_boxes import overlapping
+from broad_phase.helpers_boxes import overlapping
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import both_dimensions

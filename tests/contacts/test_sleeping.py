@@ -6,8 +6,8 @@ import itertools
 
 import numpy as np
 import pytest
+from contacts.helpers_sleeping import MODES, is_asleep, sleep, sleepy_world, tower
 from helpers_pairwise import pairwise
-from helpers_sleeping import MODES, is_asleep, sleep, sleepy_world, tower
 from worlds import ball, box, make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pickle
 
 import pytest
-from helpers_sleeping import CAUSES, GRAVITY, is_asleep, sleep, sleepy_world, tower, two_towers
+from contacts.helpers_sleeping import CAUSES, GRAVITY, is_asleep, sleep, sleepy_world, tower, two_towers
 from worlds import ball, floor
 
 from carom.components import RigidBody, Transform

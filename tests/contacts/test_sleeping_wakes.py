@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers_sleeping import (
+from contacts.helpers_sleeping import (
     CAUSES,
     EVERYWHERE,
     GRAVITY,

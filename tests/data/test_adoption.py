@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import esper
-import helpers_adoption
 import numpy as np
 import pytest
-from helpers_adoption import Charge, matches_esper
+from data import helpers_adoption
+from data.helpers_adoption import Charge, matches_esper
 from worlds import ball, make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import esper
-import helpers_adoption
 import numpy as np
 import pytest
-from helpers_adoption import Charge, matches_esper
-from helpers_calls import calls_of
+from data import helpers_adoption
+from data.helpers_adoption import Charge, matches_esper
+from data.helpers_calls import calls_of
 from worlds import ball, make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform

@@ -5,8 +5,8 @@ from __future__ import annotations
 import esper
 import numpy as np
 import pytest
-from helpers_adoption import Charge, matches_esper
-from helpers_calls import calls_of
+from data.helpers_adoption import Charge, matches_esper
+from data.helpers_calls import calls_of
 from worlds import make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform

@@ -7,7 +7,7 @@ import copy
 import esper
 import numpy as np
 import pytest
-from helpers_components import Charge, Everything, full
+from data.helpers_components import Charge, Everything, full
 from worlds import ball, make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform

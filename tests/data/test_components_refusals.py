@@ -7,8 +7,8 @@ import re
 import esper
 import numpy as np
 import pytest
-from helpers_calls import calls_of
-from helpers_components import INF, NAN, Charge, Everything
+from data.helpers_calls import calls_of
+from data.helpers_components import INF, NAN, Charge, Everything
 from worlds import ball, make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform

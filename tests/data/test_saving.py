@@ -15,7 +15,7 @@ from pathlib import Path
 import esper
 import numpy as np
 import pytest
-from helpers_snapshots import Bullet, Tag, fill, log_events, make, plugins, springs_of
+from data.helpers_snapshots import Bullet, Tag, fill, log_events, make, plugins, springs_of
 from worlds import MODES, ball, make_world
 
 from carom.components import RigidBody, SphereCollider, Transform
@@ -30,7 +30,7 @@ STEPS = 45
 ELSEWHERE = """
 import sys
 sys.path[:0] = {here!r}, {here!r} + "/data"
-from helpers_snapshots import *
+from data.helpers_snapshots import *
 from test_saving import MODES, go_on
 for mode in MODES:
     world = World.load({folder!r} + "/" + mode, *plugins({d}), components=[Bullet])

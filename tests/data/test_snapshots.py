@@ -10,8 +10,8 @@ from pathlib import Path
 import esper
 import numpy as np
 import pytest
+from data.helpers_snapshots import Bullet, Tag, fill, log_events, make, springs_of
 from helpers_determinism import Charge, settled
-from helpers_snapshots import Bullet, Tag, fill, log_events, make, springs_of
 from worlds import MODES, ball, make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform

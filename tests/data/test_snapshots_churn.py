@@ -8,8 +8,8 @@ import random
 import esper
 import numpy as np
 import pytest
+from data.helpers_snapshots import Bullet, Tag, springs_of
 from helpers_determinism import Charge, state
-from helpers_snapshots import Bullet, Tag, springs_of
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Component, Settings, World

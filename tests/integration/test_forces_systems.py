@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers_forces import DT, Calls, body
 from helpers_motion import STAGES, Oscillator, SpringAndDrag, all_methods, oscillators, record
+from integration.helpers_forces import DT, Calls, body
 from oracles import integrators_naive as naive
 from worlds import EPS, make_world, position, run, velocity
 

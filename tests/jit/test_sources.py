@@ -87,8 +87,8 @@ def defined_in_systems() -> Iterator[tuple[str, str]]:
             if isinstance(node, ast.FunctionDef):
                 yield node.name, str(path)
             elif isinstance(node, (ast.Assign, ast.AnnAssign)):
-                names = {name.id for name in ast.walk(node) if isinstance(name, ast.Name) and type(name.ctx) is ast.Store}
-                yield from ((name, str(path)) for name in names if name.isupper())
+                names = [name for name in ast.walk(node) if isinstance(name, ast.Name) and name.id.isupper()]
+                yield from ((name.id, str(path)) for name in names if isinstance(name.ctx, ast.Store))
 
 
 def test_a_constant_or_function_of_systems_has_one_meaning():

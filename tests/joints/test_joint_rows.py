@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers_joints import G, at, chain, disc, joint_world, plank, run
+from joints.helpers_joints import G, at, chain, disc, joint_world, plank, run
 
 from carom import Physics, RigidBody, SphereCollider, Transform, World
 from carom.plugins.joints import Ball, Distance, Hinge, Joints, MousePull, Weld

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 
 import pytest
-from helpers_joints import at, disc, joint_world, run
+from joints.helpers_joints import at, disc, joint_world, run
 
 from carom import Physics, RigidBody, SphereCollider, Transform, World
 from carom.plugins.joints import Distance, Joints, MousePull

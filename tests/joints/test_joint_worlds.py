@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers_joints import G, at, chain, disc, gaps, joint_world, plank, run, run_failing
+from joints.helpers_joints import G, at, chain, disc, gaps, joint_world, plank, run, run_failing
 
 from carom import Physics, RigidBody, Settings, SphereCollider, StepError, Transform, World
 from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Motor, Slider, Weld, Wheel

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers_joints import G, at, run
+from joints.helpers_joints import G, at, run
 
 from carom import Physics, RigidBody, Settings, Transform, World
 from carom.plugins.joints import Ball, Cone, Hinge, Joints, Motor, Slider, Weld, Wheel

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers_joints import G, at, chain, disc, energy, gaps, joint_world, plank, run, spin_of
+from joints.helpers_joints import G, at, chain, disc, energy, gaps, joint_world, plank, run, spin_of
 from worlds import MODES
 
 from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import pytest
-from helpers_joints import at
-from helpers_machines import Gear, Pulley, body, machine_world, machines
+from joints.helpers_joints import at
+from joints.helpers_machines import Gear, Pulley, body, machine_world, machines
 
 from carom import Physics, Plugin, PluginError, StepError, Transform, World, column
 from carom.framework.vectors import scale

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers_joints import G, at, chain, disc, plank, run, run_failing
-from helpers_machines import Gear, Pulley, Rail, Rod, Stop, body, machine_world, machines
+from joints.helpers_joints import G, at, chain, disc, plank, run, run_failing
+from joints.helpers_machines import Gear, Pulley, Rail, Rod, Stop, body, machine_world, machines
 
 from carom import Physics, RigidBody, SphereCollider, Transform, World
 from carom.plugins.joints import DRIVE, HOLD, LIMIT, SERVO, SPRING, Distance, Joints, Motor

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers_joints import energy, joint_world
+from joints.helpers_joints import energy, joint_world
 
 from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World
 from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Slider, Weld

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers_joints import G, at, run
+from joints.helpers_joints import G, at, run
 
 from carom import Physics, RigidBody, Transform, World
 from carom.plugins.joints import Joints, Wheel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers_walks import FLOORS, MODES, WALKERS, polygon, random_walk
+from laws.helpers_walks import FLOORS, MODES, WALKERS, polygon, random_walk
 
 from carom.components import AABBCollider, RigidBody, Transform
 from carom.framework import Settings, World

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers_parts import CORNER, G, L, U, angular_momentum, at, body_of, floor, parts_world, piece, run
+from parts.helpers_parts import CORNER, G, L, U, angular_momentum, at, body_of, floor, parts_world, piece, run
 from worlds import MODES
 
 from carom import Parts, Physics, RigidBody, Rotation, SphereCollider, Transform, World, scenes

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers_parts import body_of, parts_world, run
+from parts.helpers_parts import body_of, parts_world, run
 
 from carom import ConvexPolygonCollider, RigidBody, Transform
 from carom.plugins import convex_polygon

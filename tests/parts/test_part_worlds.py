@@ -7,7 +7,7 @@ import math
 import esper
 import numpy as np
 import pytest
-from helpers_parts import G, U, at, body_of, floor, parts_world, piece, run
+from parts.helpers_parts import G, U, at, body_of, floor, parts_world, piece, run
 from worlds import MODES
 
 from carom import (

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 from helpers_pairwise import pairwise
-from helpers_queries import GRAZE, Bodies, directions, scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from queries.helpers_queries import GRAZE, Bodies, directions, scene
 from worlds import ball, both_dimensions, box, make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform

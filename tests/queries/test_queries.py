@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from helpers_pairwise import pairwise
-from helpers_queries import directions, scene
+from queries.helpers_queries import directions, scene
 from worlds import ball, both_dimensions, make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers_queries import GRAZE, Bodies, directions, scene
+from queries.helpers_queries import GRAZE, Bodies, directions, scene
 from worlds import both_dimensions
 
 ASKED = 10  # places, each time

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers_pair import Pair, rotation
+from rotation.helpers_pair import Pair, rotation
 
 from carom.components import AABBCollider, SphereCollider
 from carom.plugins.capsule import CapsuleCollider

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers_pair import MARGIN, TILT, Pair, matrix, rotation
+from rotation.helpers_pair import MARGIN, TILT, Pair, matrix, rotation
 
 from carom.components import AABBCollider, SphereCollider
 from carom.plugins.capsule import CapsuleCollider

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers_joints import gaps
+from joints.helpers_joints import gaps
 from worlds import MODES
 
 from carom import Settings, Transform

@@ -7,7 +7,7 @@ import itertools
 import esper
 import numpy as np
 import pytest
-from helpers_systems import PlainNote, in_phase
+from schedule.helpers_systems import PlainNote, in_phase
 from worlds import ball, make_world
 
 from carom.components import RigidBody, Transform

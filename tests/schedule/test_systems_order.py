@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import esper
 import pytest
-from helpers_systems import A, B, C, Note, PlainNote, in_phase
+from schedule.helpers_systems import A, B, C, Note, PlainNote, in_phase
 from worlds import ball, make_world
 
 from carom.components import Transform

@@ -8,7 +8,7 @@ import pickle
 import esper
 import numpy as np
 import pytest
-from helpers_poison import column_of, complaints, rest_of, scenes, told
+from world.helpers_poison import column_of, complaints, rest_of, scenes, told
 from worlds import MODES, ball, both_dimensions, box, make_world, mostly_2d, position, run, velocity
 
 from carom.components import RigidBody, SphereCollider, Transform

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import esper
-import helpers_world
 import numpy as np
 import pytest
-from helpers_world import Counter, Name
+from world import helpers_world
+from world.helpers_world import Counter, Name
 from worlds import ball, make_world
 
 from carom.components import RigidBody, Transform

@@ -6,9 +6,9 @@ import gc
 import itertools
 
 import esper
-import helpers_world
 import pytest
-from helpers_world import Counter, Name
+from world import helpers_world
+from world.helpers_world import Counter, Name
 from worlds import ball, make_world
 
 from carom.components import RigidBody, SphereCollider, Transform

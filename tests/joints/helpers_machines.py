@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from helpers_joints import G, joint_world
+from joints.helpers_joints import G, joint_world
 
 from carom import Physics, Plugin, RigidBody, Transform, World, column
 from carom.framework.typing import Vector
