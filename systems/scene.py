@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,8 @@ from ..components.spin import Spin
 from ..framework.data.row_moves import MovedColumns, RowPlan
 from ..framework.data.table import FEW, Table
 from ..framework.jit.records.record import Record
-from ..framework.plugins.registry import Registry
-from ..framework.settings import Settings
+from ..framework.plugins.registry import Shape
+from ..framework.world.world import World
 from .records import (
     BODY_COLUMNS,
     COLLIDERS,
@@ -47,9 +47,8 @@ class Scene:
         grows whenever anything was made again
     """
 
-    def __init__(self, state: Record, table: Table, registry: Registry, settings: Callable[[], Settings]) -> None:
-        self.state, self.table, self.registry = state, table, registry
-        self._settings = settings
+    def __init__(self, state: Record, table: Table, world: World) -> None:
+        self.state, self.table, self.registry, self._world = state, table, world.registry, world
         self.prepared: set[type[Any]] = set()  # colliders whose functions are kept ready
         self.read_by_plugins: set[str] = set()  # columns that stages of plugins read
         self.moments_asked = False  # whether one of them reads the shapes: second moments, supports
@@ -83,6 +82,10 @@ class Scene:
         return self.version, self.table.static_version, self.state.motion_version
 
     # -- structure --------------------------------------------------------------------------------
+
+    def shapes(self) -> Sequence[Shape]:
+        """The shapes that are present, by number."""
+        return self.linked.shapes if self.linked is not None else ()
 
     def refresh(self) -> bool:
         """Follow which bodies and colliders there are; True if that has changed."""
@@ -256,7 +259,7 @@ class Scene:
         slots = np.array([table.slot_of(component) for component in present], np.int64)
         if present:
             state.bodies.collider_slot[:count] = slots[levels[-1]]
-        if self._settings().geometry == "bounds" and len(levels) > 1:  # shapes that are never tested cost nothing
+        if self._world.settings.geometry == "bounds" and len(levels) > 1:  # shapes that are never tested cost nothing
             levels = levels[:1]
             used = [index for index, c in enumerate(present) if c in self.prepared or (levels == index).any()]
             levels = np.where(levels < 0, -1, np.searchsorted(used, levels)).astype(np.int8)

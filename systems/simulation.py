@@ -24,7 +24,7 @@ from ..framework.world.contacts import Contacts
 from ..framework.world.world import World
 from .broad_phase.search import CandidateSearch
 from .broad_phase.system import BroadPhase
-from .codes import AFTERWARDS, CHECK_COLUMNS, CHECK_FLIGHT, LOOK, WAKE, WAKE_TOUCHED
+from .codes import AFTERWARDS
 from .contacts.events import ContactEvents, RecordedContacts
 from .contacts.response import Response
 from .contacts.solving.records import WARM_START_ROWS
@@ -42,7 +42,7 @@ from .narrow_phase.system import NarrowPhase
 from .plugin_stages.plugin_stages import PluginStages
 from .quarantine.quarantine import Quarantine
 from .queries.system import Queries
-from .record_buffers import RecordBuffers
+from .record_buffers import reserve_fixed
 from .records import CONTACT_ROWS, STATE
 from .scene import Scene, make_table
 from .settings import check_settings, gravity_vector, write_settings
@@ -51,6 +51,7 @@ from .shapes.geometry_levels import LevelCheck, check_sensors
 from .shapes.pair_coverage import check_pairs
 from .sleeping.sleepers import Sleepers
 from .stage_list import CLOSING, KEPT, OPENING, STAGES, SYSTEM_OF_STAGE
+from .stage_requests import handlers
 from .step_stages import KEEPS_WRITTEN
 
 
@@ -65,74 +66,72 @@ class Simulation:
 
     def __init__(self, world: World, dimensions: int, gravity: Any) -> None:
         self._world, self.dimensions = world, dimensions
-        self.state = make_record(STATE, dimensions)
-        self.table = make_table(dimensions)
-        self.table.clock = world.clock
-        self.table.forces_are_summed = lambda: self.state.forces_summed
+        self.state = state = make_record(STATE, dimensions)
+        reserve_fixed(state)
+        self.table = table = make_table(dimensions)
         self.set_gravity(gravity)
-        self.scene = Scene(self.state, self.table, world.registry, lambda: world.settings)
-        self.adoption = Adoption(self.table, Transform, world._contents(), LevelCheck(self.table, world.registry))
-        self.adoption.on_losing = partial(keep_gyration, self.table)
-        self.bodies = Bodies(self.table)
-        source = RecordedContacts(self.state)
+        self.scene = Scene(state, table, world)
+        self.program = Program(state, STAGES, {}, AFTERWARDS)
+        self.sleepers = Sleepers(state, table, self.scene, self.program, self._box_now)
+        self.quarantine = Quarantine(state, table, self.scene, world.report_fault)
+        self.adoption = Adoption(table, Transform, world._contents(), LevelCheck(table, world.registry))
+        self.adoption.on_losing = partial(keep_gyration, table)
+        self.bodies = Bodies(table)
+        source = RecordedContacts(self.program, self.sleepers, world.clock)
         self.contacts = Contacts(dimensions, self._membership, self._running_step, source)
-        self.search = CandidateSearch(
-            self.state, world.registry, lambda: world.settings, self._box_now,
-            lambda name: self.program.run_one(name, 0.0),
-        )  # fmt: skip
-        room = RecordBuffers(self.state, self.scene, self.search)
-        self.quarantine = Quarantine(self.state, self.table, self.scene, world.report_fault)
-        self.table.on_make, self.table.on_expose = self._follow_columns, self._follow_exposed
-        self.table.on_arrays_changed = self._follow_arrays
-        handlers = {
-            **room.handlers(self),
-            CHECK_COLUMNS: self.quarantine.check_columns, CHECK_FLIGHT: self.quarantine.check_flight,
-            LOOK: lambda dt: self.sleepers.look(),
-            WAKE: lambda dt: self.sleepers.wake_disturbed(),
-            WAKE_TOUCHED: lambda dt: self.sleepers.wake_touched(self, dt),
-        }  # fmt: skip
-        self.program = Program(self.state, STAGES, handlers, AFTERWARDS)
-        self.sleepers = Sleepers(self.state, self.table, self.scene, self.program)
-        self.sleepers.box_now, self.table.on_changed_inside = self._box_now, self.sleepers.follow_change
-        source.finish_found = lambda: self.program.run_one("finish_found", world.clock.dt)
-        source.stored, source.disturb = self.sleepers.contacts, self.sleepers.disturb
-        self.wake, self.notice_written = self.sleepers.wake, self.sleepers.notice_written
-        self.excluded = self.quarantine.excluded_now
-        self.attribute_errors = ErrorAttribution(
-            world.registry, self.state, lambda: self.scene.linked.shapes if self.scene.linked else ()
-        )
-        self.program.describe_error, self.program.on_alarm = self.attribute_errors.describe, self.attribute_errors.check
-        self.program.alarm = self.state.word_of("unsound")
-        self.queries = Queries(
-            self.state, self.table, world.registry, self.scene, self.search, self.refresh_for_queries
-        )
-        self.forces = ForceAccumulation(self.program, self.state, self.table, self.bodies, self.quarantine.report)
-        self.table.writable_while = {
-            "force": lambda: (
-                self.table.adding_forces or self.state.forces_summed or not world.has_system(self.forces)
-            ),
-            "torque": lambda: self.table.adding_forces,
-        }
-        self.integration = Integration(self.program, self.scene, self.forces, world.registry, lambda: world.settings)
+        self.search = CandidateSearch(state, world, self._box_now, self.program.run_one)
+        self.attribute_errors = ErrorAttribution(world.registry, state, self.scene.shapes)
+        self.queries = Queries(state, table, world.registry, self.scene, self.search, self.refresh_for_queries)
+        self.forces = ForceAccumulation(self.program, state, table, self.bodies, self.quarantine.report)
+        self.integration = Integration(self.program, self.scene, self.forces, world)
         self.broad_phase = BroadPhase(self.program, self.search)
         self.narrow_phase = NarrowPhase(self.program, self.scene, world.registry, self.bodies)
-        self.response = Response(self.program, self.contacts, lambda: world.settings)
-        self.contact_events = ContactEvents(
-            self.program, source, self.contacts, self._membership, lambda: world.settings
-        )
-        self.parts_version = 0
-        self.plugin_stages = PluginStages(self.state, self.scene, self.adoption, world.registry)
+        self.response = Response(self.program, self.contacts, world)
+        self.contact_events = ContactEvents(self.program, source, self.contacts, self._membership, world)
+        self.plugin_stages = PluginStages(state, self.scene, self.adoption, world.registry)
         self.integration.turns = self.plugin_stages.record(TURNS)
         self.links = StepLinks(self.scene, self.program, self.integration, self.search, self.plugin_stages)
+        self.copies = ColumnCopies(table)
+        self._wire_table()
+        self._wire_program()
+        self.wake, self.notice_written = self.sleepers.wake, self.sleepers.notice_written
+        self.excluded, self.take_deferred = self.quarantine.excluded_now, self.contacts.take_deferred
+        self.parts_version = 0
         self.must_check = False  # in every step: sensors among levels, pairs that no plugin has
-        self.copies = ColumnCopies(self.table)
-        self._words = self.state.words
-        self._step_number, self._others_write = (self.state.word_of(name) for name in ("step_number", "others_write"))
-        self._pushed, self._found_current = (self.state.word_of(name) for name in ("pushed", "found_current"))
         self.contacts_before: Any = None  # contacts that no RESPONSE has replaced, at the start of the step
-        self._generation = self.table.generation
-        self.take_deferred = self.contacts.take_deferred
-        self.settled = lambda: self.adoption.settled() and not self.plugin_stages.adopters  # no plugin moves bodies
+        self._generation = table.generation
+        self._words = state.words
+        self._step_number, self._others_write = (state.word_of(name) for name in ("step_number", "others_write"))
+        self._pushed, self._found_current = (state.word_of(name) for name in ("pushed", "found_current"))
+
+    def _wire_table(self) -> None:
+        """What the table calls when its columns change, and asks of the step."""
+        table = self.table
+        table.clock = self._world.clock
+        table.on_make, table.on_expose = self._follow_columns, self._follow_exposed
+        table.on_arrays_changed, table.on_changed_inside = self.scene.follow_arrays, self.sleepers.follow_change
+        table.forces_are_summed = self._forces_are_summed
+        table.writable_while = {"force": self._force_is_writable, "torque": self._torque_is_writable}
+
+    def _wire_program(self) -> None:
+        """What Python does for each code that a stage returns; what errors of stages are said to be."""
+        program = self.program
+        program.handlers = handlers(self)
+        program.describe_error, program.on_alarm = self.attribute_errors.describe, self.attribute_errors.check
+        program.alarm = self.state.word_of("unsound")
+
+    def settled(self) -> bool:
+        """Whether the table has all bodies as esper has them, and no plugin moves any."""
+        return self.adoption.settled() and not self.plugin_stages.adopters
+
+    def _forces_are_summed(self) -> bool:
+        return self.state.forces_summed
+
+    def _force_is_writable(self) -> bool:
+        return self.table.adding_forces or self.state.forces_summed or not self._world.has_system(self.forces)
+
+    def _torque_is_writable(self) -> bool:
+        return self.table.adding_forces
 
     @property
     def systems(self) -> tuple[System, ...]:
@@ -236,16 +235,12 @@ class Simulation:
         if self.state.version == self.table.version:  # else the next refresh does it, when rows are known
             self.quarantine.bind()
 
-    def _follow_arrays(self) -> None:
-        """Rows have other arrays."""
-        self.scene.follow_arrays()
-
     def _follow_exposed(self, key: str) -> None:
         """Code of the game may write one more column in place."""
         self.sleepers.watch(key)
-        lent = self.table.exposed
-        self.state.positions_exposed = lent.get("position", False)
-        self.state.inverse_masses_exposed = lent.get("inverse_mass", False)
+        exposed = self.table.exposed
+        self.state.positions_exposed = exposed.get("position", False)
+        self.state.inverse_masses_exposed = exposed.get("inverse_mass", False)
         self.quarantine.follow_exposed()
 
     def _check(self) -> None:

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ...framework.jit.records.record import Record
-from ...framework.plugins.registry import Registry
-from ...framework.settings import AUTOMATIC, Settings
+from ...framework.settings import AUTOMATIC
+from ...framework.world.world import World
 from ..records import FOUND
 from .boxes import fixed_count
 from .plan import reason_of
@@ -30,11 +30,11 @@ class CandidateSearch:
     """
 
     def __init__(
-        self, state: Record, registry: Registry, settings: Callable[[], Settings], box_now: Callable[[], None],
-        run_stage: Callable[[str], None],
+        self, state: Record, world: World, box_now: Callable[[], None],
+        run_stage: Callable[[str, float], None],
     ) -> None:  # fmt: skip
-        self._state, self._settings, self._box_now, self._run_stage = state, settings, box_now, run_stage
-        self._plugin = PluginBroadPhase(registry)
+        self._state, self._world, self._box_now, self._run_stage = state, world, box_now, run_stage
+        self._plugin = PluginBroadPhase(world.registry)
         self._moving, self._asleep, self._static, self._empty = (SpatialTree(state.dimensions) for _ in range(4))
         self._static_version, self._static_first = NEVER_BUILT, 0
         for grid in (state.grid, state.static_grid):
@@ -48,7 +48,7 @@ class CandidateSearch:
 
     def read_settings(self) -> None:
         """Call it when settings have changed."""
-        self._state.uses_plugin_broad_phase = self._settings().broad_phase != AUTOMATIC
+        self._state.uses_plugin_broad_phase = self._world.settings.broad_phase != AUTOMATIC
 
     def needs_grids(self) -> bool:
         """Whether the stages of grids may have to do anything with so many bodies as there are."""
@@ -61,7 +61,7 @@ class CandidateSearch:
         state = self._state
         if state.pair_search == PLUGIN:
             lower, upper = state.bodies.lower[: state.count], state.bodies.upper[: state.count]
-            self._store(*self._plugin.pairs(self._settings().broad_phase, lower, upper, state.moving))
+            self._store(*self._plugin.pairs(self._world.settings.broad_phase, lower, upper, state.moving))
             return
         self._build(self._moving, state.first, state.moving)
         self._build_static()
@@ -89,12 +89,12 @@ class CandidateSearch:
         known_until, state.all_still = state.neighbours_known_until, False
         grid.suits &= (grid.version, grid.first) == (state.version, state.first) and not state.several_levels
         if grid.suits:
-            self._run_stage("box_statics")
-            self._run_stage("box_standing")
+            self._run_stage("box_statics", 0.0)
+            self._run_stage("box_standing", 0.0)
         if not grid.suits:
             self._box_now()
-            self._run_stage("place_moving")
-        self._run_stage("place_statics")
+            self._run_stage("place_moving", 0.0)
+        self._run_stage("place_statics", 0.0)
         state.neighbours_known_until = known_until  # a system within the step may query
         grid.serves = grid.suits
         made_for = static_grid.version, static_grid.first
@@ -132,7 +132,7 @@ class CandidateSearch:
 
     def describe(self) -> str:
         """How candidates are found, for ``world.plan()``."""
-        state, name = self._state, self._settings().broad_phase
+        state, name = self._state, self._world.settings.broad_phase
         if not state.collides:
             return "no colliders: nothing to do"
         if name != AUTOMATIC:

@@ -9,11 +9,13 @@ import numpy as np
 
 from ...framework.data.esper_bridge import Membership
 from ...framework.jit.records.record import Record
+from ...framework.schedule.clock import Clock
 from ...framework.schedule.phases import Phase
 from ...framework.schedule.stages import Check, Program, PythonPart, Stage
-from ...framework.settings import Settings
 from ...framework.world.contacts import ContactRows, Contacts
 from ...framework.world.events import CONTACT_EVENTS
+from ...framework.world.world import World
+from ..sleeping.sleepers import Sleepers
 from ..sleeping.stored import merged
 from ..stage_system import StagedSystem
 from .event_stages import ROOM_FOR_FOUND, compare_contacts
@@ -24,12 +26,12 @@ Columns = dict[str, np.ndarray]
 class RecordedContacts:
     """The contacts in a world's records, as columns."""
 
-    def __init__(self, state: Record) -> None:
-        self._state, self._touching, self._impacts = state, state.contacts, state.impacts
+    def __init__(self, program: Program, sleepers: Sleepers, clock: Clock) -> None:
+        self._state = state = program.state
+        self._program, self._sleepers, self._clock = program, sleepers, clock
+        self._touching, self._impacts = state.contacts, state.impacts
         self.record: Callable[[str, Columns], None] = lambda history, columns: None
-        self.stored: Any = ()  # those of what sleeps, which the records do not hold
-        self.finish_found: Callable[[], None] = lambda: None  # looks where free flight leads
-        self.disturb: Callable[[np.ndarray], None] = lambda entities: None  # wakes these
+        self.stored = sleepers.contacts  # those of what sleeps, which the records do not hold
         self._asleep: Any = None, None, None, None  # (columns, those of what sleeps, mask of these in them, enabled)
 
     @property
@@ -73,7 +75,7 @@ class RecordedContacts:
         _, _, asleep, before = self._asleep
         changed = np.flatnonzero(asleep)[enabled[asleep] != before]
         if len(changed):
-            self.disturb(np.concatenate((columns["entity_a"][changed], columns["entity_b"][changed])))
+            self._sleepers.disturb(np.concatenate((columns["entity_a"][changed], columns["entity_b"][changed])))
         return enabled[~asleep]
 
     def stay_columns(self) -> Columns:
@@ -165,7 +167,7 @@ class RecordedContacts:
         }
 
     def _found(self) -> Columns:
-        self.finish_found()
+        self._program.run_one("finish_found", self._clock.dt)
         state, pairs, bodies = self._state, self._state.pairs, self._state.bodies
         hits, entity = pairs.hits[: pairs.found], bodies.entity
         a = pairs.a[hits]
@@ -221,12 +223,12 @@ class ContactEvents(StagedSystem):
 
     def __init__(
         self, program: Program, source: RecordedContacts, contacts: Contacts,
-        membership: Callable[[], Membership], settings: Callable[[], Settings],
+        membership: Callable[[], Membership], world: World,
     ) -> None:  # fmt: skip
         super().__init__(program)
         self._state, self._source, self._contacts = program.state, source, contacts
         self._touching, self._impacts = program.state.contacts, program.state.impacts
-        self._membership, self._settings = membership, settings
+        self._membership, self._world = membership, world
         source.record = contacts.record
 
     def _parts(self) -> list[Any]:
@@ -308,7 +310,7 @@ class ContactEvents(StagedSystem):
             )
         if impacts.capped:
             self.world.report_fault(
-                f"{impacts.capped} impacts beyond {self._settings().max_impacts_per_step} "
+                f"{impacts.capped} impacts beyond {self._world.settings.max_impacts_per_step} "
                 f"of a body in one step, the first of entity {entity[impacts.capped_row]}: raise "
                 f"Settings.max_impacts_per_step or use smaller steps; the rest was solved as contact at rest",
                 kind="impacts",

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ...framework.schedule.phases import Phase
 from ...framework.schedule.stages import Program, PythonPart, Rows, Stage
-from ...framework.settings import Settings
 from ...framework.world.contacts import Contacts
+from ...framework.world.world import World
 from ..impacts.stages import ROOM_FOR_IMPACTS, begin_impacts, resolve_impacts
 from ..joints.bodies import count_turns
 from ..parts.stages import place_parts
@@ -99,9 +98,9 @@ class Response(StagedSystem):
         ),
     )  # fmt: skip
 
-    def __init__(self, program: Program, contacts: Contacts, settings: Callable[[], Settings]) -> None:
+    def __init__(self, program: Program, contacts: Contacts, world: World) -> None:
         super().__init__(program)
-        self._state, self._contacts, self._settings = program.state, contacts, settings
+        self._state, self._contacts, self._world = program.state, contacts, world
 
     def _parts(self) -> list[Any]:
         if not self._state.others_write:
@@ -116,7 +115,7 @@ class Response(StagedSystem):
     def reason(self) -> str:
         if not self._state.collides:
             return "no colliders: nothing to do"
-        mode = self._settings().collision
+        mode = self._world.settings.collision
         if mode == "event_driven":
             what = "all impacts at their true time, in order, then contacts at rest"
         elif mode == "continuous":

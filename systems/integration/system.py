@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 
 from ...framework.jit.records.record import Record
-from ...framework.plugins.registry import Registry
 from ...framework.schedule.phases import Phase
 from ...framework.schedule.plan import PlannedKernel, kernels_of
 from ...framework.schedule.stages import Program, PythonPart, Rows, Stage
-from ...framework.settings import Settings
+from ...framework.world.world import World
 from ..forces.accumulation import ForceAccumulation
 from ..joints.bodies import begin_joints
 from ..parts.stages import carry_forces, move_parts
@@ -112,12 +111,11 @@ class Integration(StagedSystem):
     )
 
     def __init__(
-        self, program: Program, scene: Scene, forces: ForceAccumulation, registry: Registry,
-        settings: Callable[[], Settings],
-    ) -> None:  # fmt: skip
+        self, program: Program, scene: Scene, forces: ForceAccumulation, world: World
+    ) -> None:
         super().__init__(program)
         self._state: Record = program.state
-        self._scene, self._forces, self._registry, self._settings = scene, forces, registry, settings
+        self._scene, self._forces, self._world, self._registry = scene, forces, world, world.registry
         self._made: dict[Any, Integrator] = {}
         self._motion: Motion
         self.turns: Record  # what turns bodies beside stages of the integrator
@@ -128,14 +126,14 @@ class Integration(StagedSystem):
     @property
     def integrator_name(self) -> str:
         """As the settings say, unless another one goes with the kind of collision."""
-        settings = self._settings()
+        settings = self._world.settings
         return "flight" if settings.collision == "event_driven" else settings.integrator
 
     @property
     def integrator(self) -> Integrator:
         make: Any = Flight
-        if self._settings().collision != "event_driven":  # another one may be registered under the name at any time
-            make = self._registry.integrators[self._settings().integrator]
+        if self._world.settings.collision != "event_driven":  # another one may be registered under the name at any time
+            make = self._registry.integrators[self._world.settings.integrator]
         if make not in self._made:
             self._made[make] = make()
         return self._made[make]

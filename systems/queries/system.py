@@ -51,7 +51,7 @@ class Queries:
         self._state, self._table, self._registry, self._scene = state, table, registry, scene
         self._search, self._refresh, self._dimensions = candidate_search, refresh, state.dimensions
         self._kernels = query_kernels(state.dimensions)
-        self._attribute_errors = ErrorAttribution(registry, state, lambda: scene.linked.shapes if scene.linked else ())
+        self._attribute_errors = ErrorAttribution(registry, state, scene.shapes)
         self._shapes: dict[tuple[type[Any], bool], QueryShape] = {}  # and whether its parameters are the batch's own
         self._linked_version: Any = NEVER
         self._version: Any = NEVER

@@ -36,7 +36,9 @@ class Sleepers:
         (k, 2) islands and how many bodies they have
     """
 
-    def __init__(self, state: Record, table: Table, scene: Scene, program: Program) -> None:
+    def __init__(
+        self, state: Record, table: Table, scene: Scene, program: Program, box_now: Callable[[], None]
+    ) -> None:
         self._state, self._table, self._scene, self._program = state, table, scene, program
         self._exposed = ExposedColumns(table, scene)
         self._disturbed = False  # some are marked, or may be
@@ -49,7 +51,7 @@ class Sleepers:
         self.links = self.sizes = np.empty((0, 2), np.int64)
         self._followed: Any = None  # the structure that all this is of
         self._seen = -1
-        self.box_now: Callable[[], None] = lambda: None  # makes the boxes of all bodies where they are at this moment
+        self._box_now = box_now  # makes the boxes of all bodies where they are at this moment
         self._changes: list[list[float]] = []  # boxes in which shapes have changed: what sleeps near them wakes
         self._changes_taken: list[list[float]] = []  # those that this step has begun with
         self.on = False  # the settings say so, or those that sleep have to wake because they do not any more
@@ -238,7 +240,7 @@ class Sleepers:
         """Wake what sleeps in these boxes or touches them."""
         state, bodies = self._state, self._state.bodies
         known_until = state.neighbours_known_until
-        self.box_now()
+        self._box_now()
         state.neighbours_known_until = known_until
         d, rows = state.dimensions, np.flatnonzero(bodies.sleep_state[: self._table.stops[0]] > AWAKE)
         lower, upper = bodies.lower[rows, None], bodies.upper[rows, None]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -65,7 +66,9 @@ class Boxes:
         self.state = make_record(STATE, dimensions)
         self.state.collides = True
         self.state.frame = np.zeros(FRAME_SIZE)
-        self.search = CandidateSearch(self.state, registry, lambda: settings or Settings(), lambda: None, None)
+        self.search = CandidateSearch(
+            self.state, SimpleNamespace(registry=registry, settings=settings or Settings()), lambda: None, None
+        )
         self.asked = []
         work = {
             codes.NEED_ROOM: lambda: make_room(self._program.stages[self.state.stage], self.state, None, None),
