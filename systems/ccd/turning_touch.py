@@ -73,10 +73,14 @@ def clear_along(state, a, b, d, normal):
 @part
 def touch_of_turning(state, a, b, path, spins, times, limits):
     """(whether they touch; (time, normal, point, from a's centre to b's); gap then) between two times, while they turn
-    with those spins; shapes stand as at the second of these. limits: (slop; gap of a touch; speed of approach of the
-    point below which a touch is one only if no faster one follows; -inf: any is one, at corners too; by how many grazes
-    they have to be deeper than at the first time; -inf: by none; time between looks at a pair with a rule for corners,
-    whose gap holds only as they are turned now: there the touch is bisected)."""
+    with those spins; shapes stand as at the second of these. limits:
+
+    - slop, m
+    - gap of a touch, m
+    - approach of the point, m/s: a slower touch counts only if no faster one follows; -inf: any, at corners too
+    - grazes by which they have to be deeper than at the first time; -inf: none
+    - s between looks at a pair with a corner rule, whose gap holds for one pose alone: its touch is bisected
+    """
     bodies, (spin_a, spin_b), (since, until) = state.bodies, spins, times
     (slop, near, threshold, grazes, stride), shape_a, shape_b = limits, bodies.shape[a], bodies.shape[b]
     holds = not has_corner_rule(state, shape_a, shape_b)  # its gap, however they are turned meanwhile

@@ -201,7 +201,7 @@ def least_extent(state, i):
 
 @inlined
 def is_unmoved(state, i, dt):
-    """Whether a body stands as good as still."""
+    """Whether a body is slower than UNMOVED_SIZES."""
     v, least = state.bodies.linear_velocity[i], UNMOVED_SIZES * least_extent(state, i) / dt
     return dot(v, v) <= least * least
 

@@ -194,11 +194,10 @@ def measure_islands(state, dt):
 def choose_substeps(solver, t, usual, dt):
     """How many substeps island t has, and whether its contacts are hard; returns whether it is special.
 
-    Its contacts may have to bear its heaviest body: the sag under that falls with the square of the substeps, what one
-    is struck by goes in by 1 / substeps. Where the own weight of bodies asks for too many, contacts are hard. What the
-    most substeps cannot bear counts as lighter, see ``bears``. From masses, not from impulses, which would change with
-    the substeps; by factors of two, so that it seldom changes. Where light bodies of joints
-    bear heavy ones these swing fast.
+    Its contacts may have to bear its heaviest body: the sag under that falls with the square of the substeps, the depth
+    of an impact with 1 / substeps. Where the own weight of bodies asks for too many, contacts are rigid. Loads beyond
+    MOST_SUBSTEPS are capped, see ``bears``. From masses, not from impulses, which would change with the substeps; by
+    factors of two, so that it seldom changes. Light bodies whose joints bear heavy ones swing fast.
     """
     sag, least = SAG * solver.most_change[t] * dt, usual
     while MOST_SWAY * float(least * least) < sag * solver.sway[t] and 2 * least <= LEAST_WORK_SUBSTEPS:

@@ -1,7 +1,7 @@
-"""Bodies too heavy for what they lie on: rows take them as lighter, but what they find moves them as what they are.
+"""Bodies too heavy for what they lie on: rows are solved with a capped mass, their impulses move the real one.
 
-An impulse that was found for a lighter body keeps momentum where it moves the heavier one, and takes the more energy
-the heavier that is. It does not hold its weight: what holds the island from outside does, see ``find_support``.
+Such an impulse keeps momentum, and takes the more energy the heavier the body is. The island's external support carries
+the capped weight, see ``find_support``.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from .rows import compute_effective_mass, rotate_body
 
 @part
 def cap_mass_ratio(solver, t, dt, span):
-    """What island t cannot bear with the most substeps counts as no heavier than it can."""
+    """Cap the masses of island t at what it can carry with MOST_SUBSTEPS."""
     least = solver.lightest[t] / solver.bears[t]
     solver.mass_of[t] = solver.force_of[t] = 0.0
     for q in range(span[2], span[3]):

@@ -86,10 +86,11 @@ def list_by_gap(solver, span):
 
 @part
 def close_nearest_first(solver, h, span):
-    """What falls far in a substep: rows come in as they close, the nearest first, each once those before it agree.
+    """For bodies that fall far in a substep: activate rows as they close, the nearest first, each once those before it
+    agree.
 
-    All at once would not end: a pass takes back of an impulse no more than what is open, and one of a row that another
-    one should have held before is as high as a whole fall.
+    Activating all rows at once does not converge: a pass takes back of an impulse no more than what is open, and that of
+    a row which another one should have held before is as high as a whole fall.
     """
     list_by_gap(solver, span)
     count, least = span[1] - span[0], least_change(solver, h, span)

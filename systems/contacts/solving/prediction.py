@@ -1,10 +1,9 @@
-"""What bodies at rest will do in this step, before anything is known about it: the contacts that held them still push.
+"""Apply last step's contact impulses to the free-flight prediction.
 
-Free flight lets a resting body fall by g dt. For a ball that bounces on such a body the ground would give way. So the
-impulses of the last step act on the prediction once more, but change no velocity by more than there is to hold: the
-change by forces, or what the game has added to the speed at which the body closes on what pushes it that way. What a
-light body between heavy ones has of these impulses is a small difference of large ones, and no measure of it. Where no
-contact holds the body after all, they are taken back.
+Free flight lets a resting body fall by g dt: a ball that bounces on it would find no ground. So the impulses of the
+last step act on the prediction, bounded by the change of velocity by forces, or by the closing speed that the game has
+added: for a light body between heavy ones they are small differences of large numbers. Where no contact holds the body
+after all, they are taken back.
 """
 
 from __future__ import annotations

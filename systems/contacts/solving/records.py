@@ -94,7 +94,7 @@ SOLVER = Schema(
     acceleration=vectors(unit="m/s^2"),
     inverse_mass=floats(unit="1/kg"),
     solver_mass=floats(unit="kg"),  # 0 for what cannot be moved
-    mass_ratio=floats(unit="1"),  # of what it counts as to what it is: 1, less where it is lightened
+    mass_ratio=floats(unit="1"),  # solver mass / real mass
     spin=vectors(unit="rad/s"),  # where bodies spin, as in the records of the bodies
     spin_before=vectors(unit="rad/s"),  # of a substep
     turn=vectors(unit="rad"),
