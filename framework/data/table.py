@@ -144,7 +144,7 @@ class Table(TableColumns):
         blocks = [kind + 1 for kind in added_kinds] if isinstance(added_kinds, list) else added_kinds + 1
         return self._regroup(removed, added, blocks, moved, self.arrays["kind"][moved] + 1 if len(moved) else moved)
 
-    def settle(self, asleep: np.ndarray) -> None:
+    def group_sleepers(self, asleep: np.ndarray) -> None:
         """Of the dynamic rows those of this mask sleep from now on, and no others."""
         rows = np.flatnonzero(asleep != (np.arange(len(asleep)) < self.blocks[0]))
         if len(rows):

@@ -91,7 +91,7 @@ def inverse_mass_of(solver, j):
     """How stiff a row is: as if it bore the heaviest body of its group; of angles, at the end of a beam of welds."""
     joints, a, b = solver.joints, solver.joints.first[j], solver.joints.second[j]
     w = max(solver.inverse_mass[a], solver.inverse_mass[b])
-    share = min(solver.direct.stiffer * joints.stiffness * joints.bears[j] * w, DIRECT_STIFFNESS_MAX)
+    share = min(solver.direct.stiffer * joints.stiffness * joints.carried_mass[j] * w, DIRECT_STIFFNESS_MAX)
     if joints.kind[j] < TURN:
         return share / w
     if joints.kind[j] == CUSTOM:

@@ -84,7 +84,7 @@ def choose_direct(state):
             joints.at_once[j] = HELD_AT_ONCE
         elif chosen and joints.rule[j] in (LIMIT, DRIVE, SERVO) and joints.kind[j] != POINT:
             joints.at_once[j] = LIMITED_AT_ONCE
-        joints.bears[j] = DIRECT_STIFFNESS / heavy * (bend if joints.kind[j] >= TURN else 1.0)
+        joints.carried_mass[j] = DIRECT_STIFFNESS / heavy * (bend if joints.kind[j] >= TURN else 1.0)
         solver.at_once[t] |= joints.at_once[j] == HELD_AT_ONCE
         solver.sway[t] = max(solver.sway[t], direct.swing[g] / heavy)
 

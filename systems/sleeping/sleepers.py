@@ -111,7 +111,7 @@ class Sleepers:
             self._followed = self._structure()
             self.links = links_with_falling(state, self.links)
         if state.due or (state.first == 0 and (state.asleep or table.blocks[0])):
-            table.settle(self._still()[: table.stops[0]] == ASLEEP)
+            table.group_sleepers(self._still()[: table.stops[0]] == ASLEEP)
             self._followed = self._structure()
             self._exposed.take(np.flatnonzero(self._still() > AWAKE))
         self.on = state.sleeping or self._all_wake

@@ -16,7 +16,7 @@ from ...integration.turning import cross_spin, symmetric, twist
 
 @part
 def find_chunks(solver, span):
-    """The chunks of a range, which are behind those of the one before, and what their bodies weigh."""
+    """The chunks of a range, which are behind those of the one before, and the masses of their bodies."""
     c = solver.end_chunk if span[0] > 0 else 0
     solver.first_chunk, start = c, span[0]
     while c < solver.chunks and solver.ends[c] <= span[1]:

@@ -196,7 +196,7 @@ def choose_substeps(solver, t, usual, dt):
 
     Its contacts may have to bear its heaviest body: the sag under that falls with the square of the substeps, the depth
     of an impact with 1 / substeps. Where the own weight of bodies asks for too many, contacts are rigid. Loads beyond
-    MOST_SUBSTEPS are capped, see ``bears``. From masses, not from impulses, which would change with the substeps; by
+    MOST_SUBSTEPS are capped, see ``load_share``. From masses, not from impulses, which would change with the substeps; by
     factors of two, so that it seldom changes. Light bodies whose joints bear heavy ones swing fast.
     """
     sag, least = SAG * solver.most_change[t] * dt, usual
@@ -205,7 +205,7 @@ def choose_substeps(solver, t, usual, dt):
     if solver.needs_substeps[t]:
         least = max(least, STRUCK_JOINT_SUBSTEPS)
     if solver.size_of[t] == 0:  # it has joints alone
-        solver.substeps_of[t], solver.hard_of[t], solver.passes[t], solver.bears[t] = least, False, 0, math.inf
+        solver.substeps_of[t], solver.hard_of[t], solver.passes[t], solver.load_share[t] = least, False, 0, math.inf
         return least > usual or solver.at_once[t]
     rows = solver.size_of[t] + solver.links[t] * (AT_ONCE_WORK if solver.at_once[t] else 1)
     own = sag * solver.own[t] / OWN_SAG
@@ -222,7 +222,7 @@ def choose_substeps(solver, t, usual, dt):
         substeps *= 2
     solver.substeps_of[t], solver.hard_of[t] = substeps, hard
     solver.passes[t] = max(LEAST_FURTHER_PASSES, min(FURTHER_PASSES, FURTHER_WORK // rows))
-    solver.bears[t] = float(substeps * substeps) / need if need > 0.0 else math.inf
+    solver.load_share[t] = float(substeps * substeps) / need if need > 0.0 else math.inf
     return substeps > usual or hard or solver.at_once[t]
 
 

@@ -89,8 +89,8 @@ def close_nearest_first(solver, h, span):
     """For bodies that fall far in a substep: activate rows as they close, the nearest first, each once those before it
     agree.
 
-    Activating all rows at once does not converge: a pass takes back of an impulse no more than what is open, and that of
-    a row which another one should have held before is as high as a whole fall.
+    Activating all rows at once does not converge: a pass takes back of an impulse no more than what is open, and the
+    impulse of a row which another one should have held before is as high as a whole fall.
     """
     list_by_gap(solver, span)
     count, least = span[1] - span[0], least_change(solver, h, span)

@@ -125,9 +125,9 @@ SOLVER = Schema(
     substeps_of=ints("int32"),
     hard_of=flags(),
     passes=ints("int32"),  # further ones in a substep, at most
-    bears=floats(unit="1"),  # share of its heaviest body that it can bear
+    load_share=floats(unit="1"),  # share of its heaviest body that it can bear
     range_of=ints("int32"),
-    slope=floats(unit="J"),  # see guard.weigh
+    slope=floats(unit="J"),  # see guard.measure_energy
     curvature=floats(unit="J"),
     energy=floats(unit="J"),
     momentum=vectors(unit="kg m/s"),

@@ -307,7 +307,7 @@ def solve_substeps(state, dt, arms):
                 solver.shift[q] = zero_of(state)
                 if len(arms) > 0:
                     rotate_body(solver, q, scale(solver.spin[q], -dt))
-            solver.lightened = solver.bears[t] < 1.0
+            solver.lightened = solver.load_share[t] < 1.0
             if solver.lightened:
                 cap_mass_ratio(solver, t, dt, span)
         any_joint = False
