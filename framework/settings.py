@@ -24,7 +24,7 @@ AUTOMATIC = "automatic"  # the broad phase that suits the scene
 
 @dataclass(frozen=True)
 class Settings:
-    """Frozen; change a copy: ``settings.replace(dt=1/120)``.
+    """Frozen; change a copy: ``settings.replace(dt=1/120)``. ValueError names the field that is out of range.
 
     dt
         the fixed step, seconds
@@ -112,7 +112,7 @@ class Settings:
             raise ValueError(f"Settings.{name} must be a finite number {rule}, got {value!r}")
 
     def replace(self, **changes: Any) -> Self:
-        """A copy with some fields changed; TypeError for a field that does not exist."""
+        """A copy with the ``changes``; TypeError for a field that does not exist."""
         _refuse_unknown(changes)
         return dataclasses.replace(self, **changes)
 

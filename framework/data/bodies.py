@@ -55,18 +55,21 @@ class Bodies:
 
     @property
     def dynamic(self) -> Bodies:
+        """The same columns of the dynamic bodies."""
         return Bodies(self._table, DYNAMIC)
 
     @property
     def kinematic(self) -> Bodies:
+        """The same columns of the kinematic bodies."""
         return Bodies(self._table, KINEMATIC)
 
     @property
     def static(self) -> Bodies:
+        """The same columns of the static bodies, read-only."""
         return Bodies(self._table, STATIC)
 
     def has(self, component: type[Component]) -> np.ndarray:
-        """Mask of the bodies whose entity has that component."""
+        """Mask (n,) of the bodies whose entity has that component."""
         if component not in self._table.component_types:
             return np.zeros(len(self), bool)
         return self._table.has_mask(component)[self.rows]
@@ -83,7 +86,8 @@ class Bodies:
 
     @property
     def interpolated_rotation(self) -> np.ndarray:
-        """The same of rotations: (n,) rad in 2D, (n, 4) in 3D. Between two steps is what turns by its Spin."""
+        """The same of rotations, by slerp (Shoemake, 1985): (n,) rad in 2D, (n, 4) in 3D. Only what turns by its Spin
+        is between two steps."""
         return interpolated(self._table, "rotation", self.rows)
 
     def row_of(self, entity: int) -> int:
@@ -124,6 +128,7 @@ class Bodies:
             _write(getattr(self, name), value, name)
 
     def column_names(self) -> list[str]:
+        """The names of all columns there are, sorted."""
         return sorted(key for key in self._table.column_keys() if not key.startswith(("has:", "_")))
 
     def __dir__(self) -> list[str]:

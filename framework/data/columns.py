@@ -76,7 +76,7 @@ class Column:
         return REQUIRED if self.default is REQUIRED else self.checked(self.default)
 
     def whole(self, value: Any, dimensions: int) -> np.ndarray:
-        """The array that a single number stands for in a world of that many dimensions (rotation 0: no rotation)."""
+        """The array, (d,), (3,) or (4,), that a single number, ``value``, stands for (rotation 0: no rotation)."""
         array = np.empty(self.item_shape(dimensions), self.dtype)
         array[...] = self.empty_value(3) if self.item == "rotation" and dimensions == 3 else value
         return array
@@ -87,7 +87,7 @@ class Column:
 
     @cached_property
     def limits(self) -> tuple[float, float]:
-        """The smallest and the largest number that pass the checks."""
+        """The smallest and the largest number that pass the checks, in its unit."""
         smallest = SMALLEST_WITH_INVERSE if self.positive else -self.largest
         return smallest if self.minimum is None else max(smallest, self.minimum), self.largest
 
@@ -144,7 +144,7 @@ class Column:
         return None
 
     def checked_many(self, values: Any, count: int, dimensions: int) -> np.ndarray:
-        """An array for ``count`` rows, from one value for all or one per row."""
+        """An array (count, ...), from one of ``values`` for all or one per row; ValueError names field and row."""
         shape = self.item_shape(dimensions)
         if self.choices:
             return self._full(self._choices_of(values), count, shape)
@@ -192,7 +192,7 @@ class Column:
         return np.array([known[value] for value in values], self.dtype)
 
     def check_dimensions(self, value: Any, dimensions: int, entity: int | None = None) -> None:
-        """A vector must have the world's number of components; a single number stands for all of them."""
+        """ValueError if ``value`` is a vector of other dimensions than the world; a number stands for all of them."""
         whole = isinstance(value, np.ndarray)
         if self.item == "vector" and whole and len(value) != dimensions:
             raise self._error(value, f"must have {dimensions} components in this {dimensions}D world", entity)
@@ -208,7 +208,8 @@ class Column:
                 raise self._error(value, "must be a quaternion (w, x, y, z) in this 3D world", entity)
 
     def check_numbers(self, array: np.ndarray, shown: Any, entity: int | None) -> None:
-        """Finite and within the field's bounds; ``shown`` is what the message quotes (None: the first bad row)."""
+        """ValueError if ``array`` is not finite or exceeds the field's bounds; ``shown`` is what the message quotes
+        (None: the first bad row)."""
         low, high = self.limits
         usual = self.item != "rotation" and array.size and low <= array.min() and array.max() <= high  # none is nan
         if usual and (not self.nonzero or np.all(array)):
@@ -298,7 +299,7 @@ class Column:
         store.written(self, row)
 
     def value_of(self, handle: Any) -> Any:
-        """The value for reading only: a column on demand stays without memory."""
+        """The value of a ``handle`` for reading only: a column on demand stays without memory."""
         store = handle._store
         if store is None or self.key in store.arrays:
             return self.__get__(handle)
@@ -310,7 +311,7 @@ class Column:
         return value.copy() if isinstance(value, np.ndarray) else self.checked(value)
 
     def hashable(self, values: np.ndarray) -> np.ndarray:
-        """Stored values as a hash may take them: the same in every process."""
+        """Stored ``values`` (n, ...) as a hash may take them: the same in every process."""
         return values
 
     def shown(self, value: Any) -> Any:

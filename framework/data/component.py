@@ -215,7 +215,7 @@ class Component:
         return {name: column.value_of(self) for name, column in self.columns.items()}
 
     def numbers_in(self, pool: Any) -> list[int]:
-        """The numbers of arrays that it holds itself."""
+        """The numbers of arrays of ``pool`` that it holds itself."""
         values = self._values or {}
         return [values[column.name] for column in self._pooled if column.pool is pool and column.name in values]
 

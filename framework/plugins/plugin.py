@@ -52,7 +52,7 @@ class Plugin:
 
     Registering is checked at once: a function that cannot work is refused with a PluginError that names it, before
     anything is compiled. What is registered while worlds run is seen at their next step; to register something again
-    replaces it.
+    replaces it. ValueError without a name.
     """
 
     def __init__(self, name: str, version: str = "") -> None:
@@ -75,7 +75,7 @@ class Plugin:
     # -- shapes and pairs -------------------------------------------------------------------------
 
     def kernel(self, function: Thing) -> Thing:
-        """For helpers of the functions below: compiled into them. Called from Python it is the function as written."""
+        """For helpers of the functions below: ``function`` is compiled into them, and stays as written for Python."""
         if not inspect.isfunction(function):
             raise PluginError(f"plugin {self.name}: kernel takes a function, got {function!r}")
         return inlined(function)
@@ -92,7 +92,8 @@ class Plugin:
         it meets every other convex shape; and ``rounding(shape)``, how far it reaches beyond the core that support is
         about; and ``second_moments(shape, dimensions)``, from which bodies that spin get their inertia: its area or
         volume, its centre, then the means over it of xx, xy, yy, in 3D of xx, yy, zz, xy, xz, yz, of a body that is not
-        rotated. ``rotates = True`` in the class gives the functions ``shape.axes``, the body's axes in the world;
+        rotated; and ``turned(shape, axes)``, a tuple of its fields as they are on a body with these axes. In place of
+        that ``rotates = True`` in the class gives the functions ``shape.axes``, the body's axes in the world;
         ``dimensions = (2,)`` makes it a shape of 2D worlds only.
         """
 
@@ -114,7 +115,7 @@ class Plugin:
     def pair(
         self, first: type[Any], second: type[Any], *, corner: Any | None = None
     ) -> Callable[[Thing], Thing]:
-        """Register ``function(a, b, d) -> (hit, depth, normal, point)`` for two shapes.
+        """Register ``function(a, b, d) -> (hit, depth, normal, point)`` for two shapes, ``first`` and ``second``.
 
         a and b have the shapes' fields, d is the vector from a's centre to b's, a tuple of 2 or 3. ``depth`` is how far
         they overlap, negative when they are apart; ``normal`` a unit vector from a to b; ``point`` the point of contact
@@ -142,8 +143,9 @@ class Plugin:
 
     @_called_first("First, Second")
     def sweep(self, first: type[Any], second: type[Any]) -> Callable[[Thing], Thing]:
-        """Register ``function(a, b, d, v) -> (hit, time)`` for a pair: b moves by v relative to a, from d on; time,
-        from 0 to 1, is the part of v after which they touch. Without it the time is found from the pair's depth.
+        """Register ``function(a, b, d, v) -> (hit, time)`` for the pair of ``first`` and ``second``: b moves by v
+        relative to a, from d on; time, 0 to 1, is the part of v after which they touch. Without it the time is found
+        from the pair's depth.
         """
 
         def register(function: Any) -> Any:
@@ -262,7 +264,7 @@ class Plugin:
         return register
 
     def system(self, make: Thing) -> Thing:
-        """Register a class of System, ForceSystem or esper processor: each world that takes the plugin gets one."""
+        """Register ``make``, a class of System, ForceSystem or processor: each world that takes the plugin gets one."""
         checks.check_system(self, make)
         self.systems.append(make)  # type: ignore[arg-type]
         for registry in list(self.registries):

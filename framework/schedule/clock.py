@@ -7,7 +7,7 @@ import sys
 
 
 class Clock:
-    """Counts steps; time is computed from the count, so it gathers no rounding."""
+    """Counts steps of ``dt`` seconds; time is computed from the count, so it gathers no rounding."""
 
     ROUNDING = 1e-9  # of a step: frames of dt must give one step each whatever their sum rounds to
 
@@ -21,20 +21,22 @@ class Clock:
 
     @property
     def time(self) -> float:
+        """Seconds simulated."""
         return self._base_time + (self.step_count - self._base_count) * self.dt
 
     @property
     def alpha(self) -> float:
+        """The gathered time as a part of a step, 0 to 1."""
         return min(max(self.gathered / self.dt, 0.0), 1.0)
 
     def set_dt(self, dt: float) -> None:
-        """From now on; what has passed stays."""
+        """Steps take ``dt`` seconds from now on; what has passed stays."""
         if dt != self.dt:  # else replacing other settings again and again would gather rounding after all
             self._base_time, self._base_count = self.time, self.step_count
             self.dt = dt
 
     def gather(self, seconds: float, limit: int) -> int:
-        """Add a frame's time and take whole steps out of it, at most ``limit``; the surplus is dropped."""
+        """Add a frame's ``seconds`` and take whole steps out of them, at most ``limit``; the surplus is dropped."""
         self.gathered += seconds
         rest = math.fmod(self.gathered, self.dt)  # exact, however long the frame was
         steps = round(min((self.gathered - rest) / self.dt, sys.float_info.max))
@@ -45,9 +47,11 @@ class Clock:
         return min(steps, limit)
 
     def state(self) -> tuple[float, ...]:
+        """What :meth:`restore` takes: seconds and counts."""
         return (self.dt, self.step_count, self._base_time, self._base_count, self.gathered, self.dropped_steps)
 
     def restore(self, state: tuple[float, ...]) -> None:
+        """Go back to what :meth:`state` returned."""
         dt, count, base_time, base_count, gathered, dropped = state
         self.dt, self._base_time, self.gathered = dt, base_time, gathered
         self.step_count, self._base_count, self.dropped_steps = int(count), int(base_count), int(dropped)

@@ -66,6 +66,7 @@ class System(OfOneWorld, esper.Processor):
 
     @property
     def name(self) -> str:
+        """Of the class: what ``world.plan()`` and ``world.stats()`` show."""
         return type(self).__name__
 
     def process(self, dt: float) -> None:  # type: ignore[override]
@@ -88,6 +89,7 @@ class ForceSystem(OfOneWorld):
 
     @property
     def name(self) -> str:
+        """Of the class: what ``world.plan()`` and messages show."""
         return type(self).__name__
 
     def add_forces(self, bodies: Any, time: float) -> None:

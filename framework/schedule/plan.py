@@ -17,6 +17,8 @@ WIDTH = 120  # of the printed lines
 class PlannedKernel:
     """A compiled loop that a system calls, by the name that ``world.profile()`` shows.
 
+    kernel, reason
+        its name, and what it is for
     when
         what has to happen for it to be called, and so to be compiled; empty: in every step
     reads, writes
@@ -95,6 +97,7 @@ class Plan:
 
     @classmethod
     def of(cls, systems: Sequence[System], physics: Any) -> Plan:
+        """Of a world's ``systems`` and ``physics`` now."""
         entries = [
             PlanEntry(
                 s.phase.name,

@@ -85,23 +85,23 @@ class Stats:
 
     @property
     def milliseconds(self) -> dict[str, float]:
-        """Mean per step, by system."""
+        """Mean ms per step, by system."""
         return {name: 1e3 * seconds / max(self.steps, 1) for name, seconds in self._seconds().items()}
 
     @property
     def total(self) -> float:
-        """Mean milliseconds per step in all systems."""
+        """Mean ms per step in all systems."""
         return sum(self.milliseconds.values())
 
     @property
     def nanoseconds(self) -> dict[str, dict[str, float]]:
-        """By system: its time per body that moves, and per candidate or per pair and contact, as fits its phase."""
+        """By system: its time in ns per body that moves, and per candidate or pair and contact, as fits its phase."""
         counters = self.counters
         return {name: _shared(s, counters, self.units.get(name, OTHER_UNITS)) for name, s in self._seconds().items()}
 
     @property
     def kernels(self) -> tuple[KernelStats, ...]:
-        """What was measured inside ``with world.profile():``, means over the steps taken there."""
+        """A :class:`KernelStats` for each kernel called inside ``with world.profile():``, means over its steps."""
         order = {name: place for place, name in enumerate(self._seconds())}
         keys = sorted(self.profiled.calls, key=lambda key: order.get(key[0], len(order)))
         return tuple(self._kernel(*key) for key in keys)
@@ -113,7 +113,7 @@ class Stats:
 
     @property
     def compile_seconds(self) -> float:
-        """How long the systems waited for kernels to be compiled or loaded."""
+        """Seconds that the systems waited for kernels to be compiled or loaded."""
         return self.totals.waited
 
     def _seconds(self) -> dict[str, float]:

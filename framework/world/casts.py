@@ -62,7 +62,7 @@ class CastVerbs:
         """The nearest hit of each of m rays, as columns.
 
         origins (m, d); directions (m, d) or one for all; max_distances and exclude: one for all or (m,), and nothing is
-        excluded where that is -1.
+        excluded where that is -1. ValueError names the first row with a direction of zero.
         """
         services = self._synchronized()
         starts = check.points(origins, "ray_casts: origins", services.dimensions)

@@ -23,7 +23,8 @@ BLOCK = 256  # records made at once; one that a game keeps also keeps the points
 
 @dataclass(frozen=True, slots=True)
 class ContactFields:
-    """The fields of a contact."""
+    """The fields of a contact: entity_a, entity_b, point, normal, depth, normal_impulse, step, time_of_impact are the
+    values of one row of :class:`ContactRows`, point and normal (d,)."""
 
     entity_a: int
     entity_b: int
@@ -32,7 +33,7 @@ class ContactFields:
     depth: float
     normal_impulse: float
     step: int
-    time_of_impact: float  # seconds since the start of the step; nan if this is no impact
+    time_of_impact: float  # nan if this is no impact
 
 
 class Contact(ContactFields):
@@ -113,7 +114,7 @@ class ContactRows:
             raise AttributeError(f"contacts have no column {name!r}; they have {', '.join(self._columns)}") from None
 
     def row(self, index: int) -> Contact:
-        """That row as one record."""
+        """The row ``index`` as one record."""
         c = self._columns
         return Contact(
             c["entity_a"].item(index), c["entity_b"].item(index), c["point"][index].copy(), c["normal"][index].copy(),
@@ -170,7 +171,7 @@ class ContactRows:
                 yield contact.entity_a, contact.entity_b, contact
 
     def between(self, first: type[Any], second: type[Any]) -> ContactsBetween:
-        """The contacts that :meth:`pairs` would yield now, as columns: rows, a and b (k,), in the same order."""
+        """The contacts that :meth:`pairs` would yield for ``first`` and ``second``, as columns (k,): rows, a and b."""
         _check_types("between", first, second)
         a, b, enabled = self.entity_a, self.entity_b, self._columns.get("enabled")
         rows = np.arange(len(a)) if enabled is None else np.flatnonzero(enabled)
@@ -192,7 +193,7 @@ class ContactRows:
         return ContactsBetween(rows, np.where(forward, a[rows], b[rows]), np.where(forward, b[rows], a[rows]))
 
     def normals_from(self, entities: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """(k, d) the normals of these rows (k,), each pointing away from that entity (k,), which is one of its two."""
+        """(k, d) the normals of these ``rows`` (k,), each pointing away from that one of ``entities`` (k,)."""
         normals = self.normal[rows]
         turned = self.entity_a[rows] != entities
         return np.negative(normals, out=normals, where=turned[:, None])
@@ -312,7 +313,7 @@ class Contacts(ContactRows):
                 chunks.clear()
 
     def enabled_now(self) -> np.ndarray | None:
-        """``enabled`` of the contacts as they are, but for those of what sleeps; None if nothing has read their
+        """(m,) ``enabled`` of the contacts as they are, but for those of what sleeps; None if nothing has read their
         columns, so that all are."""
         if self._columns_of != self._source.version:
             return None
@@ -329,6 +330,7 @@ class Contacts(ContactRows):
             record()
 
     def record(self, history: str, columns: dict[str, np.ndarray]) -> None:
+        """Add the rows of ``columns`` to a ``history`` of the window: begin, end or impacts."""
         if len(columns["entity_a"]):
             self.recorded = True
             self._chunks[history].append(columns)
@@ -340,7 +342,7 @@ class Contacts(ContactRows):
             self._chunks[name] = [chunk for chunk in chunks if chunk["step"][0] != step]
 
     def columns_now(self) -> dict[str, np.ndarray]:
-        """The columns of the contacts as they are."""
+        """The columns (m, ...) of the contacts as they are."""
         return self._columns
 
     def show(self, columns: dict[str, np.ndarray]) -> None:
@@ -356,7 +358,7 @@ class Contacts(ContactRows):
         return {"window": self.window, "columns": columns, "histories": histories}
 
     def take_back(self, saved: dict[str, Any]) -> None:
-        """Show them again; the source has the contacts of that time."""
+        """Show what was ``saved`` again; the source has the contacts of that time."""
         self.deferred, self.recorded, self.window = None, True, saved["window"]
         self._chunks = {name: [_copied(chunk) for chunk in chunks] for name, chunks in saved["histories"].items()}
         if saved["columns"] is not None:

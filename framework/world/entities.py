@@ -73,7 +73,7 @@ class EntityVerbs:
         return self._contents().create_many({one.component: one.store(count, dimensions) for one in many}, count)
 
     def delete_entity(self, entity: int, immediate: bool = False) -> None:
-        """Delete at the start of the next step, or at once; KeyError if there is no such entity."""
+        """Delete at the start of the next step, or at once if ``immediate``; KeyError if there is no such entity."""
         contents = self._contents()
         if entity not in contents.entities:
             raise KeyError(f"no entity {entity!r} in this world")
@@ -84,7 +84,7 @@ class EntityVerbs:
         contents.dead.discard(entity)  # else esper would fail on it in every later process
 
     def delete_entities(self, entities: Iterable[int]) -> None:
-        """Delete all these at the start of the next step; KeyError, and none is deleted, if one does not exist."""
+        """Delete all ``entities`` at the start of the next step; KeyError, and none is deleted, if one is missing."""
         contents = self._contents()
         ids = entities.tolist() if isinstance(entities, np.ndarray) else list(entities)
         for entity in contents.entities.missing(ids):
@@ -128,9 +128,11 @@ class EntityVerbs:
         return self.remove_component(entity, component_type)
 
     def has_component(self, entity: int, component_type: type[Any]) -> bool:
+        """Whether the entity has a component of that type; KeyError if there is no such entity."""
         return component_type in self._types_of(entity)
 
     def has_components(self, entity: int, *component_types: type[Any]) -> bool:
+        """Whether the entity has components of all these types; KeyError if there is no such entity."""
         types = self._types_of(entity)
         return all(component_type in types for component_type in component_types)
 
@@ -142,12 +144,15 @@ class EntityVerbs:
         return found
 
     def components_for_entity(self, entity: int) -> tuple[Any, ...]:
+        """All components of the entity; KeyError if there is no such entity."""
         return tuple(self._components_of(entity).values())
 
     def try_component(self, entity: int, component_type: type[C]) -> C | None:
+        """The entity's component of that type; None if either does not exist."""
         return self._contents().entities.get(entity, {}).get(component_type)
 
     def try_components(self, entity: int, *component_types: type[Any]) -> tuple[Any, ...] | None:
+        """The entity's components of these types, in their order; None if it or one of them does not exist."""
         components = self._contents().entities.get(entity)
         if not components or not all(component_type in components for component_type in component_types):
             return None

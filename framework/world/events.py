@@ -26,7 +26,7 @@ class Events:
         self.of_esper = esper_bridge.event_registry()
 
     def define(self, *names: str) -> None:
-        """Declare events of your own, so that ``on`` takes them; ``dispatch`` declares its event too."""
+        """Declare events of your own, ``names``, so that ``on`` takes them; ``dispatch`` declares its event too."""
         for name in names:
             if not isinstance(name, str) or not name:
                 raise TypeError(f"the name of an event is text, got {name!r}")
@@ -53,14 +53,14 @@ class Events:
         return handler
 
     def off(self, name: str, handler: Handler) -> None:
-        """Stop calling ``handler``; KeyError if it was not set. Safe inside a handler."""
+        """Stop calling ``handler`` on events ``name``; KeyError if it was not set. Safe inside a handler."""
         handlers = self.handlers.get(name, [])
         if handler not in handlers:
             raise KeyError(f"no such handler for {name!r}: {handler!r}")
         handlers.remove(handler)
 
     def wanted(self, name: str) -> bool:
-        """True if the event has a handler; lets callers skip building the payload."""
+        """True if the event ``name`` has a handler; lets callers skip building the payload."""
         return bool(self.handlers.get(name)) or bool(self.of_esper.get(name))
 
     def any_handlers(self) -> bool:
@@ -73,7 +73,7 @@ class Events:
         return False
 
     def dispatch_many(self, name: str, records: Iterable[Any]) -> None:
-        """One event for each record; quick where a single handler listens, which is usual."""
+        """One event ``name`` for each of ``records``; quick where a single handler listens, which is usual."""
         for record in records:
             handlers = self.handlers.get(name, ())
             if len(handlers) == 1 and not self.of_esper.get(name):
@@ -82,7 +82,7 @@ class Events:
                 self.dispatch(name, record)
 
     def dispatch(self, name: str, *args: Any) -> None:
-        """Call the handlers that were set when the event began and have not been removed since."""
+        """Call the handlers of ``name`` that were set when the event began and have not been removed since."""
         if name not in self._known:
             self.define(name)
         for handler in tuple(self.handlers.get(name, ())):

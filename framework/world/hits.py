@@ -59,14 +59,14 @@ class Neighbours(Hits):
         self.asker_rows = asker_rows
 
     def of(self, entity: int) -> np.ndarray:
-        """The neighbours of that asker; KeyError if it is none."""
+        """(k,) the ids of the neighbours of an entity, ascending; KeyError if it is not among ``askers``."""
         found = np.flatnonzero(self.askers == entity)
         if not len(found):
             raise KeyError(entity)
         return self[int(found[0])]
 
     def pairs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rows (asker, neighbour), one for each neighbour found: for sums over all pairs at once."""
+        """(k,) rows of askers and (k,) rows of their neighbours, one of each per pair: for sums over all at once."""
         return np.repeat(self.asker_rows, self.counts), self.rows
 
 
@@ -108,7 +108,10 @@ class CastHit:
 
 @dataclass(frozen=True, eq=False)
 class NearestHits:
-    """Per query the nearest, as columns; where there is none: entity and row -1, distance inf, the others nan."""
+    """Per query the nearest, as columns; where there is none: entity and row -1, distance inf, the others nan.
+
+    entity, row, distance (m,); point, normal (m, d): as of :class:`NearestHit`.
+    """
 
     entity: np.ndarray
     row: np.ndarray
@@ -127,6 +130,6 @@ class NearestHits:
 
 @dataclass(frozen=True, eq=False)
 class CastHits(NearestHits):
-    """Per cast the first hit, as columns; where there is none, the fraction is 1: all of the way is free."""
+    """Per cast the first hit, as columns; where there is none, the fraction (m,) is 1: all of the way is free."""
 
     fraction: np.ndarray

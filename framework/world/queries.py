@@ -19,13 +19,16 @@ class QueryVerbs(CastVerbs):
     """
 
     def query_point(self, point: Vector, mask: int = -1) -> list[int]:
-        """Entities whose collider contains the point, by id."""
+        """Entities whose collider contains the ``point``, (d,) m, by id."""
         services = self._synchronized()
         centre = check.point(point, "query_point: point", services.dimensions)
         return services.queries.sphere(centre, 0.0, check.mask(mask, "query_point: mask"))
 
     def query_aabb(self, lower: Vector, upper: Vector, mask: int = -1) -> list[int]:
-        """Entities whose collider touches the box, by id."""
+        """Entities whose collider touches the box from ``lower`` to ``upper``, (d,) m, by id.
+
+        ValueError if a lower bound exceeds the upper one.
+        """
         services = self._synchronized()
         low = check.point(lower, "query_aabb: lower", services.dimensions)
         high = check.point(upper, "query_aabb: upper", services.dimensions)
@@ -34,7 +37,7 @@ class QueryVerbs(CastVerbs):
         return services.queries.box(low, high, check.mask(mask, "query_aabb: mask"))
 
     def query_sphere(self, centre: Vector, radius: float, mask: int = -1) -> list[int]:
-        """Entities whose collider touches the sphere, by id."""
+        """Entities whose collider touches the sphere of ``radius`` m around ``centre``, (d,) m, by id."""
         services = self._synchronized()
         place = check.point(centre, "query_sphere: centre", services.dimensions)
         size = check.distance(radius, "query_sphere: radius")
@@ -48,7 +51,10 @@ class QueryVerbs(CastVerbs):
         return services.queries.spheres(places, sizes, check.mask(mask, "query_spheres: mask"))
 
     def query_aabbs(self, lower: Vectors, upper: Vectors, mask: int = -1) -> Hits:
-        """For each of m boxes (corners (m, d)) the ids of the entities it touches, ascending."""
+        """For each of m boxes (``lower`` and ``upper`` (m, d)) the ids of the entities it touches, ascending.
+
+        ValueError names the first row in which a lower bound exceeds the upper one.
+        """
         services = self._synchronized()
         low = check.points(lower, "query_aabbs: lower", services.dimensions)
         high = check.points(upper, "query_aabbs: upper", services.dimensions, len(low))
@@ -60,7 +66,7 @@ class QueryVerbs(CastVerbs):
     def query_nearest(
         self, point: Vector, mask: int = -1, *, max_distance: float = math.inf, exclude: int | None = None
     ) -> NearestHit | None:
-        """The collider whose surface is nearest to the point, at most ``max_distance`` away; None if there is none.
+        """The collider whose surface is nearest to ``point``, at most ``max_distance`` m away; None if there is none.
 
         Inside a collider the distance is negative, and the deepest is the nearest. Ties go to the smaller id.
         ``exclude``: an entity to leave out.
@@ -92,12 +98,12 @@ class QueryVerbs(CastVerbs):
         return services.queries.nearest(places, limits, bits, others)
 
     def neighbours(self, radius: float, mask: int = -1, *, of: Entities | None = None) -> Neighbours:
-        """For every body the others whose position is within ``radius`` of its own, by id.
+        """For every body the others whose position is within ``radius`` m of its own, by id.
 
         Distances are between the positions of the Transforms, so it needs no collider, and whoever is a neighbour has
         its asker as a neighbour too. ``mask`` chooses layers; bodies without a collider are in none and found only with
         the mask -1. ``of``: the ids of those whose neighbours are wanted, each once, in this order; all bodies by
-        default, ascending. KeyError if one of them is no body.
+        default, ascending. KeyError if one of them is no body, ValueError if they are no list of ids.
         """
         services = self._synchronized()
         size = check.distance(radius, "neighbours: radius")

@@ -52,7 +52,7 @@ class Snapshot:
 
     @classmethod
     def of(cls, world: Any, physics: PhysicsServices) -> Snapshot:
-        """Of a world whose table is up to date with esper; shares with it what is not carom's."""
+        """Of a world, with its ``physics``, whose table is up to date; shares with it what is not carom's."""
         contents = world._contents()
         population = Population.of(contents.entities, physics.adoption)
         kept = {plugin.name: plugin.saved(world) for plugin in world.plugins}

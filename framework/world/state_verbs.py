@@ -42,7 +42,7 @@ class StateVerbs:
     # -- files ------------------------------------------------------------------------------------
 
     def save(self: Any, path: str | os.PathLike[str], *, leave_out: Collection[type[Any]] = ()) -> None:
-        """Write a snapshot and the settings into a file, for :meth:`load`; one that is there is replaced at once.
+        """Write a snapshot and the settings into the file ``path``, for :meth:`load`; it is replaced at once.
 
         leave_out
             types of components that are not carom's: no file holds them, and without this they are a CaromError
@@ -60,7 +60,7 @@ class StateVerbs:
         components: Iterable[type[Component]] = (),
         name: str | None = None,
     ) -> Self:
-        """A world that goes on where the saved one was, to the bit.
+        """A world that goes on where the one saved at ``path`` was, to the bit.
 
         plugins
             all that the saved world had, of the same versions or newer

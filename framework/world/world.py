@@ -49,6 +49,8 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
     name
         of the esper context, unique by default; ``"default"`` takes over esper's default context
 
+    ValueError if another world has the name, PluginError if two plugins have the same.
+
     Inside ``with world:`` plain esper calls work on this world.
 
     Attributes of your own go into a class derived from World, which declares them: ``score: int``.
@@ -123,7 +125,7 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
     def close(self) -> None:
         """Give the esper context back; the world cannot be used afterwards. Closing twice is fine.
 
-        Handles of its components, and arrays of columns, keep their last values.
+        Handles of its components, and arrays of columns, keep their last values. CaromError inside its own with block.
         """
         if self.closed:
             return
@@ -230,6 +232,7 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
 
     @property
     def contacts(self) -> Contacts:
+        """The contacts of the last step, as columns, and what has begun, ended and struck."""
         return self._services.contacts
 
     def kinetic_energy(self) -> float:
@@ -271,7 +274,7 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
         self._pipeline.order.add(system, before, after, frame)
 
     def remove_system(self, system: System | ForceSystem | esper.Processor) -> None:
-        """Remove that instance; during a step it leaves at its end. KeyError if it is not in this world."""
+        """Remove ``system``, an instance; during a step it leaves at its end. KeyError if it is not in this world."""
         self._open()
         self._pipeline.order.remove(system)
 
@@ -291,12 +294,12 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
         self._pipeline.order.add_plain(processor, priority)
 
     def remove_processor(self, processor: type[esper.Processor] | esper.Processor) -> None:
-        """esper's verb: by type, the last one added of it; an instance is taken too."""
+        """esper's verb: ``processor`` is a type, of which the last one added is removed, or an instance."""
         self._open()
         self._pipeline.order.remove_processor(processor)
 
     def get_processor(self, processor_type: type[P]) -> P | None:
-        """esper's verb: the last one added of that type, carom's systems too; None if there is none."""
+        """esper's verb: the last one added of ``processor_type``, carom's systems too; None if there is none."""
         self._open()
         processors = self._pipeline.order.in_esper_order()
         return next((one for one in reversed(processors) if type(one) is processor_type), None)
@@ -325,10 +328,11 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
         self._pipeline.step()
 
     def advance(self, seconds: float) -> int:
-        """As many fixed steps as fit into the time that has gathered; returns how many.
+        """Take as many fixed steps as fit into the time not yet simulated and these ``seconds``; returns how many.
 
         At most ``settings.max_steps_per_advance``; whole steps beyond that are dropped and counted in
-        ``stats().counters["dropped_steps"]``. What is less than a step is kept: ``alpha``.
+        ``stats().counters["dropped_steps"]``. What is less than a step is kept: ``alpha``. ValueError if ``seconds``
+        are negative or not finite.
         """
         self._open()
         if not (isinstance(seconds, numbers.Real) and math.isfinite(seconds) and seconds >= 0):
@@ -337,7 +341,7 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
 
     @property
     def alpha(self) -> float:
-        """How far the time gathered has come into the next step, 0 to 1; for drawing between two steps."""
+        """The time not yet simulated as a part of a step, 0 to 1; for drawing between two steps."""
         return self._pipeline.clock.alpha
 
     @property
@@ -347,11 +351,12 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
 
     @property
     def step_count(self) -> int:
+        """Fixed steps simulated; :meth:`restore` sets it back."""
         return self._pipeline.clock.step_count
 
     @property
     def clock(self) -> Clock:
-        """Counts the steps."""
+        """What ``time``, ``step_count`` and ``alpha`` come from."""
         return self._pipeline.clock
 
     def run(self, phase: Phase) -> None:
@@ -371,7 +376,7 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
         self._synchronized().adoption.register(component_types)
 
     def record(self, schema: Schema) -> Record:
-        """The record of this world that stages of plugins get for that schema: numbers, and columns as numpy arrays."""
+        """The record of this world for that ``schema``, as stages of plugins get it: numbers, and arrays (n, ...)."""
         return self._services.record(schema)
 
     def prepare(self, *component_types: type[Any]) -> None:
@@ -393,16 +398,17 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
         return self._events.on(name, handler)
 
     def off(self, name: str, handler: Callable[..., None]) -> None:
-        """Take a handler back; safe inside a handler. KeyError if it was not set."""
+        """Remove a handler of the event ``name``; safe inside a handler. KeyError if it was not set."""
         self._events.off(name, handler)
 
     def dispatch_event(self, name: str, *args: Any) -> None:
-        """Call the handlers of that event, esper's own included; it is declared by that."""
+        """Call the handlers of the event ``name``, esper's own included; it is declared by that."""
         with self._context():
             self._events.dispatch(name, *args)
 
     @property
     def events(self) -> Events:
+        """The events and their handlers; ``events.define(name)`` declares one of your own."""
         return self._events
 
     # -- looking inside ---------------------------------------------------------------------------
@@ -412,7 +418,7 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
         return self._pipeline.profiler.stats()
 
     def reset_stats(self) -> None:
-        """Begin to measure anew."""
+        """Set the times and counters of :meth:`stats` to 0."""
         self._pipeline.profiler.reset()
 
     def profile(self) -> AbstractContextManager[None]:
