@@ -99,7 +99,7 @@ class Collider(Component, abstract=True):
 
 
 class SphereCollider(Collider):
-    """A bounding sphere (a circle in 2D); radius 0 is a point."""
+    """A bounding sphere (a circle in 2D); ``radius``, m: 0 is a point."""
 
     __slots__ = ()
 
@@ -144,10 +144,8 @@ class AABBCollider(Collider):
 
     @classmethod
     def from_bounds(cls, lower: Vector, upper: Vector, **common: Unpack[MaterialFields]) -> Self:
-        """The box from its minimum and maximum point, relative to the Transform's position.
-
-        ValueError if a minimum exceeds its maximum.
-        """
+        """The box from ``lower`` to ``upper``, (d,) m relative to the Transform's position; ValueError if a lower bound
+        exceeds the upper one."""
         low, high = np.asarray(LOWER.checked(lower)), np.asarray(UPPER.checked(upper))
         if low.shape != high.shape or not (low <= high).all():
             raise ValueError(f"AABBCollider.from_bounds: lower must not exceed upper, got {lower!r} and {upper!r}")

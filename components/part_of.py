@@ -34,7 +34,7 @@ class PartOf(Component):
     position
         (d,) m, where the part is from the body's position, along the body's own axes
     rotation
-        of the part against the body: an angle, in 3D a unit quaternion (w, x, y, z)
+        of the part against the body: rad, in 3D a unit quaternion (w, x, y, z)
     mass
         kg, which the part adds to RigidBody.mass of the body; None: 1, and 0 if it is a sensor
     """

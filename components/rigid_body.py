@@ -52,7 +52,7 @@ class RigidBody(Component, flat=True):
     """How a body moves.
 
     mass
-        kilograms, above zero
+        kg, above zero
     linear_velocity
         (d,) m/s, along each axis at most 1e307
     constant_force
@@ -131,14 +131,14 @@ class RigidBody(Component, flat=True):
 
     def apply_impulse(self, impulse: Vector | float, *, at: None = None) -> None:
         """Change the velocity at once by impulse / mass; (d,) N s. Kinematic and static bodies do not react. TypeError
-        if it is to act elsewhere than at the centre: see ``Spin.apply_impulse``."""
+        for a point ``at`` which it is to act: see :meth:`Spin.apply_impulse`."""
         if at is not None:
             raise TypeError(AT_A_POINT.format("apply_impulse"))
         if self.kind == "dynamic":
             self.linear_velocity = self.linear_velocity + self._vector(IMPULSE, impulse) / self._own_mass()
 
     def apply_force(self, force: Vector | float, *, at: None = None) -> None:
-        """Push with ``force``, (d,) N; TypeError as of :meth:`apply_impulse`.
+        """Push with ``force``, (d,) N; TypeError for a point ``at`` which it is to act, as of :meth:`apply_impulse`.
 
         Inside a system: for that step, or for the next one if this step has moved the bodies already. Outside: in
         every step of the next ``step()`` or ``advance()`` that takes one. Forces of one frame add up; those of a frame

@@ -105,27 +105,28 @@ class Spin(Component):
         self._turn(self._checked(TORQUE, torque))
 
     def apply_force(self, force: Vector, at: Vector) -> None:
-        """Push with ``force``, (d,) N, at a point of the world, (d,) m."""
+        """Push with ``force``, (d,) N, at the point ``at`` of the world, (d,) m."""
         push, arm = self._checked(FORCE, force), self._arm(at)
         self._turn(self._checked(FORCE_AT, _cross(arm, push)))  # first: this may be refused
         self._handle(RigidBody).apply_force(push)
 
     def apply_impulse(self, impulse: Vector, at: Vector) -> None:
-        """Change both velocities at once by an impulse, (d,) N s, at a point of the world, (d,) m."""
+        """Change both velocities at once by an ``impulse``, (d,) N s, at the point ``at`` of the world, (d,) m."""
         push, arm, body = self._checked(IMPULSE, impulse), self._arm(at), self._handle(RigidBody)
         if body.kind == "dynamic":
             self.angular_velocity = self.angular_velocity + self._turned_by(_cross(arm, push))  # may be refused
             body.apply_impulse(push)
 
     def velocity_at(self, point: Vector) -> np.ndarray:
-        """(d,) m/s: the velocity of the body's point that is there."""
+        """(d,) m/s: the velocity of the body at ``point``, (d,) m in the world."""
         arm, w = self._arm(point), self.angular_velocity
         turned = np.cross(w, arm) if np.ndim(w) else w * np.array((-arm[1], arm[0]))
         return self._handle(RigidBody).linear_velocity + turned
 
     @property
     def moments(self) -> Angular:
-        """kg m^2: the inertia about the body's position; in 3D (3, 3), along its own axes."""
+        """kg m^2: the inertia about the body's position; in 3D (3, 3), along its own axes. CaromError if none is given
+        and no collider tells it."""
         given, store = self.inertia, self._in_world()
         if given is not None:
             return np.diag(given) if np.ndim(given) else float(given)

@@ -26,10 +26,10 @@ def _turn_at_once(table: Any, row: int) -> None:
 
 
 class Transform(Component, flat=True):
-    """Position in metres, (d,), and rotation: an angle in radians in 2D, a unit quaternion (w, x, y, z) in 3D.
+    """Position, (d,) m, and rotation: an angle in 2D, rad, a unit quaternion (w, x, y, z) in 3D.
 
     Rotation is set by the game, or by a Spin; it enlarges boxes and turns offsets. Assigning ``position`` is a
-    teleport. For a dynamic or kinematic body ``position`` is a writable view.
+    teleport; a single number is a ValueError. For a dynamic or kinematic body ``position`` is a writable view.
     """
 
     __slots__ = ()
@@ -47,6 +47,7 @@ class Transform(Component, flat=True):
 
     @property
     def x(self) -> float:
+        """m, the position along the first axis; may be set."""
         return self._get(0)
 
     @x.setter
@@ -55,6 +56,7 @@ class Transform(Component, flat=True):
 
     @property
     def y(self) -> float:
+        """m, along the second axis."""
         return self._get(1)
 
     @y.setter
@@ -63,7 +65,7 @@ class Transform(Component, flat=True):
 
     @property
     def z(self) -> float:
-        """3D only; IndexError in 2D."""
+        """m, along the third axis; IndexError in 2D."""
         return self._get(2)
 
     @z.setter
@@ -83,12 +85,12 @@ class Transform(Component, flat=True):
 
     @property
     def interpolated_position(self) -> np.ndarray:
-        """(d,) between the last two steps, by ``world.alpha``: the position to draw."""
+        """(d,) m between the last two steps, by ``world.alpha``: the position to draw."""
         return self._interpolated("position")
 
     @property
     def interpolated_rotation(self) -> float | np.ndarray:
-        """The rotation to draw, of a body that turns by its Spin: an angle in 2D, (4,) in 3D."""
+        """The rotation to draw, of a body that turns by its Spin: rad in 2D, (4,) in 3D."""
         found = self._interpolated("rotation")
         return found if found.ndim else float(found)
 
