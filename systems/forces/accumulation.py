@@ -84,7 +84,8 @@ class ForceAccumulation(StagedSystem):
         return len(systems), bool(systems) and any(Spin in system.requires for system in systems)
 
     def add_systems(self, time: float) -> None:
-        """Let each force system add to ``force``: in place where all bodies have what it requires, else to copies."""
+        """Let each force system add to ``force`` at that ``time``, s: in place where all bodies have what it requires,
+        else to copies. CaromError if one adds to torques and does not require Spin."""
         torque = self._table.arrays.get("torque")
         if torque is not None:
             torque[...] = 0.0

@@ -131,6 +131,7 @@ class Integration(StagedSystem):
 
     @property
     def integrator(self) -> Integrator:
+        """The one of :attr:`integrator_name`."""
         make: Any = Flight
         if self._world.settings.collision != "event_driven":  # another one may be registered under the name at any time
             make = self._registry.integrators[self._world.settings.integrator]

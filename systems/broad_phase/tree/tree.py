@@ -90,16 +90,16 @@ class SpatialTree:
             run("finish_tree", record)
 
     def shift_rows(self, by: int) -> None:
-        """The same boxes are those of rows further on by that many; until the next build."""
+        """Until the next build the boxes are those of rows higher ``by`` that many."""
         self.rows[:] += by
 
     @property
     def rows(self) -> Rows:
-        """The boxes' rows, in the tree's order."""
+        """(count,) the boxes' rows, in the tree's order."""
         return self.record.order[: self.count]
 
     def pairs_within(self, limit: int = CANDIDATE_LIMIT) -> tuple[Rows, Rows]:
-        """Rows (first, second) of all pairs whose boxes overlap; each pair once, no order within a pair.
+        """Rows (k,) and (k,) of all pairs whose boxes overlap; each pair once, no order within a pair.
 
         The arrays are views that hold until the next call. CandidateLimitError if there are more than ``limit``
         candidates.
@@ -112,9 +112,9 @@ class SpatialTree:
         return self._pairs("within", self, limit, wanted)
 
     def pairs_between(self, other: SpatialTree, limit: int = CANDIDATE_LIMIT) -> tuple[Rows, Rows]:
-        """Rows (of self, of other) of all overlapping pairs between two trees; cheap if either is small.
+        """Rows (k,) of self and (k,) of ``other`` of all overlapping pairs of both trees; cheap if either is small.
 
-        Views and errors as in :meth:`pairs_within`.
+        Views, ``limit`` and errors as in :meth:`pairs_within`; ValueError for a tree of other dimensions.
         """
         if self.dimensions != other.dimensions:
             raise ValueError(f"trees of {self.dimensions} and {other.dimensions} dimensions")
