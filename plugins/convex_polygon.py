@@ -86,7 +86,7 @@ class ConvexPolygonCollider(Collider):
 
     @classmethod
     def box(cls, half_extents: Any, **common: Any) -> Self:
-        """A box that turns with the Transform; ``half_extents`` (2,) or one number, above 0."""
+        """A box that turns with the Transform; ``half_extents``: (2,) m or one number, ValueError if not above 0."""
         half = np.asarray(half_extents, float)
         if half.shape not in ((), (2,)) or not (np.isfinite(half).all() and (half > 0.0).all()):
             raise ValueError(
@@ -96,7 +96,10 @@ class ConvexPolygonCollider(Collider):
 
     @classmethod
     def regular(cls, n: int, radius: float, **common: Any) -> Self:
-        """A regular polygon of n corners on a circle; the first corner is on the x axis."""
+        """A regular polygon of ``n`` corners on a circle of ``radius`` m, the first on the x axis.
+
+        ValueError if ``n`` is below 3 or the radius not above 0.
+        """
         try:
             count = operator.index(n)
         except TypeError:

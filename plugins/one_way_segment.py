@@ -40,7 +40,7 @@ class OneWaySegmentCollider(Collider):
     """A segment that stops what comes from its front and lets everything else pass; in 2D worlds.
 
     start, end
-        (2,) m, relative to the centre, turned with the Transform
+        (2,) m, relative to the centre, turned with the Transform; ValueError if they are equal
     front
         the solid side, as seen along the direction from start to end: ``"left"`` or ``"right"``
     """

@@ -18,7 +18,7 @@ class Physics(Plugin):
     """Linear mechanics of spheres and axis-aligned boxes.
 
     dimensions
-        2 or 3
+        2 or 3; ValueError for others
     gravity
         (d,) m/s^2; 0 for none
     """

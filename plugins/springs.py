@@ -110,6 +110,7 @@ class Springs(Plugin):
             self.system(lambda kind=kind: kind(self))
 
     def install(self, world: World) -> None:
+        """Called by the world; ValueError if these springs are in another one that is not closed."""
         if world.physics is None:
             raise NoPhysicsError("springs need physics before them: World(Physics(...), springs)")
         if self.world is not None and not self.world.closed:
@@ -126,7 +127,9 @@ class Springs(Plugin):
         """Connect two bodies with a spring; see :class:`Spring`. It acts from the next evaluation of forces on.
 
         rest_length
-            None: the present distance of the two
+            m; None: the present distance of the two
+        stiffness, damping, only_pulls
+            fields of the spring
 
         ValueError if an entity is not a body, if both are the same, or if a number is out of range.
         """

@@ -67,6 +67,7 @@ class Joints(Plugin):
         self.world: World | None = None
 
     def install(self, world: World) -> None:
+        """Called by the world; ValueError if these joints are in another one that is not closed."""
         if world.physics is None:
             raise NoPhysicsError("joints need physics before them: World(Physics(...), Joints())")
         if self.world is not None and not self.world.closed:
@@ -124,7 +125,7 @@ class Joints(Plugin):
         return self._columns(present, found, slice(0, self._record.count))
 
     def anchors(self) -> tuple[np.ndarray, np.ndarray]:
-        """(n, d) where the anchors of all joints are, on each a and on each b: to draw ropes and hinges."""
+        """(n, d) m, where the anchors of all joints are, on each a and on each b: to draw ropes and hinges."""
         return anchors(self._physics.table, self._present().values())
 
     def _present(self) -> dict[int, Joint]:
@@ -321,7 +322,7 @@ class Joints(Plugin):
         return None if kind is None else self._contents.components_of(entity)[kind]
 
     def note(self, joint: Joint, names: Iterable[str]) -> None:
-        """Fields of a joint were set: its rows follow at once, unless a step runs or bodies have to wake for it.
+        """The fields ``names`` of a joint were set: its rows follow at once, unless a step runs or bodies have to wake.
         Vectors that the game has got show it."""
         if joint.attached and type(joint) in KINDS and not (self._physics.table.in_step or self._physics.sleepers.on):
             self._take(joint.entity, joint)
@@ -336,7 +337,7 @@ class Joints(Plugin):
                 self._given_away[joint.entity, name] = array, array.tobytes()
 
     def watch(self, joint: Joint, name: str, array: np.ndarray) -> None:
-        """The game has got a vector of a joint."""
+        """The game has got ``array``, the vector ``name`` of a joint, and may write into it."""
         if (joint.entity, name) not in self._given_away:
             self._given_away[joint.entity, name] = array, array.tobytes()
 

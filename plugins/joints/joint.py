@@ -24,7 +24,21 @@ LEAST = 1e-100  # of an axis, whose square is taken
 
 
 class Row(NamedTuple):
-    """One row of a joint, as the record ``Joints`` has it."""
+    """One row of a joint, as the record ``Joints`` has it.
+
+    kind, rule
+        what its value is, in joints of plugins CUSTOM; what is done about it: HOLD, LIMIT, DRIVE, SERVO, SPRING, FREE
+    low, high
+        m or rad: the least and the most; or where the value is held, ``low``
+    target, most
+        m/s or rad/s: how fast a DRIVE changes it; N or N m at most
+    frequency, damping_ratio
+        Hz, of a SPRING; 1 where it just does not swing
+    axis, ends
+        along the axes of a, of what slides or turns; of angles in space unit vectors along the axes of a and of b
+    part
+        of a CUSTOM: which row of its function, from 0
+    """
 
     kind: int
     rule: int
@@ -34,9 +48,9 @@ class Row(NamedTuple):
     most: float = math.inf
     frequency: float = 0.0
     damping_ratio: float = 0.0
-    axis: Any = None  # along the axes of a, of what slides or turns
-    ends: Any = None  # of angles in space: unit vectors along the axes of a and of b
-    part: int = 0  # of a CUSTOM: which row of its function
+    axis: Any = None
+    ends: Any = None
+    part: int = 0
 
 
 class Place(NamedTuple):
@@ -83,8 +97,10 @@ def optional(**options: Any) -> Any:
 class Joint(Component, abstract=True):
     """What all joints have.
 
+    a, b
+        entities of two bodies; None: the world
     collide_connected
-        whether the two bodies may touch
+        whether the two may touch
     breaking_force, breaking_torque
         N, N m, or None: the joint is gone after a step in which its mean force or torque was higher, and joint_broken
         is sent
@@ -135,11 +151,12 @@ class Joint(Component, abstract=True):
 
     @classmethod
     def of_plugin(cls, plugin: Any) -> OwnJoint:
-        """Called by :meth:`carom.framework.Plugin.joint`."""
+        """Called by :meth:`carom.framework.Plugin.joint` of that ``plugin``."""
         return own_joint(plugin, cls)
 
     @classmethod
     def many(cls, *args: Any, **values: Any) -> Any:
+        """TypeError: each joint is created by itself."""
         raise TypeError(f"joints are created one by one: world.create_entity({cls.__name__}(...))")
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -183,7 +200,7 @@ class Joint(Component, abstract=True):
             taken.note(self, values)
 
     def let_go(self, names: Set[str]) -> None:
-        """These fields were set: the joint takes hold anew."""
+        """Attach again at the next step, because the fields ``names`` were set."""
         self.keep(attached=False)
 
     def check_ends(self) -> None:
@@ -246,13 +263,14 @@ class Joint(Component, abstract=True):
         self.check_apart(contents, entity)
 
     def check_apart(self, contents: Any, entity: int | None) -> None:
-        """ValueError if both are parts of one body, or one is a part of the other."""
+        """ValueError if in ``contents`` both are parts of one body, or one is a part of the other."""
         if WORLD not in (self.a, self.b) and whole_body(contents, self.a) == (body := whole_body(contents, self.b)):
             name = f"{'' if entity is None else f'entity {entity}: '}{type(self).__name__}"
             raise ValueError(f"{name} joins entity {self.a} and entity {self.b}, which are both of one body, {body}")
 
     def in_order(self, name: str, low: float | None, high: float | None) -> tuple[float, float]:
-        """Two limits, none where they are None; ValueError if the first is the larger, or one is no number."""
+        """The limits ``low`` and ``high``, in the unit of field ``name``; None: no limit. ValueError if ``low`` is the
+        larger, or one is no number."""
         try:
             least, most = -math.inf if low is None else float(low), math.inf if high is None else float(high)
         except (TypeError, ValueError, OverflowError):
@@ -262,18 +280,18 @@ class Joint(Component, abstract=True):
         return least, most
 
     def attach(self, a: Place, b: Place) -> None:
-        """The bodies stand where the joint takes hold of them."""
+        """Keep what :meth:`rows` needs of where both bodies are when the joint begins to act."""
 
     def rows(self, dimensions: int) -> list[Row]:
         """The rows that it is now. A joint of a plugin keeps the value of its first row, unless it says otherwise."""
         return [Row(CUSTOM, HOLD, self.start)]
 
     def hold(self, a: Place, b: Place, anchor: Any) -> None:
-        """Anchors at a point of the world."""
+        """Keep ``anchor``, (d,) m in the world, as the anchor on both."""
         self.keep(at_a=self.local(a, self.a, anchor), at_b=self.local(b, self.b, anchor), start=b.angle - a.angle)
 
     def local(self, place: Place, body: int | None, point: Any) -> np.ndarray:
-        """A point of the world, along the axes of a body that stands there; ValueError if it is too far away."""
+        """(d,) m: a ``point`` of the world along the axes of a ``body`` at ``place``; ValueError if too far away."""
         at = place.local(point)
         if body != WORLD and np.abs(at).max() > FARTHEST:
             raise ValueError(
@@ -283,7 +301,7 @@ class Joint(Component, abstract=True):
         return at
 
     def hold_axis(self, a: Place, b: Place, axis: Any) -> None:
-        """In space, an axis of both."""
+        """In 3D, keep ``axis`` as the axis of both."""
         if len(a.position) == 2:
             return
         axis = np.asarray(axis, float) / np.linalg.norm(axis)
@@ -330,7 +348,7 @@ def ends_of(name: str) -> property:
     """The property of that name: the fields ``lower`` and ``upper``."""
 
     def get(self: Any) -> tuple[float | None, float | None] | None:
-        """The least and the most, None where there is no limit."""
+        """(least, most) in the unit of ``lower`` and ``upper``; None where there is no limit."""
         return None if self.lower is self.upper is None else (self.lower, self.upper)
 
     def put(self: Any, value: Any) -> None:
@@ -341,7 +359,15 @@ def ends_of(name: str) -> property:
 
 
 class Driven(Joint, abstract=True):
-    """What has limits, a motor and a spring of its one free value."""
+    """What has limits, a motor and a spring of its one free value.
+
+    lower, upper, rest
+        m or rad: from where to where it may go, None: any; and where the spring draws it to
+    motor_speed
+        m/s or rad/s; None: no motor
+    frequency, damping_ratio
+        Hz, of the spring, None: none; 1 where it just does not swing
+    """
 
     __slots__ = ()
 
@@ -367,7 +393,7 @@ class Driven(Joint, abstract=True):
         self.in_order("limits", self.lower, self.upper)
 
     def moving(self, row: Row, most: float | None, driven: Row | None = None) -> list[Row]:
-        """The rows that drive the value, which is 0 at ``row.low``, or that of another row, with ``most``, are its
+        """The rows that drive the value, which is 0 at ``row.low``, or that of ``driven``, with ``most``, are its
         spring, or limit it."""
         rows, limits = [], self.in_order("limits", self.lower, self.upper)
         if self.motor_speed is not None:

@@ -34,8 +34,8 @@ class Distance(Joint):
     a, b
         entities of two bodies; None: the world
     point_a, point_b
-        where it holds each of them, in the world, where the bodies are when the world takes the joint; None: at the
-        position of the body
+        (d,) m, where it holds each of them, in the world, where the bodies are when the world takes the joint; None: at
+        the position of the body
     length
         m; None: the distance when the world takes the joint. Two numbers, the least and the most: (0, 2) is a rope
     frequency, damping_ratio
@@ -115,7 +115,7 @@ class Hinge(Driven):
     a, b
         entities of two bodies; None: the world
     anchor
-        the point, where the bodies are when the world takes the joint
+        (d,) m, the point, where the bodies are when the world takes the joint
     axis
         in space, the direction of the axis, in the world as they are then
     limits
@@ -152,7 +152,7 @@ class Hinge(Driven):
 
 
 class Ball(Joint):
-    """Two bodies that keep a common point, and turn as they like."""
+    """Two bodies, a and b, that keep a common point and turn freely; ``anchor``: (d,) m, where it is in the world."""
 
     __slots__ = ()
 
@@ -168,7 +168,7 @@ class Ball(Joint):
 
 
 class Weld(Joint):
-    """Two bodies that stay as they are to each other; ``anchor`` is a point of the world where they are held."""
+    """Two bodies, a and b, fixed to each other; ``anchor``: (d,) m, where they are joined in the world."""
 
     __slots__ = ()
 
@@ -231,7 +231,7 @@ class Wheel(Driven):
     """A wheel b on a car a: its anchor slides along an axis of a, on a spring, and it turns about the anchor.
 
     anchor
-        the middle of the wheel, where the bodies are when the world takes the joint
+        (d,) m, the middle of the wheel, where the bodies are when the world takes the joint
     direction
         along which the anchor moves, in the world, as the bodies are then
     axis
@@ -324,7 +324,7 @@ class Cone(Joint):
     within ``twist``: a shoulder.
 
     anchor, axis
-        of both, in the world as they are when the world takes the joint
+        (3,) m and (3,), of both, in the world as they are when the world takes the joint
     swing
         rad, at most pi
     twist
@@ -368,14 +368,16 @@ class Cone(Joint):
 
 
 class MousePull(Joint):
-    """Pulls a body, at the point where it was taken, to a place that moves.
+    """Pulls a body b, at the point where it was taken, to a place that moves.
 
     grip
-        the point of the world where the body is taken
+        (d,) m, the point of the world where the body is taken
     target
-        where to; set it at any time
+        (d,) m, where to; set it at any time
     max_force
         N; None: no limit
+    frequency, damping_ratio
+        Hz, and 1 where it just does not swing, of the spring that pulls
     """
 
     __slots__ = ()

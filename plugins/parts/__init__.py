@@ -39,6 +39,7 @@ class Parts(Plugin):
         self.world: World | None = None
 
     def install(self, world: World) -> None:
+        """Called by the world; ValueError if these parts are in another one that is not closed."""
         if world.physics is None:
             raise NoPhysicsError("parts need physics before them: World(Physics(...), Parts())")
         if self.world is not None and not self.world.closed:

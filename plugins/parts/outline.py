@@ -38,7 +38,8 @@ class Outline(NamedTuple):
 
 
 def parts_from_outline(points: Any) -> Outline:
-    """The convex pieces of an outline, (n, 2) m, in either order; ValueError if it is none, or crosses itself."""
+    """The convex pieces of an outline of ``points``, (n, 2) m, in either order; ValueError if it is none, or crosses
+    itself. ImportError without the extra ``outlines``."""
     try:
         import mapbox_earcut  # pyright: ignore[reportMissingImports]
     except ImportError as error:

@@ -25,6 +25,7 @@ def create_chain(
     **material: Unpack[MaterialFields],
 ) -> range:
     """Create the segments of a polyline, solid on its right; the ids of their entities, which are consecutive.
+    ValueError if it is none, or the world is not 2D.
 
     points
         (n, 2) m, relative to ``position``; ground is drawn from left to right, an island clockwise, a cave

@@ -26,7 +26,8 @@ def create_triangle_mesh(
     position: Vector = (0.0, 0.0, 0.0),
     **material: Unpack[MaterialFields],
 ) -> range:
-    """Create the triangles of a mesh; the ids of their entities, which are consecutive.
+    """Create the triangles of a mesh; the ids of their entities, which are consecutive. ValueError if they are none, or
+    the world is not 3D.
 
     vertices
         (n, 3) m, relative to ``position``; equal ones are one corner
@@ -61,7 +62,8 @@ def create_height_field(
     position: Vector = (0.0, 0.0, 0.0),
     **material: Unpack[MaterialFields],
 ) -> range:
-    """Create ground whose height, y, is given on a grid, two triangles for each cell; ids as of a mesh.
+    """Create ground whose height, y, is given on a grid, two triangles for each cell; ``thickness``, ``position``,
+    ``material``, ids and ValueError as of :func:`create_triangle_mesh`.
 
     heights
         (rows, columns) m: [i, j] is the height at x = i cell, z = j cell, from ``position``; solid below

@@ -42,7 +42,7 @@ class ChainSegmentCollider(Collider):
     """A segment of a static polyline in a 2D world, solid on the right of the way from start to end.
 
     start, end
-        (2,) m, relative to the centre; not turned with the Transform
+        (2,) m, relative to the centre; not turned with the Transform; ValueError if they are equal
     before, after
         (2,) m, the polyline's points before start and after end; the same as these where it ends
     thickness

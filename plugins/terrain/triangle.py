@@ -31,7 +31,7 @@ class TerrainTriangleCollider(Collider):
     """A static triangle in a 3D world, solid behind its front.
 
     a, b, c
-        (3,) m, the corners relative to the centre, counter-clockwise as seen from the front
+        (3,) m, the corners relative to the centre, counter-clockwise as seen from the front; ValueError if on a line
     beyond_ab, beyond_bc, beyond_ca
         (3,) m, the third corner of the triangle on the other side of an edge; where there is none, a, b or c
     thickness

@@ -27,10 +27,10 @@ MANY = 1000  # the same: more make the whole array again
 
 
 def cells_of_text(text: str | Iterable[str], *, empty: str = EMPTY) -> np.ndarray:
-    """Cells of a map drawn as text, lines from top to bottom: a tile for every character that is not in ``empty``.
+    """Cells (rows, columns) of a map drawn as text, from top to bottom: a tile for every character not in ``empty``.
 
     Lines may have different lengths. For a string, empty lines before the first and after the last line are removed,
-    and so is the common indentation.
+    and so is the common indentation. ValueError if no cell is left.
     """
     if isinstance(text, str):
         lines = textwrap.dedent(text).splitlines()

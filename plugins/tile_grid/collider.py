@@ -35,8 +35,8 @@ class TileGridCollider(Collider):
     faces
         ``"all"``; ``"floors"``: floors and ceilings only; ``"walls"``: walls only, see :meth:`floors_and_walls`
     lower
-        (2,) m, the map's lower left corner relative to the Transform's position; None: the map's centre is at
-        ``offset``
+        (2,) m, the map's lower left corner relative to the Transform's position, in place of ``offset``: ValueError for
+        both; None: the map's centre is at ``offset``
     """
 
     __slots__ = ()
@@ -69,7 +69,7 @@ class TileGridCollider(Collider):
 
     @classmethod
     def floors_and_walls(cls, cells: Any, tile_size: float, **common: Unpack[ColliderFields]) -> tuple[Self, Self]:
-        """The map as two colliders, for two entities: its floors and ceilings, and its walls.
+        """The map of ``cells`` and ``tile_size`` as two colliders, for two entities: floors and ceilings, and walls.
 
         Two bodies have only one contact. A body that is pushed against a wall and stands on the floor needs two, so
         that it stands still; two entities provide them. Both colliders share their memory.
@@ -134,7 +134,8 @@ class TileGridCollider(Collider):
         return ValueError(f"{whose}TileGridCollider.set: {rule}")
 
     def centre_of(self, row: int, column: int) -> np.ndarray:
-        """(2,) m, the centre of a cell, relative to the Transform's position; row 0 is the top one."""
+        """(2,) m, the centre of the cell at ``row`` (0 is the top one) and ``column``, relative to the Transform's
+        position; ValueError outside of the map."""
         rows, columns = self._shape()
         if not (0 <= row < rows and 0 <= column < columns):
             raise ValueError(f"TileGridCollider.centre_of: the map has {rows} rows and {columns} columns, "
