@@ -35,7 +35,8 @@ def ball(
     world: World, position: Any, velocity: Any = 0.0, *, radius: float = 0.5, mass: float = 1.0, kind: Any = "dynamic",
     **collider: Any,
 ) -> int:  # fmt: skip
-    """Create a ball; returns its entity. position, velocity: (d,), or a number on the first axis; collider: fields."""
+    """Create a ball; returns its entity. position, velocity: (d,) m and m/s, or a number on the first axis; radius: m;
+    mass: kg; kind: as of a RigidBody; collider: more fields of the collider."""
     body = RigidBody(mass, _place(world, velocity), kind=kind)
     return world.create_entity(Transform(_place(world, position)), body, SphereCollider(radius, **collider))
 
@@ -44,14 +45,15 @@ def box(
     world: World, position: Any, velocity: Any = 0.0, *, half: Any = 0.5, mass: float = 1.0, kind: Any = "dynamic",
     rotation: Any = 0.0, **collider: Any,
 ) -> int:  # fmt: skip
-    """Create a box; returns its entity. half: half extents, (d,) or one number for all axes; else as :func:`ball`."""
+    """Create a box; returns its entity. half: half extents, (d,) m or one number for all axes; rotation: as of a
+    Transform; position, velocity, mass, kind and collider as of :func:`ball`."""
     half = tuple(half) if np.ndim(half) else (half,) * (world.dimensions or 2)
     body = RigidBody(mass, _place(world, velocity), kind=kind)
     return world.create_entity(Transform(_place(world, position), rotation), body, AABBCollider(half, **collider))
 
 
 def floor(world: World, restitution: float = 0.0, **collider: Any) -> int:
-    """Create a static box, 2 km wide, with its top at y = 0; returns its entity."""
+    """Create a static box, 2 km wide, with its top at y = 0; returns its entity. restitution, collider: its fields."""
     half, centre = FLOOR_HALF[: world.dimensions], (0.0, -0.5, 0.0)[: world.dimensions]
     return world.create_entity(Transform(centre), AABBCollider(half, restitution=restitution, **collider))
 
@@ -67,7 +69,7 @@ def velocity(world: World, entity: int) -> Floats:
 
 
 def run(world: World, steps: int, *checks: Check) -> None:
-    """Take that many steps; each check, such as ``Conserved(world).check``, is called after every step."""
+    """Take that many steps; after each all ``checks``, as ``Conserved(world).assert_energy``, are called."""
     for _ in range(steps):
         world.step()
         for check in checks:
