@@ -77,7 +77,7 @@ class SemiImplicitEuler(Integrator):
 
 
 class VelocityVerlet(Integrator):
-    """Second order, symplectic; for velocity-dependent forces the velocity at the end is predicted by v + a dt."""
+    """Second order, symplectic (Swope et al. 1982); forces that depend on velocity see v + a dt at the end."""
 
     order, evaluations, path = 2, 2, PARABOLA
     STAGES = ("verlet_drift",)
