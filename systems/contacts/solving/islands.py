@@ -196,8 +196,8 @@ def choose_substeps(solver, t, usual, dt):
 
     Its contacts may have to bear its heaviest body: the sag under that falls with the square of the substeps, the depth
     of an impact with 1 / substeps. Where the own weight of bodies asks for too many, contacts are rigid. Loads beyond
-    MOST_SUBSTEPS are capped, see ``load_share``. From masses, not from impulses, which would change with the substeps; by
-    factors of two, so that it seldom changes. Light bodies whose joints bear heavy ones swing fast.
+    MOST_SUBSTEPS are capped, see ``load_share``. From masses, not from impulses, which would change with the substeps;
+    by factors of two, so that it seldom changes. Light bodies whose joints bear heavy ones swing fast.
     """
     sag, least = SAG * solver.most_change[t] * dt, usual
     while MOST_SWAY * float(least * least) < sag * solver.sway[t] and 2 * least <= LEAST_WORK_SUBSTEPS:
