@@ -20,7 +20,7 @@ GROUPS: dict[str, tuple[Stage, ...]] = {
 }
 
 
-@click.command("stages", short_help="List the stages of a step: what each reads and writes, where its code is.")
+@click.command("stages", short_help="List the stages of a step: what each does, and when.")
 @into_option
 def stages_command(into: Path | None) -> None:
     """List all stages of a step in their order. A scene runs those that it needs: ``carom plan`` shows which."""
@@ -30,18 +30,11 @@ def stages_command(into: Path | None) -> None:
         replace_between_marks(into, "studies stages", table().markdown())
 
 
-def file_of(stage: Stage) -> str:
-    """Where its code is."""
-    return stage.function.__module__.removeprefix("carom.").replace(".", "/") + ".py"
-
-
 def table() -> TextTable:
     """One row for each stage."""
-    headings = ("system", "stage", "what it does", "linked for", "reads", "writes", "code")
     rows = [
-        (group, stage.name, f"{stage.why} (when {stage.when})" if stage.when else stage.why,
-         stage.needed or "every world", ", ".join(stage.reads), ", ".join(stage.writes), file_of(stage))
+        (group, stage.name, stage.why, ", when ".join(filter(None, (stage.needed or "every world", stage.when))))
         for group, stages in GROUPS.items()
         for stage in stages
-    ]  # fmt: skip
-    return TextTable("The stages of a step, in order", headings, rows, words=len(headings))
+    ]
+    return TextTable("The stages of a step, in order", ("system", "stage", "what it does", "for"), rows, words=4)
