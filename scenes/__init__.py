@@ -1,7 +1,8 @@
 """carom.scenes: one library of scenes for tests, benchmarks, the lab and demonstrations.
 
-Every scene follows one protocol, ``build(settings, seed=0) -> World``; ``settings=None`` selects the scene's
-own default. A file given to ``carom run FILE.py`` follows the same protocol.
+Each is a module as ``carom run FILE.py`` takes it: ``build(settings, seed=0) -> World``, where ``settings=None``
+selects the scene's own default, ``SECONDS``, ``VIEW`` and perhaps ``SETTINGS``. A copy of the file is a scene of one's
+own.
 
 The scenes are in folders by subject: motion, impacts, gases, rest, levels, turning and joined. All can be imported from
 here.
@@ -19,52 +20,13 @@ from .protocol import Build, Scene
 from .rest import few, pile, pile2d, pile3d, pyramid, stack
 from .turning import billiards_spin, dominoes, flipper, hills, pieces, rubble, tumbler
 
-_SCENES: dict[str, Scene] = {
-    scene.name: scene
-    for scene in (
-        jump.SCENE,
-        asteroids.SCENE,
-        billiards.SCENE,
-        gas2d.SCENE,
-        gas3d.SCENE,
-        mixed2d.SCENE,
-        fastgas.SCENE,
-        bullets.SCENE,
-        shots.SCENE,
-        player.SCENE,
-        player_query.SCENE,
-        maze.SCENE,
-        static_world.SCENE,
-        freefall.SCENE,
-        pile2d.SCENE,
-        pile3d.SCENE,
-        pyramid.SCENE,
-        stack.SCENE,
-        few.SCENE,
-        platforms.SCENE,
-        conveyor.SCENE,
-        lift.SCENE,
-        cradle.SCENE,
-        galperin.SCENE,
-        spring.SCENE,
-        orbit.SCENE,
-        bouncing.SCENE,
-        oblique.SCENE,
-        thermal_gas.SCENE,
-        drops.SCENE,
-        billiards_spin.SCENE,
-        flipper.SCENE,
-        dominoes.SCENE,
-        tumbler.SCENE,
-        rubble.SCENE,
-        pieces.SCENE,
-        bridge.SCENE,
-        ragdoll.SCENE,
-        car.SCENE,
-        crane.SCENE,
-        hills.SCENE,
-    )
-}
+_MODULES = (
+    jump, asteroids, billiards, gas2d, gas3d, mixed2d, fastgas, bullets, shots, player, player_query, maze,
+    static_world, freefall, pile2d, pile3d, pyramid, stack, few, platforms, conveyor, lift, cradle, galperin, spring,
+    orbit, bouncing, oblique, thermal_gas, drops, billiards_spin, flipper, dominoes, tumbler, rubble, pieces, bridge,
+    ragdoll, car, crane, hills,
+)  # fmt: skip
+_SCENES = {scene.name: scene for scene in map(Scene.of, _MODULES)}
 
 
 def names() -> tuple[str, ...]:
@@ -81,48 +43,9 @@ def get(name: str) -> Scene:
 
 
 __all__ = [
-    "Build",
-    "Scene",
-    "asteroids",
-    "billiards",
-    "billiards_spin",
-    "bouncing",
-    "bridge",
-    "bullets",
-    "car",
-    "conveyor",
-    "cradle",
-    "crane",
-    "dominoes",
-    "drops",
-    "fastgas",
-    "flipper",
-    "freefall",
-    "galperin",
-    "gas2d",
-    "gas3d",
-    "get",
-    "hills",
-    "jump",
-    "lift",
-    "maze",
-    "mixed2d",
-    "names",
-    "oblique",
-    "orbit",
-    "pile",
-    "pile2d",
-    "pile3d",
-    "platforms",
-    "player",
-    "player_query",
-    "pyramid",
-    "ragdoll",
-    "rubble",
-    "shots",
-    "spring",
-    "stack",
-    "static_world",
-    "thermal_gas",
-    "tumbler",
-]
+    "Build", "Scene", "asteroids", "billiards", "billiards_spin", "bouncing", "bridge", "bullets", "car", "conveyor",
+    "cradle", "crane", "dominoes", "drops", "fastgas", "few", "flipper", "freefall", "galperin", "gas2d", "gas3d",
+    "get", "hills", "jump", "lift", "maze", "mixed2d", "names", "oblique", "orbit", "pieces", "pile", "pile2d",
+    "pile3d", "platforms", "player", "player_query", "pyramid", "ragdoll", "rubble", "shots", "spring", "stack",
+    "static_world", "thermal_gas", "tumbler",
+]  # fmt: skip

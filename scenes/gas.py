@@ -14,10 +14,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..components import RigidBody, SphereCollider, Transform
 from ..framework import Settings, World
 from ..plugins import Physics
-from .protocol import Scene
+from .bodies import add_spheres, lattice
 from .random_numbers import uniform
 from .sizes import ceil_root, whole
 from .walls import enclose
@@ -47,11 +46,9 @@ def initial_state(n: int, dimensions: int, seed: int = 0) -> tuple[NDArray[np.fl
     """Positions and velocities, (n, d) each: body k in cell (k mod m, k div m, ...) of m cells a side."""
     cells = ceil_root(n, dimensions)
     spacing = side(n, dimensions) / cells
-    index = np.arange(n)
-    cell = np.stack([index // cells**axis % cells for axis in range(dimensions)], axis=1)
     draws = uniform(n * 2 * dimensions, seed).reshape(n, 2, dimensions)  # per body: displacement, velocity
     jitter = 0.45 * (spacing - 2 * RADIUS)
-    positions = (cell + 0.5) * spacing + jitter * (2 * draws[:, 0] - 1)
+    positions = (lattice(n, cells, dimensions) + 0.5) * spacing + jitter * (2 * draws[:, 0] - 1)
     velocities = -5 + 10 * draws[:, 1]
     return positions, velocities
 
@@ -59,25 +56,8 @@ def initial_state(n: int, dimensions: int, seed: int = 0) -> tuple[NDArray[np.fl
 def empty_box(settings: Settings | None, n: int, dimensions: int, thickness: float = 1.0) -> World:
     """An empty world for ``n`` bodies, without gravity, with its elastic walls."""
     length = side(whole(n, "n"), dimensions)
-    settings = settings or Settings.balanced()
-    world = World(Physics(dimensions=dimensions, gravity=(0.0,) * dimensions), settings=settings)
+    world = World(Physics(dimensions=dimensions), settings=settings)
     enclose(world, (0.0,) * dimensions, (length,) * dimensions, thickness=thickness, restitution=1.0)
-    return world
-
-
-def add_spheres(world: World, positions: NDArray[np.float64], velocities: NDArray[np.float64]) -> None:
-    """Elastic discs or spheres, in the order of their positions (n, d)."""
-    world.create_entities(
-        len(positions),
-        Transform.many(positions),
-        RigidBody.many(mass=BODY_VOLUME[positions.shape[1]], linear_velocity=velocities),
-        SphereCollider.many(radius=RADIUS, restitution=1.0),
-    )
-
-
-def _gas(settings: Settings | None, seed: int, n: int, dimensions: int) -> World:
-    world = empty_box(settings, n, dimensions)
-    add_spheres(world, *initial_state(n, dimensions, seed))
     return world
 
 
@@ -86,5 +66,7 @@ def view(n: int, dimensions: int) -> tuple[tuple[float, ...], tuple[float, ...]]
     return (-1.0,) * dimensions, (side(n, dimensions) + 1.0,) * dimensions
 
 
-SCENE_2D = Scene("gas2d", "1,000 elastic discs in a square box", gas2d, 10.0, view(BODIES[2], 2))
-SCENE_3D = Scene("gas3d", "10,000 elastic spheres in a cube", gas3d, 5.0, view(BODIES[3], 3))
+def _gas(settings: Settings | None, seed: int, n: int, dimensions: int) -> World:
+    world = empty_box(settings, n, dimensions)
+    add_spheres(world, *initial_state(n, dimensions, seed), radius=RADIUS, mass=BODY_VOLUME[dimensions])
+    return world

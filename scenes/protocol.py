@@ -1,13 +1,12 @@
-"""The scene protocol: a function that builds a world, and the data needed to describe and draw it."""
+"""The scene protocol: a module with a function that builds a world, and the data needed to describe and draw it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
+from types import ModuleType
+from typing import Protocol, Self
 
 from ..framework import Settings, World
-
-USUAL = Settings()
 
 
 class Build(Protocol):
@@ -29,7 +28,14 @@ class Scene:
     build: Build
     seconds: float
     view: tuple[tuple[float, ...], tuple[float, ...]]
-    settings: Settings = USUAL
+    settings: Settings = field(default_factory=Settings)
+
+    @classmethod
+    def of(cls, module: ModuleType) -> Self:
+        """The scene of a module: the first line of its docstring, its build, SECONDS, VIEW and, if any, SETTINGS."""
+        name, description = module.__name__.rpartition(".")[2], (module.__doc__ or "").partition("\n")[0]
+        settings = getattr(module, "SETTINGS", Settings())
+        return cls(name, description.removesuffix("."), module.build, module.SECONDS, module.VIEW, settings)
 
     @property
     def dimensions(self) -> int:

@@ -1,14 +1,10 @@
-"""The elastic gas in 2D: discs in a square, see :mod:`carom.scenes.gas`."""
+"""1,000 elastic discs in a square box.
 
-from __future__ import annotations
+``n`` discs of :mod:`carom.scenes.gas`; ``seed`` chooses places and velocities.
+"""
 
-from ...framework import Settings, World
-from .. import gas
+from carom.scenes import gas
 
-
-def build(settings: Settings | None = None, seed: int = 0, *, n: int = gas.BODIES[2]) -> World:
-    """``n`` discs in a square; ``seed`` chooses places and velocities."""
-    return gas.gas2d(settings, seed, n=n)
-
-
-SCENE = gas.SCENE_2D
+SECONDS = 10.0
+VIEW = gas.view(gas.BODIES[2], 2)
+build = gas.gas2d

@@ -1,14 +1,10 @@
-"""The elastic gas in 3D: spheres in a cube, see :mod:`carom.scenes.gas`."""
+"""10,000 elastic spheres in a cube.
 
-from __future__ import annotations
+``n`` spheres of :mod:`carom.scenes.gas`; ``seed`` chooses places and velocities.
+"""
 
-from ...framework import Settings, World
-from .. import gas
+from carom.scenes import gas
 
-
-def build(settings: Settings | None = None, seed: int = 0, *, n: int = gas.BODIES[3]) -> World:
-    """``n`` spheres in a cube; ``seed`` chooses places and velocities."""
-    return gas.gas3d(settings, seed, n=n)
-
-
-SCENE = gas.SCENE_3D
+SECONDS = 5.0
+VIEW = gas.view(gas.BODIES[3], 3)
+build = gas.gas3d

@@ -1,21 +1,21 @@
-"""Queries: the gas of :mod:`carom.scenes.gases.gas2d` at rest, and places for queries.
+"""10,000 discs at rest, to ask what is where.
 
-Nothing moves, so all time is spent in the queries. ``places`` gives 1,000 points spread
-over the box.
+The start of :mod:`carom.scenes.gases.gas2d`, at rest, so all time is spent in the queries. ``places`` gives 1,000
+points spread over the box.
 """
-
-from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...framework import Settings, World
-from .. import gas
-from ..protocol import Scene
-from ..random_numbers import uniform
+from carom import Settings, World
+from carom.scenes import gas
+from carom.scenes.bodies import add_spheres
+from carom.scenes.random_numbers import uniform
 
 BODIES = 10_000
 QUERIES = 1000
+SECONDS = 1.0
+VIEW = gas.view(BODIES, 2)
 
 
 def places(n: int = BODIES, count: int = QUERIES, seed: int = 0) -> NDArray[np.float64]:
@@ -27,8 +27,5 @@ def build(settings: Settings | None = None, seed: int = 0, *, n: int = BODIES) -
     """``n`` discs at rest, at the start positions of the gas."""
     world = gas.empty_box(settings, n, 2)
     positions, velocities = gas.initial_state(n, 2, seed)
-    gas.add_spheres(world, positions, np.zeros_like(velocities))
+    add_spheres(world, positions, np.zeros_like(velocities), radius=gas.RADIUS, mass=gas.BODY_VOLUME[2])
     return world
-
-
-SCENE = Scene("player_query", "10,000 discs at rest, to ask what is where", build, 1.0, gas.view(BODIES, 2))

@@ -1,4 +1,4 @@
-"""A gas of elastic discs at a temperature: its averages are known from statistical mechanics.
+"""400 elastic discs at kT = 1, whose pressure is known from statistical mechanics.
 
 Unlike gas2d it starts with Maxwell's velocities at kT = 1 (mass 1), so it needs no warm-up: discs of diameter 1
 on a lattice that fill a fraction ``eta`` of a square. Pressure and collision rate show whether impacts are found at
@@ -7,26 +7,22 @@ eta = 0.3 the pressure is 2.063 n kT / area (virial series of hard discs, Clisby
 that the centres can reach, and each disc collides 2.4 times a second.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...components import RigidBody, SphereCollider, Transform
-from ...framework import Settings, World
-from ...plugins import Physics
-from ..protocol import Scene
-from ..sizes import floor_root, real, whole
-from ..walls import enclose
+from carom import Physics, Settings, World
+from carom.scenes.bodies import add_spheres, lattice
+from carom.scenes.sizes import floor_root, real, whole
+from carom.scenes.walls import enclose
 
 BODIES = 400
 ETA = 0.3
 RADIUS = 0.5
 THICKNESS = 10.0  # of the walls: enough for large steps of a discrete world
-
-SETTINGS = Settings.balanced().replace(collision="continuous")
+SETTINGS = Settings(collision="continuous")
+SECONDS = 100.0
 
 
 def side(n: int, eta: float) -> float:
@@ -34,12 +30,13 @@ def side(n: int, eta: float) -> float:
     return math.sqrt(n * math.pi / (4 * eta))
 
 
+VIEW = ((-1.0, -1.0), (side(BODIES, ETA) + 1.0, side(BODIES, ETA) + 1.0))
+
+
 def initial_state(n: int, eta: float, seed: int = 0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Positions and velocities, (n, 2) each: a square lattice, row by row; zero momentum, kinetic energy n."""
     per_row = floor_root(n, 2)
-    index = np.arange(n)
-    cells = np.stack([index % per_row, index // per_row], axis=1).astype(np.float64)
-    positions = (cells + 0.5) * (side(n, eta) / per_row)
+    positions = (lattice(n, per_row) + 0.5) * (side(n, eta) / per_row)
     velocities = np.random.default_rng(seed).normal(size=(n, 2))
     velocities -= velocities.mean(axis=0)
     velocities *= math.sqrt(2 * n / (velocities**2).sum())
@@ -56,25 +53,7 @@ def build(settings: Settings | None = None, seed: int = 0, *, n: int = BODIES, e
         raise ValueError(f"n must be a square number, got {n}")
     if eta > math.pi / 4:
         raise ValueError(f"eta must be at most pi / 4, where the discs of the lattice touch, got {eta!r}")
-    settings = settings or SETTINGS
-    world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings)
-    length = side(n, eta)
-    enclose(world, (0.0, 0.0), (length, length), thickness=THICKNESS, restitution=1.0)
-    positions, velocities = initial_state(n, eta, seed)
-    world.create_entities(
-        n,
-        Transform.many(positions),
-        RigidBody.many(mass=1.0, linear_velocity=velocities),
-        SphereCollider.many(radius=RADIUS, restitution=1.0),
-    )
+    world = World(Physics(dimensions=2), settings=settings or SETTINGS)
+    enclose(world, (0.0, 0.0), (side(n, eta), side(n, eta)), thickness=THICKNESS, restitution=1.0)
+    add_spheres(world, *initial_state(n, eta, seed), radius=RADIUS, mass=1.0)
     return world
-
-
-SCENE = Scene(
-    name="thermal_gas",
-    description="400 elastic discs at kT = 1, whose pressure is known",
-    build=build,
-    seconds=100.0,
-    view=((-1.0, -1.0), (side(BODIES, ETA) + 1.0, side(BODIES, ETA) + 1.0)),
-    settings=SETTINGS,
-)

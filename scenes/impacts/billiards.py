@@ -1,21 +1,16 @@
-"""The break in pool: a cue ball at 8 m/s into a rack of fifteen, seen from above, on a table without pockets.
+"""The break: a cue ball into a rack of fifteen.
 
-Sizes and masses of the real game, in metres and kilograms. Each impact loses 5 % of the approach speed, and the
-balls slow down on the cloth (by damping, the simplest approximation of rolling friction). The cue ball crosses
-its own radius in 1/280 s, hence the small time step.
+Sizes and masses of the real game, in metres and kilograms, seen from above, on a table without pockets. Each impact
+loses 5 % of the approach speed, and the balls slow down on the cloth (by damping, the simplest approximation of rolling
+friction). The cue ball crosses its own radius in 1/280 s, hence the small time step.
 """
-
-from __future__ import annotations
 
 import math
 
 import numpy as np
 
-from ...components import RigidBody, SphereCollider, Transform
-from ...framework import Settings, World
-from ...plugins import Physics
-from ..protocol import Scene
-from ..walls import enclose
+from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World
+from carom.scenes.walls import enclose
 
 LENGTH, WIDTH = 2.54, 1.27
 RADIUS = 0.028575
@@ -25,8 +20,9 @@ CUSHION = 0.06  # thickness
 CLOTH = 0.35  # 1/s
 BREAK_SPEED = 8.0
 GAP = 2e-4  # a real rack is never perfectly tight
-
-SETTINGS = Settings.balanced().replace(dt=1 / 960)
+SETTINGS = Settings(dt=1 / 960)
+SECONDS = 2.0
+VIEW = ((-CUSHION, -CUSHION), (LENGTH + CUSHION, WIDTH + CUSHION))
 
 
 def rack(seed: int = 0) -> np.ndarray:
@@ -42,10 +38,7 @@ def rack(seed: int = 0) -> np.ndarray:
 
 def build(settings: Settings | None = None, seed: int = 0) -> World:
     """Sixteen balls at the moment of the break; ``seed`` varies the rack by a tenth of a millimetre."""
-    world = World(
-        Physics(dimensions=2, gravity=(0.0, 0.0)),
-        settings=settings or SETTINGS,
-    )
+    world = World(Physics(dimensions=2), settings=settings or SETTINGS)
     enclose(world, (0.0, 0.0), (LENGTH, WIDTH), thickness=CUSHION, restitution=RESTITUTION)
     cue = np.array([[0.25 * LENGTH, WIDTH / 2 + 0.004]])  # a little off centre, as in a real break
     velocities = np.zeros((16, 2))
@@ -57,13 +50,3 @@ def build(settings: Settings | None = None, seed: int = 0) -> World:
         SphereCollider.many(radius=RADIUS, restitution=RESTITUTION),
     )
     return world
-
-
-SCENE = Scene(
-    name="billiards",
-    description="the break: a cue ball into a rack of fifteen",
-    build=build,
-    seconds=2.0,
-    view=((-CUSHION, -CUSHION), (LENGTH + CUSHION, WIDTH + CUSHION)),
-    settings=SETTINGS,
-)

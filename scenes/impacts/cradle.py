@@ -1,26 +1,24 @@
-"""Newton's cradle without the strings: equal elastic balls in a line; as many fly off as arrive.
+"""Newton's cradle: as many balls fly off as arrive.
 
-Each line is a separate experiment: of its five balls the first k arrive together at 1 m/s, the others are at rest.
-The impacts pass the velocity on from ball to ball, one at a time. In the end the last k fly off at 1 m/s and the
-others are at rest, for any gap between the balls, including none.
+Without the strings. Each line of equal elastic balls is a separate experiment: of its five balls the first k arrive
+together at 1 m/s, the others are at rest. The impacts pass the velocity on from ball to ball, one at a time. In the end
+the last k fly off at 1 m/s and the others are at rest, for any gap between the balls, including none.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from ...components import RigidBody, SphereCollider, Transform
-from ...framework import Settings, World
-from ...plugins import Physics
-from ..protocol import Scene
-from ..sizes import real, whole
+from carom import Physics, Settings, World
+from carom.scenes.bodies import add_spheres
+from carom.scenes.sizes import real, whole
 
 BALLS = 5
 APPROACH = 3.0  # metres, gap between the balls that arrive and those at rest
 BETWEEN_LINES = 2.0
 SPEED = 1.0
+SECONDS = 6.0
+VIEW = ((-8.0, -1.0), (7.0, 7.0))
 
 
 def build(
@@ -31,7 +29,7 @@ def build(
     ``gap``: metres between neighbours, both at rest and arriving; ``seed`` changes nothing.
     """
     gap = real(gap, "gap")
-    world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings or Settings.balanced())
+    world = World(Physics(dimensions=2), settings=settings)
     index = np.arange(BALLS)
     for line, value in enumerate(arriving):
         k = whole(value, "arriving")
@@ -41,19 +39,6 @@ def build(
         x = (index - k) * (1.0 + gap) - np.where(comes, APPROACH - gap, 0.0)
         velocities = np.zeros((BALLS, 2))
         velocities[comes, 0] = SPEED
-        world.create_entities(
-            BALLS,
-            Transform.many(np.stack([x, np.full(BALLS, BETWEEN_LINES * line)], axis=1)),
-            RigidBody.many(mass=1.0, linear_velocity=velocities),
-            SphereCollider.many(radius=0.5, restitution=1.0),
-        )
+        centres = np.stack([x, np.full(BALLS, BETWEEN_LINES * line)], axis=1)
+        add_spheres(world, centres, velocities, radius=0.5, mass=1.0)
     return world
-
-
-SCENE = Scene(
-    name="cradle",
-    description="Newton's cradle: as many balls fly off as arrive",
-    build=build,
-    seconds=6.0,
-    view=((-8.0, -1.0), (7.0, 7.0)),
-)

@@ -1,4 +1,4 @@
-"""Fast balls in lanes, one below the other, that show how each collision mode treats them.
+"""Fast balls in six lanes, which tell the kinds of collision apart.
 
 Each ball moves two metres in a step of 1/60 s and is half a metre wide. All shapes are elastic and there is no gravity,
 so the exact position of every ball is known. From the top:
@@ -14,13 +14,8 @@ so the exact position of every ball is known. From the top:
 Try ``--set collision=discrete``, and ``--set max_impacts_per_step=1`` for the last lane.
 """
 
-from __future__ import annotations
-
-from ...components import RigidBody, SphereCollider, Transform
-from ...framework import Settings, World
-from ...plugins import Physics
-from ..protocol import Scene
-from ..walls import block
+from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World
+from carom.scenes.walls import block
 
 START = 1.0  # x of balls that come from the left
 SPEED = 120.0
@@ -35,14 +30,14 @@ SHIELD_FACE, TARGET, TARGET_RADIUS = 7.55, 9.4, 0.5
 REACH = 0.6  # extent of walls and shields above and below the lane
 APART = 1.5  # distance of the plates
 END = 16.0
-
-SETTINGS = Settings.balanced().replace(collision="continuous")
+SETTINGS = Settings(collision="continuous")
+SECONDS = 0.1
+VIEW = ((0.0, -1.2), (END, 12.9))
 
 
 def build(settings: Settings | None = None, seed: int = 0) -> World:
     """Lanes from the top, in each the static shapes first, then the balls from the left; ``seed`` changes nothing."""
-    settings = settings or SETTINGS
-    world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings)
+    world = World(Physics(dimensions=2), settings=settings or SETTINGS)
 
     def ball(x: float, y: float, *velocity: float, radius: float = RADIUS) -> None:
         body = RigidBody(mass=1.0, linear_velocity=velocity)
@@ -65,13 +60,3 @@ def build(settings: Settings | None = None, seed: int = 0) -> World:
         block(world, (0.0, low), (END, low + THICKNESS), restitution=1.0)
     ball(START, PLATES, SPEED, -SPEED)
     return world
-
-
-SCENE = Scene(
-    name="shots",
-    description="fast balls in six lanes, which tell the kinds of collision apart",
-    build=build,
-    seconds=0.1,
-    view=((0.0, -1.2), (END, 12.9)),
-    settings=SETTINGS,
-)

@@ -1,30 +1,25 @@
-"""A bridge of planks, each hinged to the next, with crates that fall on it."""
-
-from __future__ import annotations
+"""A bridge of planks, each hinged to the next, bears crates and balls."""
 
 import numpy as np
 
-from ...components import RigidBody, SphereCollider, Transform
-from ...components.spin import Spin
-from ...framework import Settings, World
-from ...plugins import Physics
-from ...plugins.joints import Hinge, Joints
-from ...plugins.rotation import BoxCollider, Rotation
-from ..protocol import Scene
-from ..sizes import whole
+from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World
+from carom.plugins.joints import Hinge, Joints
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
+from carom.scenes.sizes import whole
 
 PLANKS, CRATES = 30, 8
 HALF_LENGTH, HALF_THICKNESS = 0.5, 0.1
 MASS, CRATE_MASS = 1.0, 2.0
 CRATE = 0.5
 FRICTION = 0.6
-SETTINGS = Settings()
+SECONDS = 10.0
+VIEW = ((-4.0, -8.0), (2 * HALF_LENGTH * PLANKS + 4.0, 8.0))
 
 
 def build(settings: Settings | None = None, seed: int = 0, *, n: int = PLANKS, crates: int = CRATES) -> World:
     """``n`` planks from one bank to the other, and every other time a crate or a ball above them."""
     n, crates = whole(n, "n", 2), whole(crates, "crates", 0)
-    world = World(Physics(dimensions=2, gravity=(0.0, -9.81)), Rotation(), Joints(), settings=settings or SETTINGS)
+    world = World(Physics(dimensions=2, gravity=(0.0, -9.81)), Rotation(), Joints(), settings=settings)
     length = 2.0 * HALF_LENGTH * n
     for x in (-2.0, length + 2.0):
         world.create_entity(Transform((x, -2.0)), BoxCollider((2.0, 2.0), friction=FRICTION))
@@ -45,13 +40,3 @@ def build(settings: Settings | None = None, seed: int = 0, *, n: int = PLANKS, c
         collider = SphereCollider(CRATE, friction=FRICTION) if k % 2 else BoxCollider((CRATE, CRATE), friction=FRICTION)
         world.create_entity(Transform(place), RigidBody(mass=CRATE_MASS), collider, Spin())
     return world
-
-
-SCENE = Scene(
-    name="bridge",
-    description="a bridge of hinged planks bears crates and balls",
-    build=build,
-    seconds=10.0,
-    view=((-4.0, -8.0), (2 * HALF_LENGTH * PLANKS + 4.0, 8.0)),
-    settings=SETTINGS,
-)

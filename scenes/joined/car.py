@@ -1,19 +1,13 @@
 """A car with sprung wheels and a motor drives over hills."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
-from ...components import RigidBody, SphereCollider, Transform
-from ...components.spin import Spin
-from ...framework import Settings, World
-from ...plugins import Physics, terrain
-from ...plugins.joints import Joints, Wheel
-from ...plugins.rotation import BoxCollider, Rotation
-from ...plugins.terrain import create_chain
-from ..protocol import Scene
-from ..sizes import real
+from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World, create_chain
+from carom.plugins import terrain
+from carom.plugins.joints import Joints, Wheel
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
+from carom.scenes.sizes import real
 
 LENGTH, START = 120.0, -6.0  # m of road, and where the car starts
 PIECE = 1.0  # m of a piece of road
@@ -23,7 +17,8 @@ SPEED = 30.0  # rad/s of the wheels
 TORQUE = 60.0  # N m
 SPRING, RATIO = 4.0, 0.7  # Hz of the suspension, and its damping ratio
 TRAVEL = 0.25  # m
-SETTINGS = Settings()
+SECONDS = 9.0
+VIEW = ((-10.0, -4.0), (100.0, 12.0))
 
 
 def height(x: float) -> float:
@@ -36,7 +31,7 @@ def build(settings: Settings | None = None, seed: int = 0, *, speed: float = SPE
     """A motor turns the rear wheel against the car, up to ``speed``; ``seed`` changes nothing."""
     speed = real(speed, "speed")
     physics = Physics(dimensions=2, gravity=(0.0, -9.81))
-    world = World(physics, Rotation(), Joints(), terrain.plugin, settings=settings or SETTINGS)
+    world = World(physics, Rotation(), Joints(), terrain.plugin, settings=settings)
     road = [(k * PIECE, height(k * PIECE)) for k in range(-20, int(LENGTH / PIECE) + 1)]
     create_chain(world, road, friction=0.9)
     chassis = world.create_entity(
@@ -49,13 +44,3 @@ def build(settings: Settings | None = None, seed: int = 0, *, speed: float = SPE
         spring = {"frequency": SPRING, "damping_ratio": RATIO, "rest": -0.1}
         world.create_entity(Wheel(chassis, wheel, axle, (0.0, 1.0), limits=(-TRAVEL, TRAVEL), **spring, **motor))
     return world
-
-
-SCENE = Scene(
-    name="car",
-    description="a car with sprung wheels and a motor drives over hills",
-    build=build,
-    seconds=9.0,
-    view=((-10.0, -4.0), (100.0, 12.0)),
-    settings=SETTINGS,
-)

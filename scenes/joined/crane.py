@@ -1,15 +1,12 @@
-"""A crane lifts a crate: a trolley on a beam, and a rope that a system shortens and lets out."""
+"""A crane lifts a crate, carries it across and lets it down.
 
-from __future__ import annotations
+It is a trolley on a beam, and a rope that a system shortens and lets out.
+"""
 
-from ...components import RigidBody, Transform
-from ...components.spin import Spin
-from ...framework import Phase, Settings, System, World
-from ...plugins import Physics
-from ...plugins.joints import Distance, Joints, Slider
-from ...plugins.rotation import BoxCollider, Rotation
-from ..protocol import Scene
-from ..sizes import real
+from carom import Phase, Physics, RigidBody, Settings, System, Transform, World
+from carom.plugins.joints import Distance, Joints, Slider
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
+from carom.scenes.sizes import real
 
 BEAM = 10.0  # m above the ground
 SPAN = 12.0  # m that the trolley may go
@@ -17,7 +14,8 @@ ROPE = 8.0  # m at the start
 WINCH, TROLLEY = 2.0, 2.0  # m/s
 CRATE, MASS = 0.75, 50.0
 SHORT = 4.0  # m of the rope while it carries
-SETTINGS = Settings()
+SECONDS = 20.0
+VIEW = ((-4.0, -1.0), (16.0, 12.0))
 
 
 class Driver(System):
@@ -45,7 +43,7 @@ class Driver(System):
 def build(settings: Settings | None = None, seed: int = 0, *, mass: float = MASS) -> World:
     """A crate of ``mass`` on the ground, under the trolley; ``seed`` changes nothing."""
     mass = real(mass, "mass", above=True)
-    world = World(Physics(dimensions=2, gravity=(0.0, -9.81)), Rotation(), Joints(), settings=settings or SETTINGS)
+    world = World(Physics(dimensions=2, gravity=(0.0, -9.81)), Rotation(), Joints(), settings=settings)
     world.create_entity(Transform((6.0, -1.0)), BoxCollider((12.0, 1.0)))
     trolley = world.create_entity(Transform((0.0, BEAM)), RigidBody(mass=20.0), BoxCollider((0.6, 0.2)), Spin())
     rail = world.create_entity(
@@ -55,13 +53,3 @@ def build(settings: Settings | None = None, seed: int = 0, *, mass: float = MASS
     rope = world.create_entity(Distance(trolley, crate, point_b=(0.0, 2 * CRATE), length=(0.0, ROPE + CRATE)))
     world.add_system(Driver(rope, rail))
     return world
-
-
-SCENE = Scene(
-    name="crane",
-    description="a crane lifts a crate, carries it across and lets it down",
-    build=build,
-    seconds=20.0,
-    view=((-4.0, -1.0), (16.0, 12.0)),
-    settings=SETTINGS,
-)

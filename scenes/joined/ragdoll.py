@@ -1,22 +1,15 @@
-"""Ragdolls fall down stairs: ten parts each, whose joints bend as far as those of people."""
-
-from __future__ import annotations
+"""Ragdolls of ten parts, whose joints bend as far as those of people, fall down stairs."""
 
 import numpy as np
 
-from ...components import RigidBody, SphereCollider, Transform
-from ...components.spin import Spin
-from ...framework import Settings, World
-from ...plugins import Physics
-from ...plugins.joints import Hinge, Joints
-from ...plugins.rotation import BoxCollider, Rotation
-from ..protocol import Scene
-from ..sizes import whole
+from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World
+from carom.plugins.joints import Hinge, Joints
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
+from carom.scenes.sizes import whole
 
 DOLLS = 4
 STEPS, STEP = 8, (1.2, 0.6)  # of the stairs, m
 FRICTION = 0.5
-SETTINGS = Settings()
 
 # Parts: place and half size, m, of a doll whose hip is at the origin; each hangs on an earlier one, at a place, and
 # bends by so much against it, rad.
@@ -46,6 +39,8 @@ JOINTS = (
 HEAD = 0.16  # m, its radius
 DENSITY = 60.0  # kg/m^2
 BODY, LIMBS = 1, 2  # layers: parts of dolls meet the stairs, and not each other
+SECONDS = 10.0
+VIEW = ((-3.0, -7.0), (18.0, 12.0))
 
 
 def _doll(world: World, hip: np.ndarray, velocity: np.ndarray) -> list[int]:
@@ -66,7 +61,7 @@ def _doll(world: World, hip: np.ndarray, velocity: np.ndarray) -> list[int]:
 def build(settings: Settings | None = None, seed: int = 0, *, n: int = DOLLS) -> World:
     """``n`` dolls above the stairs, thrown as ``seed`` says."""
     n = whole(n, "n")
-    world = World(Physics(dimensions=2, gravity=(0.0, -9.81)), Rotation(), Joints(), settings=settings or SETTINGS)
+    world = World(Physics(dimensions=2, gravity=(0.0, -9.81)), Rotation(), Joints(), settings=settings)
     width, height = STEP
     for k in range(STEPS):
         world.create_entity(
@@ -83,13 +78,3 @@ def build(settings: Settings | None = None, seed: int = 0, *, n: int = DOLLS) ->
         hip = np.array((1.5 + 0.4 * (k % 3), 2.0 + 2.5 * k))
         _doll(world, hip, random.uniform((1.0, -2.0), (4.0, 2.0)))
     return world
-
-
-SCENE = Scene(
-    name="ragdoll",
-    description="ragdolls of ten parts fall down stairs",
-    build=build,
-    seconds=10.0,
-    view=((-3.0, -7.0), (18.0, 12.0)),
-    settings=SETTINGS,
-)

@@ -1,22 +1,17 @@
-"""A conveyor belt of moving slats: crates drop on it, ride along and fall into a bin.
+"""A belt of moving slats carries crates into a bin.
 
 The belt is a row of kinematic boxes with a velocity, and friction makes the crates follow. A slat that has passed the
 end is put back at the start. The bin's floor has little friction, so that a crate makes room for the next one.
 """
-
-from __future__ import annotations
 
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...components import AABBCollider, RigidBody, Transform
-from ...framework import Phase, Settings, System, World
-from ...plugins import Physics
-from ..protocol import Scene
-from ..sizes import whole
-from ..walls import block
+from carom import AABBCollider, Phase, Physics, RigidBody, Settings, System, Transform, World
+from carom.scenes.sizes import whole
+from carom.scenes.walls import block
 
 CRATES = 10
 LENGTH, SLAT, THICKNESS = 16.0, 1.0, 0.5  # metres; the belt's upper face is at height 0
@@ -27,6 +22,8 @@ DROP = ((1.5, 2.0), (2.5, 2.5))  # where they are created
 EXTENTS = (0.3, 0.6)
 BIN = (LENGTH, LENGTH + 12.0)
 DEPTH = 5.0
+SECONDS = 20.0
+VIEW = ((-2.0, -DEPTH - 1.0), (BIN[1] + 1.0, 4.0))
 
 
 class Belt(System):
@@ -69,7 +66,7 @@ class Chute(System):
 def build(settings: Settings | None = None, seed: int = 0, *, n: int = CRATES) -> World:
     """An empty belt and ``n`` crates to come; ``seed`` chooses their sizes and places."""
     n = whole(n, "n")
-    world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings or Settings.balanced())
+    world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings)
     slats = world.create_entities(
         round(LENGTH / SLAT),
         Transform.many([((k + 0.5) * SLAT - SLAT, -THICKNESS / 2) for k in range(round(LENGTH / SLAT))]),
@@ -83,12 +80,3 @@ def build(settings: Settings | None = None, seed: int = 0, *, n: int = CRATES) -
     random = np.random.default_rng(seed)
     world.add_system(Chute(random.uniform(*DROP, (n, 2)), random.uniform(*EXTENTS, (n, 2))))
     return world
-
-
-SCENE = Scene(
-    name="conveyor",
-    description="a belt of moving slats carries crates into a bin",
-    build=build,
-    seconds=20.0,
-    view=((-2.0, -DEPTH - 1.0), (BIN[1] + 1.0, 4.0)),
-)

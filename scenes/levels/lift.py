@@ -1,29 +1,26 @@
-"""Moving platforms: a lift takes a stack of crates up and down, a ferry carries one from side to side.
+"""A lift and a ferry carry crates up, down and across.
 
 Both are kinematic: contacts do not change their motion, and the crates on them follow. The lift accelerates with at
 most 0.25 g, so the crates stay on it; the ferry with half of the limit of friction, so its crate does not slide.
 """
-
-from __future__ import annotations
 
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...components import AABBCollider, RigidBody, Transform
-from ...framework import Component, Phase, Settings, System, World, column
-from ...framework.typing import VectorField
-from ...plugins import Physics
-from ..protocol import Scene
-from ..sizes import whole
-from ..walls import block
+from carom import AABBCollider, Component, Phase, Physics, RigidBody, Settings, System, Transform, World, column
+from carom.framework.typing import VectorField
+from carom.scenes.sizes import whole
+from carom.scenes.walls import block
 
 GRAVITY, FRICTION = 9.81, 0.6
 CRATES = 3
 THICKNESS = 0.5
 LIFT_HEIGHT, LIFT_PERIOD = 8.0, 8.0  # metres, seconds: peak acceleration 2.5 m/s^2
 FERRY_WIDTH, FERRY_PERIOD = 10.0, 8.0  # peak acceleration 3.1 m/s^2; friction passes on 5.9
+SECONDS = 12.0
+VIEW = ((-4.0, -2.0), (18.0, 13.0))
 
 
 class Shuttle(Component):
@@ -67,7 +64,7 @@ def build(settings: Settings | None = None, seed: int = 0, *, crates: int = CRAT
     Created in this order: ground, lift, ferry, the lift's crates from the lowest up, the ferry's crate.
     """
     crates = whole(crates, "crates", 0)
-    world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings or Settings.balanced())
+    world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings)
     block(world, (-4.0, -2.0), (18.0, -1.0), friction=FRICTION)
     _platform(world, (0.0, -THICKNESS / 2), (0.0, LIFT_HEIGHT), LIFT_PERIOD)
     _platform(world, (5.0, -THICKNESS / 2), (FERRY_WIDTH, 0.0), FERRY_PERIOD)
@@ -76,12 +73,3 @@ def build(settings: Settings | None = None, seed: int = 0, *, crates: int = CRAT
     _crate(world, 5.0, 0.5)
     world.add_system(Drive())
     return world
-
-
-SCENE = Scene(
-    name="lift",
-    description="a lift and a ferry carry crates up, down and across",
-    build=build,
-    seconds=12.0,
-    view=((-4.0, -2.0), (18.0, 13.0)),
-)

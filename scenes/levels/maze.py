@@ -1,28 +1,25 @@
-"""A thousand discs and boxes that bounce off the walls of a maze and off each other.
+"""1,000 discs and boxes wander in a maze, and bounce off its walls and each other.
 
 The maze has exactly one path between any two of its cells (made by a random walk to unvisited cells, with
 backtracking). Straight runs of wall are one long static box, so the level is a few hundred boxes
 of very unequal length. Restitution 1, no gravity: kinetic energy is conserved.
 """
 
-from __future__ import annotations
-
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
-from ...components import AABBCollider, RigidBody, SphereCollider, Transform
-from ...framework import Settings, World
-from ...plugins import Physics
-from ..protocol import Scene
-from ..sizes import ceil_root, whole
+from carom import AABBCollider, Physics, Settings, Transform, World
+from carom.scenes.bodies import add_discs_and_boxes, random_velocities
+from carom.scenes.sizes import ceil_root, whole
 
 MOVERS = 1000
 CELL = 5.0  # metres, from wall to wall
 WALL = 0.5  # thickness
 SPEEDS = (2.0, 8.0)  # metres/s
 EXTENTS = (0.3, 0.7)  # radius or half extent
+SIDE = ceil_root(MOVERS, 2) * CELL
+SECONDS = 10.0
+VIEW = ((-WALL, -WALL), (SIDE + WALL, SIDE + WALL))
 
 
 def cut(side: int, random: np.random.Generator) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -75,7 +72,7 @@ def build(settings: Settings | None = None, seed: int = 0, *, n: int = MOVERS) -
     """``n`` movers, each in a separate cell of the smallest square maze that holds them, discs first."""
     side = ceil_root(whole(n, "n"), 2)
     random = np.random.default_rng(seed)
-    world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings or Settings.balanced())
+    world = World(Physics(dimensions=2), settings=settings)
     centres, halves = wall_boxes(side, random)
     world.create_entities(
         len(centres), Transform.many(centres), AABBCollider.many(half_extents=halves, restitution=1.0)
@@ -85,29 +82,5 @@ def build(settings: Settings | None = None, seed: int = 0, *, n: int = MOVERS) -
     room = (CELL - WALL) / 2 - extent
     places = (np.stack([cells % side, cells // side], axis=1) + 0.5) * CELL
     places += random.uniform(-1, 1, (n, 2)) * room[:, None]
-    heading, speed = random.uniform(0, 2 * math.pi, n), random.uniform(*SPEEDS, n)
-    velocities = speed[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=1)
-    discs, boxes = slice(0, None, 2), slice(1, None, 2)
-    world.create_entities(
-        len(extent[discs]),
-        Transform.many(places[discs]),
-        RigidBody.many(mass=math.pi * extent[discs] ** 2, linear_velocity=velocities[discs]),
-        SphereCollider.many(radius=extent[discs], restitution=1.0),
-    )
-    world.create_entities(
-        len(extent[boxes]),
-        Transform.many(places[boxes]),
-        RigidBody.many(mass=4 * extent[boxes] ** 2, linear_velocity=velocities[boxes]),
-        AABBCollider.many(half_extents=np.repeat(extent[boxes, None], 2, axis=1), restitution=1.0),
-    )
+    add_discs_and_boxes(world, places, random_velocities(random, n, SPEEDS), extent)
     return world
-
-
-SIDE = ceil_root(MOVERS, 2) * CELL
-SCENE = Scene(
-    name="maze",
-    description="1,000 discs and boxes wander in a maze",
-    build=build,
-    seconds=10.0,
-    view=((-WALL, -WALL), (SIDE + WALL, SIDE + WALL)),
-)

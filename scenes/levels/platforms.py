@@ -1,21 +1,16 @@
-"""Crates rain on platforms: they land, slide to a stop, or slip over the edge and land further down.
+"""60 crates rain on platforms and come to rest.
 
-Typical for game levels: boxes of several sizes and masses on static ledges, with friction and a
-little bounce. Crates that miss every platform end on the ground between the walls.
+Typical for game levels: boxes of several sizes and masses on static ledges, with friction and a little bounce. They
+slide to a stop or slip over the edge; those that miss every platform end on the ground between the walls.
 """
-
-from __future__ import annotations
 
 import math
 
 import numpy as np
 
-from ...components import AABBCollider, RigidBody, Transform
-from ...framework import Settings, World
-from ...plugins import Physics
-from ..protocol import Scene
-from ..sizes import whole
-from ..walls import block, enclose
+from carom import AABBCollider, Physics, RigidBody, Settings, Transform, World
+from carom.scenes.sizes import whole
+from carom.scenes.walls import block, enclose
 
 CRATES = 60
 WIDTH, HEIGHT = 40.0, 26.0
@@ -34,8 +29,7 @@ EXTENTS = (0.35, 0.75)  # half the width, half the height
 DRIFT = 6.0  # metres/s, at most, to either side
 FRICTION, RESTITUTION, GRAVITY = 0.15, 0.3, 9.81
 IMPACTS = 32  # per crate and step, at most: a crate between two others may bounce to and fro many times
-
-SETTINGS = Settings.balanced().replace(max_impacts_per_step=IMPACTS)
+SETTINGS = Settings(max_impacts_per_step=IMPACTS)
 
 
 def _top(n: int) -> float:
@@ -46,8 +40,7 @@ def _top(n: int) -> float:
 def build(settings: Settings | None = None, seed: int = 0, *, n: int = CRATES) -> World:
     """``n`` crates in rows above the platforms; ``seed`` chooses their sizes, places and velocities."""
     n = whole(n, "n")
-    settings = settings or SETTINGS
-    world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings)
+    world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings or SETTINGS)
     top = _top(n)
     enclose(world, (0.0, 0.0), (WIDTH, top), friction=FRICTION, open_top=True)
     for start, end, height in PLATFORMS:
@@ -69,11 +62,5 @@ def build(settings: Settings | None = None, seed: int = 0, *, n: int = CRATES) -
     return world
 
 
-SCENE = Scene(
-    name="platforms",
-    description="60 crates rain on platforms and come to rest",
-    build=build,
-    seconds=6.0,
-    view=((-1.0, -1.0), (WIDTH + 1.0, _top(CRATES))),
-    settings=SETTINGS,
-)
+SECONDS = 6.0
+VIEW = ((-1.0, -1.0), (WIDTH + 1.0, _top(CRATES)))

@@ -1,21 +1,16 @@
-"""One player among 10,000 objects, with a range query in each step and contacts with what is in its way.
+"""One player ploughs through 10,000 discs and boxes.
 
 The scene for the broad phase: each step the player's radar makes one query that must not examine all
-10,000 objects, and its body collides with the few that it meets. The objects, discs and boxes, are at rest until
-they are pushed.
+10,000 objects, and its body collides with the few that it meets. The objects are at rest until they are pushed.
 """
-
-from __future__ import annotations
 
 import math
 
 import numpy as np
 
-from ...components import AABBCollider, RigidBody, SphereCollider, Transform
-from ...framework import Phase, Settings, System, World
-from ...plugins import Physics
-from ..protocol import Scene
-from ..walls import enclose
+from carom import Phase, Physics, RigidBody, Settings, SphereCollider, System, Transform, World
+from carom.scenes.bodies import add_discs_and_boxes, lattice
+from carom.scenes.walls import enclose
 
 OBJECTS = 10_000
 PER_ROW = 101  # a lattice of 10,201 places; the 201 nearest to the player stay empty
@@ -27,6 +22,8 @@ LAP_RATE = 0.3  # radians/s along the eight
 THRUST = 8.0  # 1/s: rate at which the player's velocity follows the desired one
 RADAR_RADIUS = 8.0
 DRAG = 1.5  # 1/s, of the objects
+SECONDS = 21.0
+VIEW = ((-2.0, -2.0), (SIDE + 2.0, SIDE + 2.0))
 
 
 class Pilot(System):
@@ -65,7 +62,7 @@ class Radar(System):
 
 def build(settings: Settings | None = None, seed: int = 0) -> World:
     """The player starts in the middle; ``seed`` chooses the objects' places and sizes."""
-    world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings or Settings.balanced())
+    world = World(Physics(dimensions=2), settings=settings)
     enclose(world, (0.0, 0.0), (SIDE, SIDE), thickness=2.0)
     player = world.create_entity(
         Transform((SIDE / 2, SIDE / 2)),
@@ -74,34 +71,12 @@ def build(settings: Settings | None = None, seed: int = 0) -> World:
     )
 
     random = np.random.default_rng(seed)
-    index = np.arange(PER_ROW**2)
-    places = (np.stack([index % PER_ROW, index // PER_ROW], axis=1) + 0.5) * SPACING
+    places = (lattice(PER_ROW**2, PER_ROW) + 0.5) * SPACING
     order = np.argsort(np.hypot(*(places - SIDE / 2).T), kind="stable")
     places = places[np.sort(order[-OBJECTS:])]
     extents = random.uniform(0.25, 0.6, OBJECTS)  # radius or half extent
     places += random.uniform(-1, 1, (OBJECTS, 2)) * (SPACING / 2 - extents)[:, None]
-    discs, boxes = extents[::2], extents[1::2]
-    world.create_entities(
-        len(discs),
-        Transform.many(places[::2]),
-        RigidBody.many(mass=math.pi * discs**2, linear_damping=DRAG),
-        SphereCollider.many(radius=discs, restitution=0.2),
-    )
-    world.create_entities(
-        len(boxes),
-        Transform.many(places[1::2]),
-        RigidBody.many(mass=4 * boxes**2, linear_damping=DRAG),
-        AABBCollider.many(half_extents=np.stack([boxes, boxes], axis=1), restitution=0.2),
-    )
+    add_discs_and_boxes(world, places, np.zeros_like(places), extents, restitution=0.2, damping=DRAG)
     world.add_system(Pilot(player))
     world.add_system(Radar(player))
     return world
-
-
-SCENE = Scene(
-    name="player",
-    description="one player ploughs through 10,000 discs and boxes",
-    build=build,
-    seconds=21.0,
-    view=((-2.0, -2.0), (SIDE + 2.0, SIDE + 2.0)),
-)

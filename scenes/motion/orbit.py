@@ -1,27 +1,24 @@
-"""A planet on an ellipse around a sun at the origin: GM = 1, semi-major axis 1, so one orbit takes 2 pi seconds.
+"""A planet runs ten times around its ellipse.
 
-It starts at the perihelion, where it is fastest, at (1 - e, 0) with the speed sqrt((1 + e) / (1 - e)) upwards
-(Kepler's ellipse; e is the eccentricity). After each orbit it must be back there. Its energy is -1/2 for any e,
-its angular momentum sqrt(1 - e^2).
+The sun is at the origin, GM = 1 and the semi-major axis 1, so one orbit takes 2 pi seconds. The planet starts at the
+perihelion, where it is fastest, at (1 - e, 0) with the speed sqrt((1 + e) / (1 - e)) upwards (Kepler's ellipse; e is
+the eccentricity). After each orbit it must be back there. Its energy is -1/2 for any e, its angular momentum
+sqrt(1 - e^2).
 """
-
-from __future__ import annotations
 
 import math
 from typing import Any
 
-from ...components import RigidBody, Transform
-from ...framework import ForceSystem, Settings, World
-from ...plugins import Physics
-from ..protocol import Scene
-from ..sizes import real
+from carom import ForceSystem, Physics, RigidBody, Settings, Transform, World
+from carom.scenes.sizes import real
 
 ECCENTRICITY = 0.6
 PERIOD = 2 * math.pi
 STEPS_PER_PERIOD = 1000
 PERIODS = 10
-
-SETTINGS = Settings.balanced().replace(dt=PERIOD / STEPS_PER_PERIOD, integrator="velocity_verlet")
+SETTINGS = Settings(dt=PERIOD / STEPS_PER_PERIOD, integrator="velocity_verlet")
+SECONDS = PERIODS * PERIOD
+VIEW = ((-2.2, -1.2), (1.2, 1.2))
 
 
 class Sun(ForceSystem):
@@ -43,19 +40,8 @@ def build(settings: Settings | None = None, seed: int = 0, *, eccentricity: floa
     e = real(eccentricity, "eccentricity")
     if e >= 1:
         raise ValueError(f"eccentricity must be below 1, got {eccentricity!r}")
-    settings = settings or SETTINGS
-    world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings)
+    world = World(Physics(dimensions=2), settings=settings or SETTINGS)
     speed = math.sqrt((1 + e) / (1 - e))
     world.create_entity(Transform((1 - e, 0.0)), RigidBody(mass=1.0, linear_velocity=(0.0, speed)))
     world.add_system(Sun())
     return world
-
-
-SCENE = Scene(
-    name="orbit",
-    description="a planet runs ten times around its ellipse",
-    build=build,
-    seconds=PERIODS * PERIOD,
-    view=((-2.2, -1.2), (1.2, 1.2)),
-    settings=SETTINGS,
-)

@@ -1,26 +1,22 @@
-"""A body on a spring: one oscillation per second, undamped or with ``damping``.
+"""A body on a spring swings once a second.
 
-It starts at (1, 0) at rest, so x(t) = cos(omega t), omega = sqrt(stiffness / mass) = 2 pi 1/s. With a damping rate c
+It starts at (1, 0) at rest, so x(t) = cos(omega t), omega = sqrt(stiffness / mass) = 2 pi 1/s. With a ``damping`` c
 the amplitude falls as exp(-c t / 2) and omega becomes sqrt(stiffness / mass - c^2 / 4). Integrators differ in
 amplitude, frequency and energy.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
-from ...components import RigidBody, Transform
-from ...framework import ForceSystem, Settings, World
-from ...plugins import Physics
-from ..protocol import Scene
-from ..sizes import real
+from carom import ForceSystem, Physics, RigidBody, Settings, Transform, World
+from carom.scenes.sizes import real
 
 MASS = 1.0
 STIFFNESS = (2 * math.pi) ** 2  # N/m: omega = 2 pi
 START = (1.0, 0.0)
-
-SETTINGS = Settings.balanced().replace(integrator="velocity_verlet")
+SETTINGS = Settings(integrator="velocity_verlet")
+SECONDS = 5.2
+VIEW = ((-1.5, -1.0), (1.5, 1.0))
 
 
 class SpringToOrigin(ForceSystem):
@@ -44,18 +40,7 @@ def build(
 ) -> World:
     """1 kg on a spring of ``stiffness`` N/m; ``damping``, 1/s, is a drag of -damping m v. ``seed`` changes nothing."""
     force = SpringToOrigin(real(stiffness, "stiffness"), real(damping, "damping"))
-    settings = settings or SETTINGS
-    world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings)
+    world = World(Physics(dimensions=2), settings=settings or SETTINGS)
     world.create_entity(Transform(START), RigidBody(mass=MASS))
     world.add_system(force)
     return world
-
-
-SCENE = Scene(
-    name="spring",
-    description="a body on a spring swings once a second",
-    build=build,
-    seconds=5.2,  # no whole number of turns, which would hide errors of the phase
-    view=((-1.5, -1.0), (1.5, 1.0)),
-    settings=SETTINGS,
-)

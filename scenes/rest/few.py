@@ -1,20 +1,16 @@
-"""Twenty balls at rest on a floor, or in the air above it: what the step of a small game costs."""
-
-from __future__ import annotations
+"""Twenty balls at rest on a floor, or in the air above it: the step of a small game."""
 
 import numpy as np
 
-from ...components import RigidBody, SphereCollider, Transform
-from ...framework import Settings, World
-from ...plugins import Physics
-from ..protocol import Scene
-from ..random_numbers import uniform
-from ..sizes import real, whole
-from ..walls import block
+from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World
+from carom.scenes.random_numbers import uniform
+from carom.scenes.sizes import real, whole
+from carom.scenes.walls import block
 
 BODIES = 20
 PITCH = 1.5
-GRAVITY = 9.81
+SECONDS = 10.0
+VIEW = ((-16.0, -2.0), (16.0, 8.0))
 
 
 def build(
@@ -28,7 +24,7 @@ def build(
     """``n`` balls of mass 1 and diameter 1 side by side, each at ``height`` times a number in [0.5, 1.5) above the
     floor; ``seed`` chooses these."""
     n, height, restitution = whole(n, "n"), real(height, "height"), real(restitution, "restitution")
-    world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings or Settings.balanced())
+    world = World(Physics(dimensions=2, gravity=(0.0, -9.81)), settings=settings)
     half = 0.5 * PITCH * (n + 1)
     block(world, (-half, -1.0), (half, 0.0), restitution=restitution)
     x = PITCH * (np.arange(n) - 0.5 * (n - 1))
@@ -36,6 +32,3 @@ def build(
     balls = SphereCollider.many(radius=0.5, restitution=restitution)
     world.create_entities(n, Transform.many(centres), RigidBody.many(mass=1.0), balls)
     return world
-
-
-SCENE = Scene("few", "twenty balls on a floor, the step of a small game", build, 10.0, ((-16.0, -2.0), (16.0, 8.0)))

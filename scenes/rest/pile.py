@@ -5,23 +5,18 @@ bodies start at rest on a lattice with gaps of 0.2, each displaced by up to 0.09
 floor and sides, but no lid.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 
-from ...components import RigidBody, SphereCollider, Transform
-from ...framework import Settings, World
-from ...plugins import Physics
-from ..gas import BODY_VOLUME, RADIUS
-from ..protocol import Scene
-from ..random_numbers import uniform
-from ..sizes import floor_root, whole
-from ..walls import enclose
+from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World
+from carom.scenes.bodies import lattice
+from carom.scenes.gas import BODY_VOLUME, RADIUS
+from carom.scenes.random_numbers import uniform
+from carom.scenes.sizes import floor_root, whole
+from carom.scenes.walls import enclose
 
 PITCH = 1.2  # of the lattice
 JITTER = 0.09
-GRAVITY = 9.81
 BODIES = {2: 1000, 3: 1000}
 UP = 1  # the axis
 
@@ -49,9 +44,7 @@ def layers(n: int, dimensions: int) -> int:
 def initial_positions(n: int, dimensions: int, seed: int = 0) -> NDArray[np.float64]:
     """(n, d): m = floor(n^(1/d)) bodies to a row along x, in 3D m rows along z to a layer, layers upwards."""
     per_row = floor_root(n, dimensions)
-    index = np.arange(n)
-    place = np.stack([index // per_row**k % per_row for k in range(dimensions)], axis=1)  # x, (z,) y
-    place[:, -1] = index // per_row ** (dimensions - 1)
+    place = lattice(n, per_row, dimensions)  # x, (z,) y
     centres = width(n, dimensions) / 2 + (place - (per_row - 1) / 2) * PITCH
     centres[:, -1] = 0.6 + PITCH * place[:, -1]
     if dimensions == 3:
@@ -62,8 +55,8 @@ def initial_positions(n: int, dimensions: int, seed: int = 0) -> NDArray[np.floa
 def _pile(settings: Settings | None, seed: int, n: int, dimensions: int) -> World:
     n = whole(n, "n")
     gravity = [0.0] * dimensions
-    gravity[UP] = -GRAVITY
-    world = World(Physics(dimensions=dimensions, gravity=gravity), settings=settings or Settings.balanced())
+    gravity[UP] = -9.81
+    world = World(Physics(dimensions=dimensions, gravity=gravity), settings=settings)
     upper = np.full(dimensions, width(n, dimensions))
     upper[UP] = PITCH * layers(n, dimensions)
     enclose(world, (0.0,) * dimensions, upper.tolist(), open_top=True)
@@ -76,12 +69,9 @@ def _pile(settings: Settings | None, seed: int, n: int, dimensions: int) -> Worl
     return world
 
 
-def _view(dimensions: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def view(dimensions: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """The region to draw: the bin and its walls."""
     n = BODIES[dimensions]
     upper = [width(n, dimensions) + 1.0] * dimensions
     upper[UP] = PITCH * layers(n, dimensions) + 1.0
     return (-1.0,) * dimensions, tuple(upper)
-
-
-SCENE_2D = Scene("pile2d", "1,000 discs fall into a bin and come to rest", pile2d, 15.0, _view(2))
-SCENE_3D = Scene("pile3d", "1,000 spheres fall into a bin and come to rest", pile3d, 10.0, _view(3))

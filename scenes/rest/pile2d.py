@@ -1,14 +1,10 @@
-"""The pile in 2D: discs in a bin, see :mod:`carom.scenes.rest.pile`."""
+"""1,000 discs fall into a bin and come to rest.
 
-from __future__ import annotations
+``n`` discs of :mod:`carom.scenes.rest.pile`; ``seed`` chooses their places.
+"""
 
-from ...framework import Settings, World
-from . import pile
+from carom.scenes.rest import pile
 
-
-def build(settings: Settings | None = None, seed: int = 0, *, n: int = pile.BODIES[2]) -> World:
-    """``n`` discs in a bin; ``seed`` chooses their places."""
-    return pile.pile2d(settings, seed, n=n)
-
-
-SCENE = pile.SCENE_2D
+SECONDS = 15.0
+VIEW = pile.view(2)
+build = pile.pile2d

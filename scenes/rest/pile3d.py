@@ -1,14 +1,10 @@
-"""The pile in 3D: spheres in a bin, see :mod:`carom.scenes.rest.pile`."""
+"""1,000 spheres fall into a bin and come to rest.
 
-from __future__ import annotations
+``n`` spheres of :mod:`carom.scenes.rest.pile`; ``seed`` chooses their places.
+"""
 
-from ...framework import Settings, World
-from . import pile
+from carom.scenes.rest import pile
 
-
-def build(settings: Settings | None = None, seed: int = 0, *, n: int = pile.BODIES[3]) -> World:
-    """``n`` spheres in a bin; ``seed`` chooses their places."""
-    return pile.pile3d(settings, seed, n=n)
-
-
-SCENE = pile.SCENE_3D
+SECONDS = 10.0
+VIEW = pile.view(3)
+build = pile.pile3d

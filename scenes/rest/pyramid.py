@@ -1,27 +1,22 @@
-"""A pyramid of unit boxes: each row has one box less than the row below and is offset by half a box.
+"""1,275 boxes in 50 rows stand by friction.
 
-Restitution 0, mass 1, gravity 9.81. It must stand, with friction 0.6 and without. A spacing
-of 1.1 leaves gaps between the boxes of a row. With ``spins`` the boxes can turn.
+Each row of unit boxes has one less than the row below and is offset by half a box. Restitution 0, mass 1, gravity 9.81.
+It must stand, with friction 0.6 and without. A spacing of 1.1 leaves gaps between the boxes of a row. With ``spins``
+the boxes can turn.
 """
-
-from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...components import AABBCollider, RigidBody, Transform
-from ...components.spin import Spin
-from ...framework import Settings, World
-from ...plugins import Physics
-from ...plugins.rotation import BoxCollider, Rotation
-from ..protocol import Scene
-from ..sizes import real, whole
-from ..walls import block
+from carom import AABBCollider, BoxCollider, Physics, RigidBody, Rotation, Settings, Spin, Transform, World
+from carom.scenes.sizes import real, whole
+from carom.scenes.walls import block
 
 ROWS = 50
 FRICTION = 0.6
-GRAVITY = 9.81
 GROUND = 200.0  # metres wide, or twice the pyramid's width if that is more
+SECONDS = 8.0
+VIEW = ((-30.0, -1.0), (30.0, 52.0))
 
 
 def initial_positions(rows: int, spacing: float = 1.0) -> NDArray[np.float64]:
@@ -42,8 +37,8 @@ def build(
 ) -> World:
     """``rows`` rows, ``spacing`` >= 1 metre from centre to centre in a row; ``seed`` changes nothing."""
     rows, friction, spacing = whole(rows, "rows"), real(friction, "friction"), real(spacing, "spacing", 1.0)
-    plugins = [Physics(dimensions=2, gravity=(0.0, -GRAVITY)), *[Rotation()] * spins]
-    world = World(*plugins, settings=settings or Settings.balanced())
+    plugins = [Physics(dimensions=2, gravity=(0.0, -9.81)), *[Rotation()] * spins]
+    world = World(*plugins, settings=settings)
     reach = max(GROUND / 2, rows * spacing)
     block(world, (-reach, -1.0), (reach, 0.0), friction=friction)
     positions = initial_positions(rows, spacing)
@@ -55,12 +50,3 @@ def build(
         *[Spin.many(0.0)] * spins,
     )
     return world
-
-
-SCENE = Scene(
-    name="pyramid",
-    description="1,275 boxes in 50 rows stand by friction",
-    build=build,
-    seconds=8.0,
-    view=((-30.0, -1.0), (30.0, 52.0)),
-)

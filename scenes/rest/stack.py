@@ -1,23 +1,20 @@
-"""A tower: boxes of side 1, or balls of diameter 1, one exactly above the other.
+"""A tower of ten boxes that must stay as it is.
 
-It must stay in place: no sinking, no shaking, no drift. ``top_mass`` makes the topmost body heavier than the
-others, which is difficult for an iterative solver.
+Boxes of side 1, or balls of diameter 1, one exactly above the other: no sinking, no shaking, no drift. ``top_mass``
+makes the topmost body heavier than the others, which is difficult for an iterative solver.
 """
-
-from __future__ import annotations
 
 import numpy as np
 
-from ...components import AABBCollider, RigidBody, SphereCollider, Transform
-from ...framework import Settings, World
-from ...plugins import Physics
-from ..protocol import Scene
-from ..sizes import real, whole
-from ..walls import block
+from carom import AABBCollider, Physics, RigidBody, Settings, SphereCollider, Transform, World
+from carom.scenes.sizes import real, whole
+from carom.scenes.walls import block
 
 BODIES = 10
 FRICTION = 0.6
 GRAVITY = 9.81
+SECONDS = 10.0
+VIEW = ((-6.0, -1.0), (6.0, 11.0))
 
 
 def build(
@@ -31,18 +28,11 @@ def build(
 ) -> World:
     """``n`` bodies from the ground up, mass 1, the last one ``top_mass`` kg; ``seed`` changes nothing."""
     n, top_mass, friction = whole(n, "n"), real(top_mass, "top_mass", above=True), real(friction, "friction")
-    world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings or Settings.balanced())
+    world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings)
     block(world, (-10.0, -1.0), (10.0, 0.0), friction=friction)
     mass = np.ones(n)
     mass[-1] = top_mass
-    collider = (
-        SphereCollider.many(radius=0.5, friction=friction)
-        if balls
-        else AABBCollider.many(half_extents=(0.5, 0.5), friction=friction)
-    )
+    ball, box = (SphereCollider.many(radius=0.5, friction=friction), AABBCollider.many((0.5, 0.5), friction=friction))
     centres = np.stack([np.zeros(n), 0.5 + np.arange(n)], axis=1)
-    world.create_entities(n, Transform.many(centres), RigidBody.many(mass=mass), collider)
+    world.create_entities(n, Transform.many(centres), RigidBody.many(mass=mass), ball if balls else box)
     return world
-
-
-SCENE = Scene("stack", "a tower of ten boxes that must stay as it is", build, 10.0, ((-6.0, -1.0), (6.0, 11.0)))

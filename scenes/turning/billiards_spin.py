@@ -1,33 +1,27 @@
-"""Follow, stop and draw, seen from the side: on three tables a cue ball meets another one, each with its own spin.
+"""Follow, stop and draw: what spin does to a cue ball.
 
-The cue ball hands its velocity on, and keeps its spin, because balls rub on the cloth only. So with top spin it follows
-the other one, without spin it stays, and with back spin it comes back. Both roll without sliding in the end. On the
-table of ``billiards``, which is seen from above, nothing rolls: a plane has no cloth below it.
+Seen from the side: on three tables a cue ball meets another one, each with its own spin. The cue ball hands its
+velocity on, and keeps its spin, because balls rub on the cloth only. So with top spin it follows the other one, without
+spin it stays, and with back spin it comes back. Both roll without sliding in the end. On the table of ``billiards``,
+which is seen from above, nothing rolls: a plane has no cloth below it.
 """
-
-from __future__ import annotations
 
 import numpy as np
 
-from ...components import RigidBody, SphereCollider, Transform
-from ...components.spin import Spin
-from ...framework import Settings, World
-from ...plugins import Physics
-from ...plugins.rotation import Rotation
-from ..impacts.billiards import MASS, RADIUS
-from ..protocol import Scene
-from ..sizes import real
-from ..walls import block
+from carom import Physics, RigidBody, Rotation, Settings, SphereCollider, Spin, Transform, World
+from carom.scenes.impacts.billiards import MASS, RADIUS
+from carom.scenes.sizes import real
+from carom.scenes.walls import block
 
 SPEED = 1.5  # m/s
 FRICTION = 0.2  # of a ball on the cloth
-GRAVITY = 9.81
 SPINS = {"follow": -1.0, "stop": 0.0, "draw": 1.0}  # in speeds over radius; -1: it rolls
 SHELF = 0.2  # from one table to the next
 LENGTH, THICKNESS = (-0.5, 1.5), 0.02
 GAP = 1e-3
-
-SETTINGS = Settings.balanced().replace(dt=1 / 480)
+SETTINGS = Settings(dt=1 / 480)
+SECONDS = 1.2
+VIEW = ((LENGTH[0], -2.3 * SHELF), (LENGTH[1], 0.8 * SHELF))
 
 
 def build(settings: Settings | None = None, seed: int = 0, *, speed: float = SPEED) -> World:
@@ -36,7 +30,7 @@ def build(settings: Settings | None = None, seed: int = 0, *, speed: float = SPE
     Created in this order, from the upper table to the lower one: table, cue ball, the other ball.
     """
     speed = real(speed, "speed")
-    world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), Rotation(), settings=settings or SETTINGS)
+    world = World(Physics(dimensions=2, gravity=(0.0, -9.81)), Rotation(), settings=settings or SETTINGS)
     for k, spin in enumerate(SPINS.values()):
         cloth = -k * SHELF
         block(world, (LENGTH[0], cloth - THICKNESS), (LENGTH[1], cloth), friction=FRICTION)
@@ -48,13 +42,3 @@ def build(settings: Settings | None = None, seed: int = 0, *, speed: float = SPE
                 SphereCollider(RADIUS, restitution=1.0),  # friction None: that of the cloth, and none between balls
             )
     return world
-
-
-SCENE = Scene(
-    name="billiards_spin",
-    description="follow, stop and draw: what spin does to a cue ball",
-    build=build,
-    seconds=1.2,
-    view=((LENGTH[0], -2.3 * SHELF), (LENGTH[1], 0.8 * SHELF)),
-    settings=SETTINGS,
-)

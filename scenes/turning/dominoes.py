@@ -1,20 +1,13 @@
-"""A row of dominoes: the first one gets a push, and each one throws the next.
+"""Fifty dominoes in a row: the first one gets a push, and each one throws the next.
 
 The wave runs at a speed that depends on height and spacing, not on the number of dominoes.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
-from ...components import RigidBody, Transform
-from ...components.spin import Spin
-from ...framework import Settings, World
-from ...plugins import Physics
-from ...plugins.rotation import BoxCollider, Rotation
-from ..protocol import Scene
-from ..sizes import real, whole
-from ..walls import block
+from carom import BoxCollider, Physics, RigidBody, Rotation, Settings, Spin, Transform, World
+from carom.scenes.sizes import real, whole
+from carom.scenes.walls import block
 
 DOMINOES = 50
 HALF_EXTENTS = (0.15, 1.0)
@@ -22,7 +15,8 @@ MASS = 0.6
 SPACING = 0.8  # from centre to centre
 PUSH = 1.0  # rad/s, about its foot
 FRICTION = 0.6
-GRAVITY = 9.81
+SECONDS = 13.0
+VIEW = ((-3.0, -1.0), (DOMINOES * SPACING + 3.0, 4.0))
 
 
 def build(
@@ -31,7 +25,7 @@ def build(
 ) -> World:  # fmt: skip
     """``n`` dominoes on end, the first one at 0 falls to the right; ``seed`` changes nothing."""
     n, spacing, friction = whole(n, "n"), real(spacing, "spacing", above=True), real(friction, "friction")
-    world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), Rotation(), settings=settings or Settings.balanced())
+    world = World(Physics(dimensions=2, gravity=(0.0, -9.81)), Rotation(), settings=settings)
     block(world, (-5.0, -1.0), (n * spacing + 5.0, 0.0), friction=friction)
     places = np.stack([spacing * np.arange(n), np.full(n, HALF_EXTENTS[1])], axis=1)
     push = np.where(np.arange(n) == 0, PUSH, 0.0)
@@ -43,12 +37,3 @@ def build(
         BoxCollider.many(half_extents=HALF_EXTENTS, friction=friction),
     )
     return world
-
-
-SCENE = Scene(
-    name="dominoes",
-    description="fifty dominoes in a row, the first one pushed",
-    build=build,
-    seconds=13.0,
-    view=((-3.0, -1.0), (DOMINOES * SPACING + 3.0, 4.0)),
-)

@@ -1,23 +1,17 @@
-"""Two flippers of a pinball table keep balls in play: kinematic bars that a system turns.
+"""Two flippers of a pinball table keep three balls in play: bars that a system turns.
 
 The table leans, so gravity is weak. A flipper swings up when a ball is above it and comes down again; each point of it
 throws with its own velocity. The gap between both is narrower than a ball.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 
-from ...components import RigidBody, SphereCollider, Transform
-from ...components.spin import Spin
-from ...framework import Phase, Settings, System, World
-from ...plugins import Physics
-from ...plugins.rotation import BoxCollider, Rotation
-from ..protocol import Scene
-from ..sizes import whole
-from ..walls import enclose
+from carom import Phase, Physics, RigidBody, Settings, SphereCollider, System, Transform, World
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
+from carom.scenes.sizes import whole
+from carom.scenes.walls import enclose
 
 BALLS = 3
 RADIUS, MASS = 0.25, 1.0
@@ -30,8 +24,9 @@ SWING, RETURN = 14.0, 5.0  # rad/s
 NEAR = 0.5  # m: a ball that close above a flipper makes it swing
 FRICTION, RESTITUTION, BOUNCE = 0.3, 0.4, 0.9
 BUMPERS = ((2.4, 8.0), (5.6, 8.0), (4.0, 9.8))
-
-SETTINGS = Settings.balanced().replace(dt=1 / 240)
+SETTINGS = Settings(dt=1 / 240)
+SECONDS = 10.0
+VIEW = ((-1.0, -1.0), (WIDTH + 1.0, HEIGHT + 1.0))
 
 
 class Flippers(System):
@@ -108,13 +103,3 @@ def build(settings: Settings | None = None, seed: int = 0, *, n: int = BALLS) ->
     )
     world.add_system(Flippers(flippers))
     return world
-
-
-SCENE = Scene(
-    name="flipper",
-    description="two flippers of a pinball table keep three balls in play",
-    build=build,
-    seconds=10.0,
-    view=((-1.0, -1.0), (WIDTH + 1.0, HEIGHT + 1.0)),
-    settings=SETTINGS,
-)

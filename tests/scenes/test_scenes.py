@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import math
 import re
+import runpy
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -47,10 +49,13 @@ def test_every_scene_has_a_row_in_the_manual_with_its_bodies():
 
 @pytest.mark.parametrize("name", scenes.names())
 class TestEveryScene:
-    def test_keeps_the_protocol(self, name):
+    def test_keeps_the_protocol_and_a_copy_of_its_file_is_the_same_scene(self, name, tmp_path):
         scene = scenes.get(name)
         settings = Settings.balanced().replace(substeps=3)
-        first, again, other = (scene.build(settings, seed=seed) for seed in (5, 5, 6))
+        copy = runpy.run_path(shutil.copy(getattr(scenes, name).__file__, tmp_path))
+        assert (copy["SECONDS"], copy["VIEW"]) == (scene.seconds, scene.view)
+        first, other = (scene.build(settings, seed=seed) for seed in (5, 6))
+        again = copy["build"](settings, seed=5)
         assert scene.name == name
         assert 0 < len(scene.description) < 90
         assert "\n" not in scene.description
