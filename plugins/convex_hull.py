@@ -96,22 +96,15 @@ def _is_hull(rows: np.ndarray) -> bool:
     )
 
 
-def _wrong_with(rows: np.ndarray) -> str | None:
+def _rows_of(points: np.ndarray) -> np.ndarray | str:
+    """The rows of the hull of points, these themselves if they are such rows; or what is wrong with the points."""
+    return points if _is_hull(points) else _hull_of(points.tobytes())
+
+
+def _wrong_with(points: np.ndarray) -> str | None:
     """Why these are neither a hull nor points that have one."""
-    made = None if _is_hull(rows) else _hull_of(rows.tobytes())
+    made = _rows_of(points)
     return made if isinstance(made, str) else None
-
-
-def _rows_of(points: Any) -> Any:
-    """The rows of the hull of points; what has none is left for the column to report."""
-    try:
-        rows = np.array(points, float)
-    except (TypeError, ValueError):
-        return points
-    if rows.ndim != 2 or rows.shape[1] != 3 or len(rows) < 4 or not np.isfinite(rows).all() or _is_hull(rows):
-        return points
-    made = _hull_of(rows.tobytes())
-    return points if isinstance(made, str) else made
 
 
 @plugin.shape(cost=4)

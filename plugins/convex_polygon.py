@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import operator
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -49,21 +48,10 @@ def wrong_with(vertices: np.ndarray) -> str | None:
     return None
 
 
-def _counter_clockwise(vertices: Any) -> Any:
-    """Reversed if clockwise; anything that is not a polygon is left for the column to report."""
-    try:
-        corners = np.asarray(vertices)
-    except ValueError:  # rows of different lengths
-        return vertices
-    if corners.ndim != 2 or corners.shape[1] != 2 or corners.dtype.kind not in "iuf" or len(corners) < 3:
-        return vertices
-    corners = corners.astype(float)
-    size = np.abs(corners).max()
-    if not (np.isfinite(size) and size > 0.0):
-        return vertices
-    x, y = ((corners - corners[0]) / size).T
-    area = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum()
-    return corners[::-1] if area < 0.0 else corners
+def _counter_clockwise(corners: np.ndarray) -> np.ndarray:
+    """Reversed if clockwise."""
+    x, y = ((corners - corners[0]) / np.abs(corners).max()).T
+    return corners[::-1] if (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() < 0.0 else corners
 
 
 @plugin.shape(cost=4)
@@ -100,10 +88,7 @@ class ConvexPolygonCollider(Collider):
 
         ValueError if ``n`` is below 3 or the radius not above 0.
         """
-        try:
-            count = operator.index(n)
-        except TypeError:
-            count = 0
+        count = n.__index__() if hasattr(n, "__index__") else 0
         if count < 3:
             raise ValueError(f"ConvexPolygonCollider.regular: n must be a whole number from 3, got {n!r}")
         if not (math.isfinite(radius) and radius > 0.0):

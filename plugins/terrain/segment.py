@@ -80,6 +80,9 @@ class ChainSegmentCollider(Collider):
         return shape.start if dot(shape.start, direction) >= dot(shape.end, direction) else shape.end
 
 
+segment_support = plugin.kernel(ChainSegmentCollider.support)
+
+
 @plugin.kernel
 def to_left(v):
     """Turned by a quarter."""
@@ -249,14 +252,29 @@ def with_corner(b, at, corner, face, known, support):
 
 
 @plugin.kernel
-def ends_of(a, direction):
-    """The segment's own support."""
-    return a.start if dot(a.start, direction) >= dot(a.end, direction) else a.end
-
-
-@plugin.kernel
 def sharp(a):
     return 0.0
+
+
+def register_pairs(collider, contact):
+    """The pairs of a piece of terrain, solid on one side.
+
+    ``contact(a, b, d, support, rounding)``: whether a convex shape is over the piece's own part, else its neighbours
+    have the contact if there is one; depth, normal, point.
+    """
+
+    def is_beside(a, b, d, slop, support, rounding):
+        return not contact(a, b, d, support, rounding)[0]
+
+    @plugin.pair(collider, Convex, corner=is_beside)
+    def piece_convex(a, b, d, support, rounding):
+        owns, depth, normal, point = contact(a, b, d, support, rounding)
+        return owns and depth >= 0.0, depth, normal, point
+
+    @plugin.pair(collider, collider)
+    def two_pieces(a, b, d):
+        """Never a contact: neither moves."""
+        return False, -math.inf, d, d
 
 
 @part
@@ -303,7 +321,7 @@ def contact_of_segment(a, b, d, support, rounding):
     if kind == NONE:
         gap = height - round_b
         if gap < zone:
-            _, depth, straight, _ = convex_convex(a, b, d, ends_of, support, sharp, rounding)
+            _, depth, straight, _ = convex_convex(a, b, d, segment_support, support, sharp, rounding)
             if -depth > zone:
                 return miss(straight, -depth, frame, face.nearest)
         return miss(best, max(gap, NEAR * size), frame, face.nearest)
@@ -313,19 +331,4 @@ def contact_of_segment(a, b, d, support, rounding):
     return True, depth, best, add_scaled(point, best, -0.5 * depth)
 
 
-def is_beside(a, b, d, slop, support, rounding):
-    """Whether the neighbours have the contact, if there is one."""
-    return not contact_of_segment(a, b, d, support, rounding)[0]
-
-
-@plugin.pair(ChainSegmentCollider, Convex, corner=is_beside)
-def segment_convex(a, b, d, support, rounding):
-    """Not inlined: it is long and has several callers."""
-    owns, depth, normal, point = contact_of_segment(a, b, d, support, rounding)
-    return owns and depth >= 0.0, depth, normal, point
-
-
-@plugin.pair(ChainSegmentCollider, ChainSegmentCollider)
-def two_segments(a, b, d):
-    """Never a contact: neither moves."""
-    return False, -math.inf, d, d
+register_pairs(ChainSegmentCollider, contact_of_segment)

@@ -14,12 +14,12 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ...components import Collider, RigidBody
-from ...framework import Component, Convex, column
+from ...framework import Component, column
 from ...framework.compilation import part
 from ...framework.typing import VectorField
 from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
 from ..standard_shapes import convex_convex
-from .segment import BEHIND, BESIDE, NEAR, NONE, PART, STRAIGHT, TILT, WHOLE, plugin, sharp
+from .segment import BEHIND, BESIDE, NEAR, NONE, PART, STRAIGHT, TILT, WHOLE, plugin, register_pairs, sharp
 
 # One edge: a point of it, the direction out of the triangle in its plane, that through the neighbour, whether the
 # neighbour falls away, and how far the triangle counts beyond an edge from which it does not.
@@ -78,18 +78,12 @@ class TerrainTriangleCollider(Collider):
         return shape.b if two >= three else shape.c
 
 
+triangle_support = plugin.kernel(TerrainTriangleCollider.support)
+
+
 @plugin.kernel
 def cross3(u, v):
     return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
-
-
-@plugin.kernel
-def corner_towards(a, direction):
-    """The triangle's own support."""
-    one, two, three = dot(a.a, direction), dot(a.b, direction), dot(a.c, direction)
-    if one >= two and one >= three:
-        return a.a
-    return a.b if two >= three else a.c
 
 
 @part
@@ -159,7 +153,7 @@ def contact_of_triangle(a, b, d, support, rounding):
     one = edge_of(a.a, a.b, a.beyond_ab, normal, 5.0 * zone)
     two = edge_of(a.b, a.c, a.beyond_bc, normal, 5.0 * zone)
     three = edge_of(a.c, a.a, a.beyond_ca, normal, 5.0 * zone)
-    _, depth, straight, place = convex_convex(a, b, d, corner_towards, support, sharp, rounding)
+    _, depth, straight, place = convex_convex(a, b, d, triangle_support, support, sharp, rounding)
     between = is_between(straight, one) and is_between(straight, two) and is_between(straight, three)
     between = between and dot(straight, normal) > -NEAR
     kind, height, lowest, far, side, outer = WHOLE, level, nearest, 0.0, normal, normal
@@ -192,19 +186,4 @@ def contact_of_triangle(a, b, d, support, rounding):
     return True, depth, normal, add_scaled(point, normal, -dot(normal, sub(point, a.a)) - 0.5 * depth)
 
 
-def is_beside(a, b, d, slop, support, rounding):
-    """Whether the neighbours have the contact, if there is one."""
-    return not contact_of_triangle(a, b, d, support, rounding)[0]
-
-
-@plugin.pair(TerrainTriangleCollider, Convex, corner=is_beside)
-def triangle_convex(a, b, d, support, rounding):
-    """Not inlined: it is long and has several callers."""
-    owns, depth, normal, point = contact_of_triangle(a, b, d, support, rounding)
-    return owns and depth >= 0.0, depth, normal, point
-
-
-@plugin.pair(TerrainTriangleCollider, TerrainTriangleCollider)
-def two_triangles(a, b, d):
-    """Never a contact: neither moves."""
-    return False, -math.inf, d, d
+register_pairs(TerrainTriangleCollider, contact_of_triangle)

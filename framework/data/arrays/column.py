@@ -23,12 +23,10 @@ class ArrayColumn(Column):
     width: int = 1
     rows: tuple[int, int] = (1, 2**31)
     check: Callable[[np.ndarray], str | None] | None = None
-    convert: Callable[[Any], Any] | None = None
+    convert: Callable[[np.ndarray], np.ndarray] | None = None
     pool: Pool = field(default_factory=lambda: Pool(1))
 
     def checked(self, value: Any, entity: int | None = None) -> Any:
-        if self.convert is not None:
-            value = self.convert(value)
         array = Column(item="vector", name=self.name, owner=self.owner)._as_numbers(value, entity)
         if array.ndim == 1 and self.width == 1:
             array = array[:, None]
@@ -41,7 +39,7 @@ class ArrayColumn(Column):
         wrong = None if self.check is None else self.check(array)
         if wrong is not None:
             raise self._error(array, wrong, entity)
-        return self.pool.number_of(array)
+        return self.pool.number_of(array if self.convert is None else self.convert(array))
 
     def checked_many(self, values: Any, count: int, dimensions: int) -> np.ndarray:
         """One array for all, or a list with one per row."""
@@ -106,7 +104,8 @@ def hold_arrays(holder: Any, columns: Iterable[Column]) -> None:
 
 def array_column(
     width: int, *, rows: tuple[int, int] = (1, 2**31), check: Callable[[np.ndarray], str | None] | None = None,
-    convert: Callable[[Any], Any] | None = None, leading: Callable[[np.ndarray], int] = len, kw_only: bool = False,
+    convert: Callable[[np.ndarray], np.ndarray] | None = None, leading: Callable[[np.ndarray], int] = len,
+    kw_only: bool = False,
 ) -> Any:  # fmt: skip
     """A field of a component that is an array (n, width) of floats, with its own n on every entity.
 
@@ -115,7 +114,7 @@ def array_column(
     check
         gets the array; returns what is wrong with it ("must be convex"), or None
     convert
-        gets what a user gives, and returns the array to check and store
+        gets an array in which nothing is wrong, and returns the one to store
     leading
         gets the array; returns how many of its first rows the others follow from
     kw_only
