@@ -49,7 +49,6 @@ def test_answers_follow_steps_and_writes(d):
         served, outside = served + bool(grid.serves), outside + grid.outside_count
     assert 0 < served < 12
     assert outside > 0
-    world.close()
 
 
 @pytest.mark.parametrize(
@@ -89,4 +88,3 @@ def test_answers_while_bodies_sleep(d, count, kinds, grids):
         if turn == 0:
             assert (bool(state.grid.serves), bool(state.static_grid.serves)) == grids
             assert state.first > 0.8 * len(world.bodies.dynamic)
-    world.close()
