@@ -80,11 +80,8 @@ def test_pile2d(n, seed):
 @pytest.mark.parametrize(
     ("name", "side", "thickness", "sides"),
     [
-        ("gas2d", math.sqrt(300 * math.pi), 1.0, 4),
         ("gas3d", (300 * SPHERE / 0.1) ** (1 / 3), 1.0, 6),
-        ("mixed2d", math.sqrt(300 * math.pi), 1.0, 4),
         ("fastgas", math.sqrt(300 * math.pi), 0.2, 4),
-        ("player_query", math.sqrt(300 * math.pi), 1.0, 4),
         ("pile2d", 1.2 * math.sqrt(300), 1.0, 3),
         ("pile3d", 1.2 * 300 ** (1 / 3), 1.0, 5),
     ],
@@ -151,17 +148,12 @@ def test_nothing_overlaps_at_the_start(name, seed):
 
 
 @pytest.mark.parametrize("name", [*GENERATORS, "maze", "platforms", "conveyor", "stack"])
-@pytest.mark.parametrize(
-    ("n", "error", "message"),
-    [
-        (0, ValueError, "n must be at least 1, got 0"),
-        (2.5, TypeError, "n must be a whole number, got 2.5"),
-        (True, TypeError, "n must be a whole number, got True"),
-    ],
-)
-def test_a_bad_number_of_bodies_is_refused(name, n, error, message):
-    with pytest.raises(error, match=f"^{message}$"):
-        make(name, n=n)
+def test_a_bad_number_of_bodies_is_refused(name):
+    with pytest.raises(ValueError, match=r"^n must be at least 1, got 0$"):
+        make(name, n=0)
+    for n in (2.5, True):
+        with pytest.raises(TypeError, match=f"^n must be a whole number, got {n}$"):
+            make(name, n=n)
 
 
 @pytest.mark.parametrize(
