@@ -23,6 +23,12 @@ standard_shapes.shape(cost=1.5)(AABBCollider)
 
 
 @inlined
+def sharp(shape):
+    """The rounding of a shape that has none."""
+    return 0.0
+
+
+@inlined
 def axis_normal(like, axis, sign):
     """The unit vector along an axis."""
     result = like

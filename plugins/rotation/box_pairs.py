@@ -8,13 +8,14 @@ import math
 from ...components import AABBCollider, SphereCollider
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, scale
 from ...systems.shapes.convex.pair import SUPPORT_TILT, convex_convex, middle_of_overlap
-from ..standard_shapes import sphere_box
+from ..standard_shapes import sharp, sphere_box
 from .box import BoxCollider, boxes
 
 CLOSE = 1e-14  # of the coordinates: nearer than that a distance has no direction, as for any two convex shapes
 
 Level = collections.namedtuple("Level", "half_extents axes")  # a box that never turns, as one that does
 ball_and_box = boxes.kernel(sphere_box)
+support = boxes.kernel(BoxCollider.support)
 
 
 @boxes.kernel
@@ -23,22 +24,6 @@ def level(box, like):
     if len(like) == 2:
         return Level(box.half_extents, ((1.0, 0.0), (0.0, 1.0)))
     return Level(box.half_extents, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
-
-
-@boxes.kernel
-def support(box, direction):
-    """The corner that lies farthest in a direction."""
-    corner = scale(direction, 0.0)
-    for j in range(len(direction)):
-        half = item(box.half_extents, j)
-        corner = add_scaled(corner, box.axes[j], half if dot(box.axes[j], direction) >= 0.0 else -half)
-    return corner
-
-
-@boxes.kernel
-def sharp(box):
-    """Boxes are not rounded."""
-    return 0.0
 
 
 @boxes.kernel

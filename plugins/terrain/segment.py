@@ -18,7 +18,7 @@ from ...framework import Component, Convex, Plugin, column
 from ...framework.compilation import part
 from ...framework.typing import VectorField
 from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
-from ..standard_shapes import convex_convex
+from ..standard_shapes import convex_convex, sharp
 
 plugin = Plugin("terrain", version="1.0")
 
@@ -249,11 +249,6 @@ def with_corner(b, at, corner, face, known, support):
     if kind == NONE or (kind == WHOLE and gap > height + STRAIGHT * (abs(at[0]) + abs(at[1]))):
         return NONE, gap, between, False
     return known
-
-
-@plugin.kernel
-def sharp(a):
-    return 0.0
 
 
 def register_pairs(collider, contact):

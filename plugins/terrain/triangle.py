@@ -18,8 +18,8 @@ from ...framework import Component, column
 from ...framework.compilation import part
 from ...framework.typing import VectorField
 from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
-from ..standard_shapes import convex_convex
-from .segment import BEHIND, BESIDE, NEAR, NONE, PART, STRAIGHT, TILT, WHOLE, plugin, register_pairs, sharp
+from ..standard_shapes import convex_convex, sharp
+from .segment import BEHIND, BESIDE, NEAR, NONE, PART, STRAIGHT, TILT, WHOLE, plugin, register_pairs
 
 # One edge: a point of it, the direction out of the triangle in its plane, that through the neighbour, whether the
 # neighbour falls away, and how far the triangle counts beyond an edge from which it does not.

@@ -11,7 +11,7 @@ import math
 from ...framework.compilation import part
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, divided, length, sub
-from ..standard_shapes import convex_convex
+from ..standard_shapes import convex_convex, sharp
 from .cells import BLOCK
 from .collider import ALL, WALLS
 from .rectangles import (
@@ -34,7 +34,6 @@ from .rectangles import (
     hidden,
     load_cells,
     rectangle,
-    sharp,
     store_cells,
     tile_support,
 )

@@ -240,11 +240,6 @@ def tile_support(half, direction):
 
 
 @plugin.kernel
-def sharp(half):
-    return 0.0
-
-
-@plugin.kernel
 def halved(waiting, count, cells, right_first, upper_first):
     """Push both halves of a rectangle, cut across its longer side, at index ``count``; the first one goes on top.
 

@@ -7,7 +7,7 @@ import math
 from ...framework.compilation import part
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, length, sub
-from ..standard_shapes import convex_convex
+from ..standard_shapes import convex_convex, sharp
 from .cells import BLOCK
 from .collider import plugin
 from .contact import cells_under, searched
@@ -23,7 +23,6 @@ from .rectangles import (
     halved,
     load_cells,
     rectangle,
-    sharp,
     store_cells,
     tile_support,
 )
