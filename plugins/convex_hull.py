@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import itertools
-import math
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from ..components.colliders import Collider
 from ..framework import Plugin, array_column
 from ..framework.typing import ArrayField
-from ..framework.vectors import add_scaled, dot, item, replace, scale
+from .corners import bounds_of, support_of
 
 __all__ = ["ConvexHullCollider"]
 
@@ -141,25 +140,11 @@ class ConvexHullCollider(Collider):
 
     @staticmethod
     def bounds(shape, dimensions):
-        reach = 0.0, 0.0, 0.0
-        for j in range(FIRST, len(shape.hull)):
-            for k in range(3):
-                way = 0.0
-                for axis in range(3):
-                    way += shape.hull[j, axis] * item(shape.axes[axis], k)
-                reach = replace(reach, k, max(item(reach, k), abs(way)))
-        return reach
+        return bounds_of(shape.hull, FIRST, shape)
 
     @staticmethod
     def support(shape, direction):
-        x, y, z = shape.axes
-        along_x, along_y, along_z = dot(x, direction), dot(y, direction), dot(z, direction)
-        farthest, at = -math.inf, FIRST
-        for j in range(FIRST, len(shape.hull)):
-            reach = shape.hull[j, 0] * along_x + shape.hull[j, 1] * along_y + shape.hull[j, 2] * along_z
-            if reach > farthest:
-                farthest, at = reach, j
-        return add_scaled(add_scaled(scale(x, shape.hull[at, 0]), y, shape.hull[at, 1]), z, shape.hull[at, 2])
+        return support_of(shape.hull, FIRST, shape, direction)
 
     @staticmethod
     def second_moments(shape, dimensions):

@@ -10,7 +10,7 @@ import numpy as np
 from ..components.colliders import Collider
 from ..framework import Plugin, array_column, column
 from ..framework.typing import ArrayField
-from ..framework.vectors import add_scaled, dot, scale
+from .corners import bounds_of, support_of
 
 __all__ = ["ConvexPolygonCollider"]
 
@@ -102,24 +102,12 @@ class ConvexPolygonCollider(Collider):
 
     @staticmethod
     def bounds(shape, dimensions):
-        x, y = shape.axes
-        wide, high = 0.0, 0.0
-        for k in range(len(shape.vertices)):
-            one, two = shape.vertices[k, 0], shape.vertices[k, 1]
-            wide = max(wide, abs(one * x[0] + two * y[0]))
-            high = max(high, abs(one * x[1] + two * y[1]))
+        wide, high = bounds_of(shape.vertices, 0, shape)
         return wide + shape.corner_radius, high + shape.corner_radius
 
     @staticmethod
     def support(shape, direction):
-        x, y = shape.axes
-        along_x, along_y = dot(x, direction), dot(y, direction)
-        farthest, at = -math.inf, 0
-        for k in range(len(shape.vertices)):
-            reach = shape.vertices[k, 0] * along_x + shape.vertices[k, 1] * along_y
-            if reach > farthest:
-                farthest, at = reach, k
-        return add_scaled(scale(x, shape.vertices[at, 0]), y, shape.vertices[at, 1])
+        return support_of(shape.vertices, 0, shape, direction)
 
     @staticmethod
     def rounding(shape):

@@ -10,7 +10,8 @@ import numpy as np
 from ..components import Collider
 from ..framework import Column, Convex, Plugin
 from ..framework.typing import VectorField
-from ..framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, scale, sub
+from ..framework.vectors import add, add_scaled, divided, dot, length, negative, replace, scale, sub
+from .corners import in_world
 
 __all__ = ["HalfSpaceCollider"]
 
@@ -57,10 +58,7 @@ class HalfSpaceCollider(Collider):
 @plugin.kernel
 def outwards(shape):
     """The unit normal in the world."""
-    turned = scale(shape.axes[0], item(shape.normal, 0))
-    turned = add_scaled(turned, shape.axes[1], item(shape.normal, 1))
-    if len(turned) == 3:
-        turned = add_scaled(turned, shape.axes[len(turned) - 1], item(shape.normal, len(turned) - 1))
+    turned = in_world(shape, shape.normal)
     return divided(turned, length(turned))
 
 

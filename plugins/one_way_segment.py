@@ -18,7 +18,8 @@ import numpy as np
 from ..components import AABBCollider, Collider, SphereCollider
 from ..framework import Phase, Plugin, System, World, column
 from ..framework.typing import VectorField
-from ..framework.vectors import add_scaled, dot, item, scale
+from ..framework.vectors import dot
+from .corners import in_world
 
 __all__ = ["OneWaySegmentCollider"]
 
@@ -27,12 +28,6 @@ plugin = Plugin("one_way_segment", version="1.0")
 SLACK = 0.02  # of its height: a body that begins to touch at most this deep counts as coming from the front
 UPRIGHT = 0.5  # cosine: contacts whose normal leans farther from the front are with the segment's ends
 FRONTS = ("left", "right")
-
-
-@plugin.kernel
-def in_world(shape, point):
-    """A point of the shape relative to its centre, in world axes."""
-    return add_scaled(scale(shape.axes[0], item(point, 0)), shape.axes[1], item(point, 1))
 
 
 @plugin.shape(cost=2)

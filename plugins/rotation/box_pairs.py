@@ -8,6 +8,7 @@ import math
 from ...components import AABBCollider, SphereCollider
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, scale
 from ...systems.shapes.convex.pair import SUPPORT_TILT, convex_convex, middle_of_overlap
+from ..corners import along_axes, in_world
 from ..standard_shapes import sharp, sphere_box
 from .box import BoxCollider, boxes
 
@@ -24,24 +25,6 @@ def level(box, like):
     if len(like) == 2:
         return Level(box.half_extents, ((1.0, 0.0), (0.0, 1.0)))
     return Level(box.half_extents, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
-
-
-@boxes.kernel
-def along_axes(box, vector):
-    """A vector of the world along the axes of a box."""
-    result = vector
-    for k in range(len(vector)):
-        result = replace(result, k, dot(box.axes[k], vector))
-    return result
-
-
-@boxes.kernel
-def in_world(box, vector):
-    """The vector of the world that leads so far along the axes of a box."""
-    result = scale(vector, 0.0)
-    for k in range(len(vector)):
-        result = add_scaled(result, box.axes[k], item(vector, k))
-    return result
 
 
 @boxes.kernel
