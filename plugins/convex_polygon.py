@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..components.colliders import Collider
-from ..framework import Plugin, array_column, column
+from ..framework import Column, Plugin, array_column, column
 from ..framework.typing import ArrayField
 from .corners import bounds_of, support_of
 
@@ -16,6 +16,8 @@ __all__ = ["ConvexPolygonCollider"]
 
 STRAIGHT = 1e-12  # sine of the turn at a corner; below it the corner counts as straight
 FULL_TURN = 2.0 * math.pi
+CORNERS = Column(dtype=int, minimum=3, owner="ConvexPolygonCollider.regular", name="n")
+RADIUS = Column(positive=True, owner="ConvexPolygonCollider.regular", name="radius")
 
 plugin = Plugin("convex_polygon", version="1.0")
 
@@ -88,13 +90,9 @@ class ConvexPolygonCollider(Collider):
 
         ValueError if ``n`` is below 3 or the radius not above 0.
         """
-        count = n.__index__() if hasattr(n, "__index__") else 0
-        if count < 3:
-            raise ValueError(f"ConvexPolygonCollider.regular: n must be a whole number from 3, got {n!r}")
-        if not (math.isfinite(radius) and radius > 0.0):
-            raise ValueError(f"ConvexPolygonCollider.regular: radius must be positive, got {radius!r}")
+        count, reach = CORNERS.checked(n), RADIUS.checked(radius)
         angles = np.arange(count) * (FULL_TURN / count)
-        return cls(radius * np.stack((np.cos(angles), np.sin(angles)), axis=1), **common)
+        return cls(reach * np.stack((np.cos(angles), np.sin(angles)), axis=1), **common)
 
     @classmethod
     def sample(cls, **common: Any) -> Self:

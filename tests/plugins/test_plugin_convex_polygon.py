@@ -62,7 +62,7 @@ def test_boxes_and_regular_polygons():
         with pytest.raises(ValueError, match="box: half_extents must be positive"):
             ConvexPolygonCollider.box(wrong)
     for n, radius in ((2, 1), (2.5, 1), (3, 0), (3, math.inf)):
-        with pytest.raises(ValueError, match="regular: "):
+        with pytest.raises(ValueError, match=r"regular\.(n|radius) must be "):
             ConvexPolygonCollider.regular(n, radius)
     with pytest.raises(ValueError, match="corner_radius"):
         ConvexPolygonCollider(SQUARE, corner_radius=-1)
