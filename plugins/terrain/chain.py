@@ -102,20 +102,25 @@ def bound(numbers: Any) -> str:
     return f"at most {LONGEST:g} m" if np.isfinite(numbers).all() else "finite"
 
 
-def _checked(points: Any, loop: bool) -> np.ndarray:
-    """As an array; ValueError if they are no polyline."""
+def points_of(given: Any, where: str, least: int, width: int) -> np.ndarray:
+    """(n, width) m, ``least`` or more points; ValueError if they are none, or too far away."""
     try:
-        array = np.asarray(points, float)
+        array = np.asarray(given, float)
     except (TypeError, ValueError, OverflowError):
         array = np.empty(0)
-    least = 3 if loop else 2
-    if array.ndim != 2 or array.shape[1:] != (2,) or len(array) < least:
-        got = f"an array of shape {array.shape}" if isinstance(points, np.ndarray) else repr(points)
-        raise ValueError(f"create_chain: points must be {least} or more pairs of numbers, got {got}")
+    if array.ndim != 2 or array.shape[1:] != (width,) or len(array) < least:
+        got = f"an array of shape {array.shape}" if isinstance(given, np.ndarray) else repr(given)
+        raise ValueError(f"{where} must be {least} or more of {width} numbers each, got {got}")
     bad = ~(abs(array) <= LONGEST).all(axis=1)
     if bad.any():
         i = int(np.argmax(bad))
-        raise ValueError(f"create_chain: points must be {bound(array[i])}, point {i} is {tuple(array[i].tolist())}")
+        raise ValueError(f"{where} must be {bound(array[i])}, row {i} is {tuple(array[i].tolist())}")
+    return array
+
+
+def _checked(points: Any, loop: bool) -> np.ndarray:
+    """As an array; ValueError if they are no polyline."""
+    array = points_of(points, "create_chain: points", 3 if loop else 2, 2)
     same = (array == np.roll(array, -1, axis=0)).all(axis=1)
     if not loop:
         same[-1] = False

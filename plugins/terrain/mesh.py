@@ -10,7 +10,7 @@ from ...components import Transform
 from ...components.colliders import LONGEST, MaterialFields
 from ...framework import Column, World
 from ...framework.typing import Vector
-from .chain import bound
+from .chain import bound, points_of
 from .triangle import TerrainTriangleCollider
 
 MESH_POSITION = Column(item="vector", owner="create_triangle_mesh", name="position")
@@ -40,7 +40,7 @@ def create_triangle_mesh(
     """
     if world.dimensions != 3:
         raise ValueError(f"create_triangle_mesh: a mesh is for 3D worlds, this world is {world.dimensions}D")
-    places = _points(vertices) + MESH_POSITION.checked(position)
+    places = points_of(vertices, "create_triangle_mesh: vertices", 3, 3) + MESH_POSITION.checked(position)
     corners = _corners(triangles, places)
     beyond = places[_neighbours(corners)]
     faces = places[corners]
@@ -98,22 +98,6 @@ def create_height_field(
         position=position,
         **material,
     )
-
-
-def _points(vertices: Any) -> np.ndarray:
-    try:
-        array = np.asarray(vertices, float)
-    except (TypeError, ValueError, OverflowError):
-        array = np.empty(0)
-    if array.ndim != 2 or array.shape[1:] != (3,) or len(array) < 3:
-        got = f"an array of shape {array.shape}" if isinstance(vertices, np.ndarray) else repr(vertices)
-        raise ValueError(f"create_triangle_mesh: vertices must be 3 or more of 3 numbers each, got {got}")
-    bad = ~(abs(array) <= LONGEST).all(axis=1)
-    if bad.any():
-        i = int(np.argmax(bad))
-        value = tuple(array[i].tolist())
-        raise ValueError(f"create_triangle_mesh: vertices must be {bound(value)}, vertex {i} is {value}")
-    return array
 
 
 def _corners(triangles: Any, places: np.ndarray) -> np.ndarray:

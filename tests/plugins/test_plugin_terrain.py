@@ -279,12 +279,12 @@ def test_it_is_saved_and_goes_on_to_the_bit(tmp_path):
 @pytest.mark.parametrize(
     ("points", "options", "message"),
     [
-        ([(0, 0)], {}, r"create_chain: points must be 2 or more pairs of numbers, got \[\(0, 0\)\]"),
-        ([(0, 0), (1, 0)], {"loop": True}, "points must be 3 or more pairs"),
-        (np.zeros((4, 3)), {}, r"pairs of numbers, got an array of shape \(4, 3\)"),
-        ("hill", {}, "pairs of numbers, got 'hill'"),
-        ([(0, 0), (10**400, 0)], {}, r"pairs of numbers, got \[\(0, 0\), \(1000"),
-        ([(0, 0), (1, math.nan)], {}, r"points must be finite, point 1 is \(1.0, nan\)"),
+        ([(0, 0)], {}, r"create_chain: points must be 2 or more of 2 numbers each, got \[\(0, 0\)\]"),
+        ([(0, 0), (1, 0)], {"loop": True}, "points must be 3 or more of 2 numbers"),
+        (np.zeros((4, 3)), {}, r"2 numbers each, got an array of shape \(4, 3\)"),
+        ("hill", {}, "2 numbers each, got 'hill'"),
+        ([(0, 0), (10**400, 0)], {}, r"2 numbers each, got \[\(0, 0\), \(1000"),
+        ([(0, 0), (1, math.nan)], {}, r"points must be finite, row 1 is \(1.0, nan\)"),
         ([(0, 0), (1, 0), (1, 0)], {}, r"points 1 and 2 are both \(1.0, 0.0\)"),
         ([(0, 0), (1, 0), (1, 1), (0, 0)], {"loop": True}, r"points 3 and 0 are both \(0.0, 0.0\)"),
         ([(0, 0), (1, 0)], {"thickness": -1.0}, r"ChainSegmentCollider.thickness .*-1.0"),

@@ -190,7 +190,7 @@ def test_rays_see_fronts_only():
             [(0, 1, 2)],
             r"vertices must be 3 or more of 3 numbers each, got an array of shape \(4, 2\)",
         ),
-        ([(0, 0, 0), (1, 0, math.nan), (0, 0, 1)], [(0, 1, 2)], r"vertex 1 is \(1.0, 0.0, nan\)"),
+        ([(0, 0, 0), (1, 0, math.nan), (0, 0, 1)], [(0, 1, 2)], r"row 1 is \(1.0, 0.0, nan\)"),
         ([(0, 0, 0), (1, 0, 0), (0, 0, 10**400)], [(0, 1, 2)], "vertices must be 3 or more of 3 numbers each"),
         ([(0, 0, 0), (1, 0, 0), (0, 0, 1)], [(0, 1)], "triangles must be 1 or more of 3 whole numbers each"),
         ([(0, 0, 0), (1, 0, 0), (0, 0, 1)], [(0, 1, 3)], r"there are 3 vertices, triangle 0 is \(0, 1, 3\)"),
