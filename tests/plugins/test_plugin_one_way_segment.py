@@ -68,7 +68,6 @@ def test_a_jump_passes_and_lands(shape):
     assert velocity(world, jumper)[1] == pytest.approx(0, abs=1e-6)
     assert [(contact.entity_a, contact.entity_b) for contact in begun] == [(1, jumper)]
     assert begun[0].normal == pytest.approx((0, 1))
-    world.close()
     free.close()
 
 
@@ -83,7 +82,6 @@ def test_a_jump_that_ends_inside_falls_back(shape, apex):
     heights = run(world, 1.5, jumper)[:, 0]
     assert abs(heights - (-2 + speed * t - G * t**2 / 2)).max() < 1e-12
     assert heights.max() == pytest.approx(apex, abs=G / 60**2 / 8)  # sampled
-    world.close()
 
 
 @each_shape
@@ -96,7 +94,6 @@ def test_falls_are_stopped_at_any_speed_that_does_not_leap_over_it(shape, speed)
         heights = run(world, 0.9, faller)
         assert heights[-1] == pytest.approx(0.5, abs=REST)
         assert heights.min() > 0.45
-        world.close()
 
 
 @pytest.mark.parametrize("angle", [0.5, *(pytest.param(angle, marks=pytest.mark.long) for angle in (0.0, -2.0))])
@@ -117,7 +114,6 @@ def test_ten_thousand_bodies_from_everywhere(angle):
             world.step()
             path.append(world.bodies.dynamic.position.copy())
         paths.append(np.array(path))
-        world.close()
     met, free = paths
     along, out = np.array((math.cos(angle), math.sin(angle))), np.array((-math.sin(angle), math.cos(angle)))
     low, at = free @ out - radius, free @ along
@@ -142,7 +138,6 @@ def test_a_stack_stands_on_it_however_heavy():
     assert heights[-1, 1] > 1.2
     assert [contact.entity_a for contact in world.contacts.of(light)].count(light) == 2
     assert 1 in [contact.entity_b for contact in world.contacts.of(light)]
-    world.close()
 
 
 @each_shape
@@ -154,7 +149,6 @@ def test_a_body_from_the_side_passes(shape):
             Transform((-4, height)), RigidBody(linear_velocity=(6, 0), gravity_scale=0), SHAPES[shape]())  # fmt: skip
         run(world, 1.3, walker)
         assert position(world, walker) == pytest.approx((-4 + 6 * 78 / 60, height))
-        world.close()
 
 
 def test_a_body_that_falls_past_the_end_is_not_caught():
@@ -167,7 +161,6 @@ def test_a_body_that_falls_past_the_end_is_not_caught():
     on_the_edge = throw(world, (-2.45, 2.0), (0.0, -20.0))
     run(world, 0.5, on_the_edge)
     assert position(world, on_the_edge)[1] == pytest.approx(0.5, abs=REST)
-    world.close()
 
 
 @each_shape
@@ -180,7 +173,6 @@ def test_slides_off_the_end(shape):
     assert heights.max() < 0.5 + 1e-6
     assert heights[-1, 0] < -1.0
     assert velocity(world, slider)[1] < -5.0
-    world.close()
 
 
 @each_shape
@@ -193,7 +185,6 @@ def test_a_row_of_segments_and_floors_has_no_seams(shape):
     heights = run(world, 3.2, slider)
     assert velocity(world, slider)[0] == pytest.approx(5.0, abs=1e-9)
     assert abs(heights - 0.5).max() < REST
-    world.close()
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.4, math.pi / 2, 2.5, math.pi])
@@ -213,7 +204,6 @@ def test_the_front_turns_with_the_transform(angle, front):
         run(world, 1.0)
         assert (position(world, ahead) - middle) @ out == pytest.approx(0.5 + 2.6, abs=1e-9)
         assert (position(world, behind) - middle) @ out == pytest.approx(2.0)
-        world.close()
 
 
 @each_shape
@@ -230,7 +220,6 @@ def test_a_lift_carries_and_is_jumped_through(shape):
     for entity in (rider, jumper, still):  # bodies at rest in the air are picked up
         assert position(world, entity)[1] - top == pytest.approx(0.5, abs=0.01)
         assert velocity(world, entity)[1] == pytest.approx(2, abs=0.01)
-    world.close()
 
 
 @each_shape
@@ -242,7 +231,6 @@ def test_a_platform_that_sinks_over_a_body_passes(shape):
     stands = throw(world, (0, 0.5), shape=shape)
     heights = run(world, 2.0, stands)
     assert abs(heights - 0.5).max() < REST
-    world.close()
 
 
 def test_dropping_through_by_the_mask():
@@ -257,7 +245,6 @@ def test_dropping_through_by_the_mask():
     collider.mask = -1
     run(world, 1.0)
     assert position(world, player)[1] < -2
-    world.close()
 
 
 def test_shapes_of_other_plugins_and_bodies_with_levels_and_offsets():
@@ -276,7 +263,6 @@ def test_shapes_of_other_plugins_and_bodies_with_levels_and_offsets():
     assert heights.max(0) == pytest.approx([2.0 - 0.15 / 2] * 3, abs=0.1)
     assert heights[-1] == pytest.approx(lows, abs=REST)
     assert position(world, low_jump)[1] < -5
-    world.close()
 
 
 def test_sensors_and_contacts_switched_off_by_others_are_left_alone():
@@ -290,7 +276,6 @@ def test_sensors_and_contacts_switched_off_by_others_are_left_alone():
         world.step()
         seen |= {(contact.entity_a, contact.entity_b) for contact in world.contacts.begin}
     assert seen == {(2, jumper), (1, ghost), (2, ghost)}
-    world.close()
 
 
 def test_the_order_of_ids_does_not_matter():
@@ -306,7 +291,6 @@ def test_the_order_of_ids_does_not_matter():
             world.create_entity(*segment)
         run(world, 2.0)
         results.append([position(world, entity)[1] for entity in jumpers])
-        world.close()
     assert results[0] == results[1] == pytest.approx([0.5, 0.5], abs=REST)
 
 
@@ -334,7 +318,6 @@ def test_queries_find_it_from_both_sides():
         assert hit.normal == pytest.approx((0, side))
     assert world.query_sphere((0, 0.4), 0.5) == [1]
     assert world.query_sphere((2.4, 0.4), 0.5) == []
-    world.close()
 
 
 def test_bad_values_are_named():
@@ -347,4 +330,3 @@ def test_bad_values_are_named():
     world = World(Physics(dimensions=3), one_way_segment.plugin)
     with pytest.raises(ValueError, match="OneWaySegmentCollider"):
         world.create_entity(Transform((0, 0, 0)), OneWaySegmentCollider((0, 0), (1, 0)))
-    world.close()

@@ -73,7 +73,6 @@ def test_what_slides_over_a_hundred_joints_keeps_height_speed_and_angle(mode, ti
         assert velocity(world, entity) @ along == pytest.approx(30.0, abs=near)
         if shape != "ball":
             assert angle(world, entity) == pytest.approx(angles[shape], abs=near)
-    world.close()
 
 
 @each_mode
@@ -93,7 +92,6 @@ def test_what_goes_beyond_its_own_length_in_a_step_is_borne_by_what_it_leaves(mo
             assert position(world, entity) @ up == pytest.approx(0.3, abs=5e-3)
             assert velocity(world, entity) @ along == pytest.approx(50.0, rel=4e-3)
             assert angle(world, entity) == pytest.approx(tilt, abs=0.02)
-        world.close()
 
 
 @each_mode
@@ -129,7 +127,6 @@ def test_nothing_fast_passes_in_swept_worlds(mode):
         world.step()
         places = world.bodies.dynamic.position
         assert (places[:, 1] > np.interp(places[:, 0], *ground.T) - 1e-3).all()
-    world.close()
 
 
 @pytest.mark.parametrize("mode", MODES[1:])
@@ -156,7 +153,6 @@ def test_no_thin_bar_that_spins_passes_waves_or_peaks(e, mode):
         places = world.bodies.dynamic.position
         along = places[:, 0] - 40.0 * np.arange(n)
         assert (places[:, 1] > np.interp(along, x, y) - 0.03)[np.abs(along) < 7.9].all()
-        world.close()
 
 
 @each_mode
@@ -177,7 +173,6 @@ def test_a_ball_swings_in_a_parabola_of_many_segments(mode):
     assert y.min() == pytest.approx(0.1, abs=1e-3)
     assert x.max() == pytest.approx(-start[0], abs=0.03)
     assert (y - x**2 / 4.0 > 0.09).all()
-    world.close()
 
 
 @each_mode
@@ -199,7 +194,6 @@ def test_boxes_rest_on_slopes_and_across_joints_with_two_points(mode):
     for entity, was in zip(boxes, before, strict=True):
         assert (*position(world, entity), angle(world, entity)) == pytest.approx(was, abs=1e-3)
         assert velocity(world, entity) == pytest.approx((0, 0), abs=1e-5)
-    world.close()
 
 
 def test_a_ball_in_a_valley_touches_both_sides():
@@ -210,7 +204,6 @@ def test_a_ball_in_a_valley_touches_both_sides():
         world.step()
     assert position(world, ball) == pytest.approx((0, 0.4 * math.sqrt(2.0)), abs=2e-3)
     assert [contact.entity_a for contact in world.contacts] == [1, 2]
-    world.close()
 
 
 @each_mode
@@ -224,7 +217,6 @@ def test_what_bounces_on_a_joint_bounces_as_high(mode):
         if k > 480:
             highest = np.maximum(highest, [position(world, ball)[1] for ball in balls])
     assert highest == pytest.approx(1.4, abs=1e-5)
-    world.close()
 
 
 def test_one_side_is_solid():
@@ -243,7 +235,6 @@ def test_one_side_is_solid():
     for _ in range(60):
         world.step()
     assert position(world, inside)[1] > 0.39
-    world.close()
 
 
 def test_loops_are_solid_on_the_right():
@@ -260,7 +251,6 @@ def test_loops_are_solid_on_the_right():
             assert abs(x) < 12.0 - 0.39
             assert abs(y) < 4.0 - 0.39
             assert max(abs(x) - 3.0, abs(y) - 1.0) > 0.25
-    world.close()
 
 
 def test_it_is_saved_and_goes_on_to_the_bit(tmp_path):
@@ -295,20 +285,17 @@ def test_bad_points_are_refused(points, options, message):
     with pytest.raises(ValueError, match=message):
         create_chain(world, points, **options)
     assert not len(world.bodies)
-    world.close()
 
 
 def test_it_is_refused_in_3d_and_on_what_moves():
     world = World(Physics(dimensions=3), terrain.plugin)
     with pytest.raises(ValueError, match="create_chain: a chain is for 2D worlds, this world is 3D"):
         create_chain(world, [(0, 0), (1, 0)])
-    world.close()
     world = make_world()
     segment = ChainSegmentCollider((-1, 0), (1, 0), (-1, 0), (1, 0))
     entity = world.create_entity(Transform((0, 0)), RigidBody(), segment)
     with pytest.raises(ValueError, match=f"entity {entity} has ChainSegmentCollider, which no RigidBody can have"):
         world.step()
-    world.close()
 
 
 def test_a_step_in_which_the_queue_of_impacts_grows_has_the_same_bits():

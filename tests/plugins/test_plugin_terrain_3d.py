@@ -72,7 +72,6 @@ def test_what_slides_over_a_floor_of_triangles_keeps_height_speed_and_angle(mode
         assert position(world, entity) == pytest.approx((41.3 + 4.0 * k, high, 7.2), abs=1e-4)
         assert velocity(world, entity) == pytest.approx((20.0, 0.0, 1.0), abs=1e-4)
     assert abs(world.component_for_entity(bodies[3], Transform).rotation[0]) == pytest.approx(1.0, abs=1e-9)
-    world.close()
 
 
 @each_mode
@@ -93,7 +92,6 @@ def test_nobody_passes_the_hills(mode, seed):
         world.step()
         places = world.bodies.dynamic.position
         assert (places[:, 1] > height_at(heights, places)).all()
-    world.close()
 
 
 @pytest.mark.parametrize("mode", MODES[1:])
@@ -110,7 +108,6 @@ def test_nothing_fast_passes_in_swept_worlds(mode):
         inside = ((places[:, ::2] > 1.0) & (places[:, ::2] < SIDE - 2.0)).all(axis=1)  # others may fly over the rim
         assert (places[:, 1] > height_at(heights, places))[inside].all()
     assert inside.sum() > 10
-    world.close()
 
 
 @each_mode
@@ -129,7 +126,6 @@ def test_a_ball_rolls_down_a_slope_of_triangles_as_down_a_plane(mode):
     assert velocity(world, ball)[2] == pytest.approx(0.0, abs=1e-4)
     x, y, _ = position(world, ball)
     assert (0.5 * x + y) * math.cos(slope) == pytest.approx(0.4, abs=2e-3)
-    world.close()
 
 
 @each_mode
@@ -147,7 +143,6 @@ def test_boxes_lie_still_on_slopes(mode):
         world.step()
     assert position(world, box) == pytest.approx(before, abs=2e-3)
     assert velocity(world, box) == pytest.approx((0, 0, 0), abs=1e-4)
-    world.close()
 
 
 @each_mode
@@ -168,7 +163,6 @@ def test_a_mesh_of_a_bowl_holds_balls(mode):
     for _ in range(300):
         world.step()
         assert (np.abs(world.bodies.dynamic.position).sum(axis=1) < 4.0).all()
-    world.close()
 
 
 def test_rays_see_fronts_only():
@@ -179,7 +173,6 @@ def test_rays_see_fronts_only():
     assert hit.entity == ground[1]
     assert hit.distance == pytest.approx(3.0)
     assert hit.normal == pytest.approx((0, 1, 0))
-    world.close()
 
 
 @pytest.mark.parametrize(
@@ -203,7 +196,6 @@ def test_bad_meshes_are_refused(vertices, triangles, message):
     with pytest.raises(ValueError, match=f"create_triangle_mesh: .*{message}"):
         create_triangle_mesh(world, vertices, triangles)
     assert not len(world.bodies)
-    world.close()
 
 
 def test_bad_heights_are_refused():
@@ -214,8 +206,6 @@ def test_bad_heights_are_refused():
         create_height_field(world, [[1.0, 2.0], [math.nan, 0.0]], 1.0)
     with pytest.raises(ValueError, match=r"create_height_field.cell must be .*0"):
         create_height_field(world, np.zeros((2, 2)), 0.0)
-    world.close()
     world = World(Physics(dimensions=2), terrain.plugin)
     with pytest.raises(ValueError, match="create_height_field: a mesh is for 3D worlds, this world is 2D"):
         create_height_field(world, np.zeros((2, 2)), 1.0)
-    world.close()

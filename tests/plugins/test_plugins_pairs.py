@@ -72,7 +72,6 @@ def test_a_pair_without_handler_is_an_error_with_both_shapes_and_the_ways_out():
         world.step()
     world.delete_entity(b)
     world.step()
-    world.close()
 
 
 def test_what_stands_still_never_meets():
@@ -87,7 +86,6 @@ def test_what_stands_still_never_meets():
         world.step()
     world.component_for_entity(alone, lonely).mask = 0
     world.step()
-    world.close()
 
 
 def test_registering_late_and_again_is_seen_at_the_next_step():
@@ -107,7 +105,6 @@ def test_registering_late_and_again_is_seen_at_the_next_step():
     plugin.pair(lonely, lonely)(never)
     world.step()
     assert len(world.contacts) == 0
-    world.close()
 
 
 def test_a_flat_shape_is_not_for_3d():
@@ -125,7 +122,6 @@ def test_a_flat_shape_is_not_for_3d():
     entity = world.create_entity(Transform((0, 0, 0)), FlatCollider(1.0))
     with pytest.raises(ValueError, match=f"entity {entity}: FlatCollider is a shape of 2D worlds, this world is 3D"):
         world.step()
-    world.close()
 
 
 def fragile_plugin():
@@ -166,7 +162,6 @@ def test_a_pair_that_fails_names_itself_and_the_step_is_undone(size, message):
     world.delete_entity(culprit)
     world.step()
     assert world.component_for_entity(bystander, Transform).x == pytest.approx(1 / 60)
-    world.close()
 
 
 def test_a_sweep_that_fails_names_itself():
@@ -185,7 +180,6 @@ def test_a_sweep_that_fails_names_itself():
     with pytest.raises(StepError, match=f"entities {first} and {second}: its sweep returned a time that is not from"):
         world.step()
     assert world.state_hash() == state
-    world.close()
 
 
 def odd_plugin(what):
@@ -220,7 +214,6 @@ def test_other_functions_of_a_shape_that_fail(what, message, d):
     with pytest.raises(StepError, match=message):
         world.step()
     assert world.step_count == 0
-    world.close()
 
 
 def test_an_integrator_registered_again_is_seen_at_the_next_step():
@@ -244,7 +237,6 @@ def test_an_integrator_registered_again_is_seen_at_the_next_step():
     plugin.integrator("mine")(Ahead)
     world.step()
     assert world.component_for_entity(body, Transform).x == 1.0
-    world.close()
 
 
 def approaching(world, distance=1.9, **collider):
@@ -286,7 +278,6 @@ def test_a_filter_decides_which_bodies_may_meet():
     world.step()
     assert seen == [(1, 2), (1, 3), (2, 3)]
     assert list(zip(world.contacts.entity_a, world.contacts.entity_b, strict=True)) == [(1, 2), (2, 3)]
-    world.close()
 
 
 @pytest.mark.parametrize("answer", [None, np.ones(7, bool), np.ones(1), True])
@@ -302,7 +293,6 @@ def test_a_filter_answers_for_each_pair(answer):
     with pytest.raises(StepError, match="plugin teams: pair filter vague must return an array of 1 bool"):
         world.step()
     assert world.step_count == 0
-    world.close()
 
 
 class AllPairs:
@@ -331,7 +321,6 @@ def test_a_broad_phase_of_a_plugin_finds_the_same():
             world.step()
         assert ("all pairs, as the settings say" in str(world.plan())) == (settings.broad_phase != "automatic")
         hashes.append(world.state_hash())
-        world.close()
     assert hashes[0] == hashes[1]
 
 
@@ -356,7 +345,6 @@ def test_a_broad_phase_that_answers_nonsense(answer, message):
     approaching(world)
     with pytest.raises(StepError, match=f"broad phase 'strange' .*{message}"):
         world.step()
-    world.close()
 
 
 def test_each_world_gets_its_own_system():
@@ -375,8 +363,6 @@ def test_each_world_gets_its_own_system():
     worlds[1].step()
     found = [[s for s in world.systems if isinstance(s, Counter)] for world in worlds]
     assert [[s.steps for s in systems] for systems in found] == [[3], [1]]
-    for world in worlds:
-        world.close()
 
 
 def test_a_mixing_rule_that_fails_in_a_step():
@@ -390,7 +376,6 @@ def test_a_mixing_rule_that_fails_in_a_step():
     with pytest.raises(StepError, match="a mixing rule of a plugin returned no number from 0"):
         world.step()
     assert np.isfinite(world.bodies.position).all()
-    world.close()
 
 
 def test_a_plugin_joins_whole_or_not_at_all():
@@ -413,7 +398,6 @@ def test_a_plugin_joins_whole_or_not_at_all():
     assert not any(isinstance(system, Good) for system in world.systems)
     assert plugin not in world.plugins
     world.step()
-    world.close()
 
 
 def test_a_system_registered_late_joins_the_worlds_that_run():
@@ -429,4 +413,3 @@ def test_a_system_registered_late_joins_the_worlds_that_run():
 
     world.step()
     assert len(steps) == 1
-    world.close()

@@ -74,7 +74,6 @@ def test_a_field_may_be_an_array():
     assert len(world.component_for_entity(one, CloudCollider).points) == 3
     with pytest.raises(ValueError, match="read-only"):
         cloud.points[0, 0] = 7
-    world.close()
 
 
 @pytest.mark.parametrize(
@@ -106,7 +105,6 @@ def test_arrays_in_bulk():
     assert [len(world.component_for_entity(e, CloudCollider).points) for e in (1, 2, 3, *entities)] == [1, 2, 3, 3, 3]
     with pytest.raises(PluginError):
         Plugin("x").shape(cost=1)(type("Other", (Collider,), {"points": array_column(2)}))
-    world.close()
 
 
 def test_queries_know_shapes_with_arrays():
@@ -117,4 +115,3 @@ def test_queries_know_shapes_with_arrays():
     world.create_entity(Transform((0, 9)), RigidBody(), SphereCollider(1.0))
     (hit,) = world.shape_cast(CloudCollider([(0.0, 0.0), (1.0, 0.0)]), (-9, 9), (20, 0), exclude=cloud)
     assert hit.distance == pytest.approx(7.0)
-    world.close()

@@ -71,8 +71,6 @@ class TestEveryScene:
         state, same, others = ([bodies.position.tolist(), bodies.linear_velocity.tolist()] for bodies in views)
         assert state == same
         assert (state == others) == (name in WITHOUT_CHANCE)
-        for world in (first, again, other):
-            world.close()
 
     def test_has_its_settings_and_bodies_that_start_and_stay_in_view(self, name):
         scene = scenes.get(name)
@@ -83,7 +81,6 @@ class TestEveryScene:
             positions = world.bodies.dynamic.position
             assert np.all((positions > lower) & (positions < upper))
             world.step()
-        world.close()
 
 
 def test_the_hero_lands_six_tiles_further_on_the_ground():
@@ -93,7 +90,6 @@ def test_the_hero_lands_six_tiles_further_on_the_ground():
     x, y = world.bodies.dynamic.position[0]
     assert y == pytest.approx(jump.HALF_HEIGHT, abs=0.05 * jump.TILE)
     assert x == pytest.approx(jump.RUN_SPEED * world.time, rel=1e-9)  # nothing on the way, no friction
-    world.close()
 
 
 @pytest.mark.parametrize(
@@ -109,7 +105,6 @@ def test_elastic_scenes_keep_their_energy(name, steps):
         impacts += len(world.contacts.impacts)
     assert impacts > 50
     assert world.kinetic_energy() == pytest.approx(before, rel=1e-11)
-    world.close()
 
 
 def test_the_break_hands_the_cue_balls_motion_on():
@@ -120,7 +115,6 @@ def test_the_break_hands_the_cue_balls_motion_on():
     speeds = np.linalg.norm(world.bodies.dynamic.linear_velocity, axis=1)
     assert (speeds > 0.05).sum() >= 12
     assert 0.2 * before < world.kinetic_energy() < before
-    world.close()
 
 
 def test_the_player_sees_what_brute_force_sees_and_pushes_what_it_meets():
@@ -139,4 +133,3 @@ def test_the_player_sees_what_brute_force_sees_and_pushes_what_it_meets():
     assert surely_near <= set(radar.near) <= perhaps_near | walls
     pushed = np.linalg.norm(world.bodies.dynamic.linear_velocity, axis=1) > 0.1
     assert 1 < pushed.sum() < 2000
-    world.close()
