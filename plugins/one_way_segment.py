@@ -7,10 +7,8 @@ contains.
 
 from __future__ import annotations
 
-import collections
 import weakref
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -19,6 +17,7 @@ from ..components import AABBCollider, Collider, SphereCollider
 from ..framework import Phase, Plugin, System, World, column
 from ..framework.typing import VectorField
 from ..framework.vectors import dot
+from ..systems.shapes.linking.parameters import parameter_tuple
 from .corners import in_world
 
 __all__ = ["OneWaySegmentCollider"]
@@ -220,13 +219,12 @@ class _Shapes:
 
     def _parameters(self, component: type[Any], index: int) -> Any:
         """The parameters for the shape's functions, with the body's rotation applied."""
-        columns = self._world.registry.shapes[component].columns
+        shape, axes = self._world.registry.shapes[component], self._turn[index]
         handle = self._world.component_for_entity(int(self._entities[index]), component)
-        axes = self._turn[index]
-        values = [_plain(getattr(handle, name)) for name in columns]
-        sample = _tuple_type(component, columns)(*values, tuple(map(tuple, axes.T.tolist())))
+        values = [_plain(getattr(handle, name)) for name in shape.columns]
+        sample = parameter_tuple(shape)(*values, *[tuple(map(tuple, axes.T.tolist()))] * shape.rotates)
         if hasattr(component, "turned"):
-            sample = sample._replace(**dict(zip(columns, component.turned(sample, axes), strict=True)))
+            sample = sample._replace(**dict(zip(shape.columns, component.turned(sample, axes), strict=True)))
         return sample
 
 
@@ -257,11 +255,6 @@ def _rotations(bodies: Any, rows: Any) -> np.ndarray:
 
 def _turned(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     return (matrices @ vectors[:, :, None])[:, :, 0]
-
-
-@lru_cache(maxsize=64)
-def _tuple_type(component: type[Any], columns: tuple[str, ...]) -> Any:
-    return collections.namedtuple(component.__name__, (*columns, "axes"))
 
 
 def _plain(value: Any) -> Any:
