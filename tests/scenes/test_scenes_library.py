@@ -5,38 +5,23 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers_rest import SLOP, G, depths
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from carom.components import AABBCollider, Transform
 from carom.framework import Settings
 from carom.scenes import conveyor, lift, maze, platforms
 
 
-def reached(right, above):
-    """The cells that can be reached from (0, 0)."""
-    side = len(right)
-    seen, todo = set(), [(0, 0)]
-    while todo:
-        x, y = todo.pop()
-        if (x, y) in seen:
-            continue
-        seen.add((x, y))
-        if x + 1 < side and not right[x, y]:
-            todo.append((x + 1, y))
-        if x > 0 and not right[x - 1, y]:
-            todo.append((x - 1, y))
-        if y + 1 < side and not above[x, y]:
-            todo.append((x, y + 1))
-        if y > 0 and not above[x, y - 1]:
-            todo.append((x, y - 1))
-    return seen
-
-
 @pytest.mark.parametrize(("side", "seed"), [(1, 0), (2, 0), (7, 3), (32, 0)])
 def test_the_maze_has_one_way_to_every_cell(side, seed):
     """All cells are reached, with one passage less than there are cells: a tree. The outer wall is closed."""
     right, above = maze.cut(side, np.random.default_rng(seed))
-    assert len(reached(right, above)) == side**2
-    assert (~right).sum() + (~above).sum() == side**2 - 1
+    passages = np.concatenate((np.argwhere(~right) @ (side, 1), np.argwhere(~above) @ (side, 1)))
+    ahead = np.repeat((side, 1), ((~right).sum(), (~above).sum()))
+    graph = coo_matrix((np.ones(len(passages)), (passages, passages + ahead)), shape=(side**2, side**2))
+    assert connected_components(graph, directed=False)[0] == 1
+    assert len(passages) == side**2 - 1
     assert right[-1].all()
     assert above[:, -1].all()
 
