@@ -6,17 +6,21 @@ import math
 
 import numpy as np
 import pytest
-from joints.helpers_joints import gaps
 from worlds import MODES
 
 from carom import Settings, Transform
-from carom.plugins.joints import Hinge, Joints
+from carom.plugins.joints import Joints
 from carom.plugins.rotation import Spin
 from carom.scenes import bridge, car, crane, ragdoll
 
 
-def hinges(world):
-    return [entity for entity, _ in world.get_component(Hinge)]
+def joints_of(world):
+    return next(plugin for plugin in world.plugins if isinstance(plugin, Joints))
+
+
+def gaps(joints):
+    """By how much the anchors of each joint are apart, m."""
+    return np.linalg.norm(np.subtract(*joints.anchors()), axis=1)
 
 
 def mechanical_energy(world):
@@ -35,27 +39,10 @@ def test_the_bridge_bears_what_falls_on_it_and_blows_give_no_energy(seed, planks
         for _ in range(60):
             for _ in range(10):
                 world.step()
-            assert gaps(world, hinges(world)).max() < gap
+            assert gaps(joints_of(world)).max() < gap
             assert mechanical_energy(world) < start + 1.0
         assert planks > 30 or world.bodies.dynamic.position[:, 1].min() > -4.0
         assert planks > 30 or world.kinetic_energy() < 100.0
-
-
-def ends_apart(world, joints):
-    """A function that tells by how much the ends of each of these hinges are apart, m, of many at once."""
-    bodies, found = world.bodies, [world.component_for_entity(joint, Hinge) for joint in joints]
-
-    def ends(entities, local):
-        rows, local = [bodies.row_of(entity) for entity in entities], np.array(local)
-        c, s = np.cos(bodies.rotation[rows]), np.sin(bodies.rotation[rows])
-        turned = c * local[:, 0] - s * local[:, 1], s * local[:, 0] + c * local[:, 1]
-        return bodies.position[rows] + np.column_stack(turned)
-
-    def apart():
-        first = ends([joint.a for joint in found], [joint.at_a for joint in found])
-        return np.linalg.norm(ends([joint.b for joint in found], [joint.at_b for joint in found]) - first, axis=1)
-
-    return apart
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -74,13 +61,13 @@ def test_thrown_ragdolls_are_not_torn_nor_go_through_stairs(seeds, share, mode):
                 hip = random.uniform((1.0, 1.5), (9.0, 4.0))
                 ragdoll._doll(world, hip, random.uniform((-4.0, -6.0), (6.0, 4.0)))
             world.step()
-            worst, apart = np.zeros(25), ends_apart(world, hinges(world))
+            worst, joints = np.zeros(25), joints_of(world)
             for step in range(1200):
                 world.step()
                 if step >= 600 and world.kinetic_energy() < 25.0:  # some are to fall off a stair late
                     break
                 if step < 200 or step % 20 == 0:
-                    worst = np.maximum(worst, apart().reshape(25, -1).max(axis=1))
+                    worst = np.maximum(worst, gaps(joints).reshape(25, -1).max(axis=1))
                     places = world.bodies.dynamic.position
                     ends = np.clip(np.ceil(places[:, 0] / ragdoll.STEP[0]), 1, ragdoll.STEPS) * ragdoll.STEP[1]
                     assert (places[:, 1] > -ends - 0.1).all(), seed
@@ -95,7 +82,7 @@ def test_thrown_ragdolls_are_not_torn_nor_go_through_stairs(seeds, share, mode):
 def test_the_car_drives_over_the_hills():
     with car.build() as world:
         lowest, off, travels = math.inf, 0.0, []
-        joints = next(plugin for plugin in world.plugins if isinstance(plugin, Joints))
+        joints = joints_of(world)
         for _ in range(600):
             world.step()
             chassis, *wheels = world.bodies.dynamic.entity.tolist()
