@@ -16,7 +16,7 @@ from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.components.colliders import Collider
 from carom.framework import Phase, Plugin, Settings, System, World, column
 from carom.framework.errors import UnhandledPairError
-from carom.framework.vectors import divided
+from carom.framework.vectors import scale
 from carom.plugins import Physics
 
 COUNTERS = ("first_level_tests", "first_level_hits", "false_positives")
@@ -331,32 +331,18 @@ class DiscCollider(Collider):
     def bounds(shape, dimensions):
         return shape.reach, shape.reach
 
+    @staticmethod
+    def support(shape, direction):
+        return scale(direction, 0.0)
 
-def disc_disc(a, b, d):
-    depth = a.reach + b.reach - math.hypot(d[0], d[1])
-    normal = divided(d, math.hypot(d[0], d[1])) if d != (0.0, 0.0) else (1.0, 0.0)
-    return depth >= 0.0, depth, normal, d
-
-
-def sphere_disc(a, b, d):
-    depth = a.radius + b.reach - math.hypot(d[0], d[1])
-    normal = divided(d, math.hypot(d[0], d[1])) if d != (0.0, 0.0) else (1.0, 0.0)
-    return depth >= 0.0, depth, normal, d
-
-
-def box_disc(a, b, d):
-    x = max(abs(d[0]) - a.half_extents[0], 0.0)
-    y = max(abs(d[1]) - a.half_extents[1], 0.0)
-    depth = b.reach - math.hypot(x, y)
-    return depth >= 0.0, depth, (1.0, 0.0), d
+    @staticmethod
+    def rounding(shape):
+        return shape.reach
 
 
 def disc_world(cost=5.0):
     plugin = Plugin("discs")
     plugin.shape(cost=cost)(DiscCollider)
-    plugin.pair(DiscCollider, DiscCollider)(disc_disc)
-    plugin.pair(SphereCollider, DiscCollider)(sphere_disc)
-    plugin.pair(AABBCollider, DiscCollider)(box_disc)
     return World(Physics(dimensions=2), plugin, settings=Settings())
 
 
