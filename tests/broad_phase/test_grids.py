@@ -260,12 +260,3 @@ def test_long_kinematic_boxes_leave_the_others_in_their_grid(d, fixed):
         pairs = overlapping(centre - half, centre + half, moving)
         assert found == {(i, j) for i, j in pairs if sleepers <= i or sleepers <= j < moving}
         assert boxes.state.pair_search == UNIFORM_GRID
-
-
-def test_what_is_uneven_is_left_to_trees():
-    with level(2, 300) as world:
-        world.step()
-        assert "uniform grid" in reason(world)
-        world.component_for_entity(int(world.bodies.entity[0]), RigidBody).linear_velocity = (1e5, 0.0)
-        world.step()
-        assert "quadtree" in reason(world)

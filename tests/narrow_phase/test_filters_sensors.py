@@ -125,28 +125,6 @@ def test_a_body_may_become_a_sensor_and_back_between_steps():
     assert {event[0] for event in told} == {"stay"}
 
 
-@both_dimensions
-@pytest.mark.parametrize("refuses", [0, 1])
-def test_one_mask_that_refuses_is_enough(d, refuses):
-    """Impacts and rest, in either order: the two pass through each other, without event or contact."""
-    masks = [{"layer": 1, "mask": 3}, {"layer": 2, "mask": 3}]
-    masks[refuses]["mask"] = 4
-    world = make_world(d, gravity=10.0)
-    ground = floor(world, layer=1, mask=3 if refuses else 4)
-    fallen = box(world, up(d, 0.5), layer=2, mask=4 if refuses else 3)
-    a = ball(world, (-1.0, 50.0, 0.0)[:d], (2.0, 0.0, 0.0)[:d], restitution=1.0, **masks[0])
-    b = ball(world, (1.0, 50.0, 0.0)[:d], (-2.0, 0.0, 0.0)[:d], restitution=1.0, **masks[1])
-    told = listen(world)
-    run(world, 60)
-    assert told == []
-    assert len(world.contacts) == world.stats().counters["pairs"] == 0
-    assert velocity(world, a)[0] == 2.0
-    assert velocity(world, b)[0] == -2.0
-    assert velocity(world, fallen)[1] == pytest.approx(-10.0, rel=1e-12)
-    assert world.query_point(up(d, -0.1), mask=1) == [ground]
-    assert world.query_point(up(d, -0.1), mask=2) == []
-
-
 def test_layers_changed_between_steps_let_go_and_catch_again():
     """A body at rest whose floor is excluded by its mask falls freely in that very step, without support."""
     world = make_world(gravity=10.0)
