@@ -32,7 +32,7 @@ def build(
     block(world, (-10.0, -1.0), (10.0, 0.0), friction=friction)
     mass = np.ones(n)
     mass[-1] = top_mass
-    ball, box = (SphereCollider.many(radius=0.5, friction=friction), AABBCollider.many((0.5, 0.5), friction=friction))
+    ball, box = SphereCollider.many(radius=0.5, friction=friction), AABBCollider.many((0.5, 0.5), friction=friction)
     centres = np.stack([np.zeros(n), 0.5 + np.arange(n)], axis=1)
     world.create_entities(n, Transform.many(centres), RigidBody.many(mass=mass), ball if balls else box)
     return world
