@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from ..cli.options import listed, out_option, shown_options, whole_number
+from ..cli.options import COUNT, Listed, out_option, shown_options
 from ..cli.usage_errors import Problem
 from ..engines.pymunk_space import pymunk_module
 from ..reporting.output import Output, drawing_into
@@ -22,12 +22,9 @@ NAMES = ", ".join(dict.fromkeys(subject.scene for subject in SUITE))
 
 
 @click.command("bench", short_help="Time carom on this machine.")
+@click.option("--scenes", "scene_names", type=Listed(click.STRING), metavar="NAME,NAME", help=f"Only these of {NAMES}.")
 @click.option(
-    "--scenes", "scene_names", metavar="NAME,NAME", help=f"Only these of {NAMES}.",
-    callback=listed("--scenes", "names", str),
-)  # fmt: skip
-@click.option(
-    "--sizes", metavar="N,N", callback=listed("--sizes", "whole numbers from 1", whole_number),
+    "--sizes", type=Listed(COUNT), metavar="N,N",
     help=f"Numbers of bodies (default: {SIZES[0]:,} and {SIZES[1]:,}) of scenes that come in sizes; few, pyramid, "
     "static_world, fastgas, freefall and those that turn have their own.",
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The click groups of the ``carom`` command and its subcommands: one-line errors with suggestions."""
+"""The click groups of the ``carom`` command and its subcommands: errors of one line."""
 
 from __future__ import annotations
 
@@ -8,29 +8,11 @@ from typing import Any
 
 import click
 
-from .usage_errors import Problem, did_you_mean
-
 STOPPED = 130  # exit code after Ctrl-C
 
 
 class Commands(click.Group):
-    """A click group whose errors are one line on stderr, with suggestions, and exit code 2.
-
-    gone: what to say of commands that there are no more.
-    """
-
-    def __init__(self, *args: Any, gone: dict[str, str] | None = None, **options: Any) -> None:
-        super().__init__(*args, **options)
-        self.gone = gone or {}
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        name = args[0] if args else ""
-        if name and not name.startswith("-") and self.get_command(ctx, name) is None:
-            cure = f": {self.gone[name]}" if name in self.gone else did_you_mean(name, self.list_commands(ctx))
-            raise Problem(f"no command {name!r}{cure}")
-        return super().resolve_command(ctx, args)
+    """A click group whose errors are one line on stderr, and exit code 2."""
 
     def main(self, *args: Any, **options: Any) -> Any:
         options["standalone_mode"] = False

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import hashlib
 import inspect
-import symtable
+import math
 import sys
 import traceback
 import weakref
@@ -21,17 +20,15 @@ import numpy as np
 
 from ... import scenes
 from ...framework import Plugin, Settings, World
-from .options import apply, is_view
+from .options import Corners, apply, corners
 from .usage_errors import Problem, did_you_mean, one_line
-
-Bounds = tuple[tuple[float, ...], tuple[float, ...]]
 
 
 @dataclass(frozen=True)
 class Loaded:
-    """Something that builds worlds; ``seconds``, ``view`` and ``compared`` are None if not defined.
+    """Something that builds worlds; what it does not define is None.
 
-    settings: those that it recommends; None: not known before a world is built
+    seconds, view, settings: those that it recommends
     compared: compared(world) -> dict: what a game is judged by
     """
 
@@ -39,70 +36,44 @@ class Loaded:
     function: Any
     file: Path | None = None
     seconds: float | None = None
-    view: Bounds | None = None
+    view: Corners | None = None
     settings: Settings | None = None
     siblings: Siblings | None = None
     compared: Any = None
 
     def build(
-        self, settings: Settings | None, changes: dict[str, Any], seed: int, plugins: Sequence[Plugin] = ()
+        self, settings: Settings | None, changes: Mapping[str, Any], seed: int, plugins: Sequence[Plugin] = ()
     ) -> World:
-        """A world with ``settings`` (None: those that the scene or the file has itself) and with additional plugins;
-        Problem if it fails."""
-        chosen = settings
-        if settings is None:
-            settings = self.settings
-        brought = {name for each in plugins for name in (*each.integrators, *each.broad_phases, *each.mixing_rules)}
-        late = {field: value for field, value in changes.items() if value in brought}
-        early = {field: value for field, value in changes.items() if field not in late}
-        if early:
-            settings = apply(settings or self._own_settings(seed), early)
-        world = self._call(settings, seed)
-        ignored = _what_is_ignored(world.settings, chosen, early)
-        if ignored is not None:
-            world.close()
-            raise Problem(
-                f"{self.name}: build ignores its settings, so {ignored} has no effect: give them to the world, "
-                f"World(..., settings=settings)"
-            )
+        """A world with ``settings`` (None: those that the scene or the file has itself), with fields changed, and with
+        further plugins; Problem if it fails."""
+        given = settings or self.settings
+        if given is not None and not plugins:  # else these may be names that the plugins bring
+            given = apply(given, changes)
+        with self.attribute_errors(), stdout_kept_clean():
+            world = self._world(given, seed)
+        if not isinstance(world, World):
+            raise Problem(f"{self.name}: build returned {_kind(world)}, not a World")
+        if world.dimensions is None:
+            raise Problem(f"{self.name}: no physics in this world: World(Physics(...))")
         for plugin in plugins:
             try:
                 with stdout_kept_clean():
                     world.add_plugin(plugin)
             except (Exception, SystemExit) as error:  # runs third-party code that creates systems
                 raise Problem(f"--plugin {plugin.name}: {one_line(error)}") from error
-        if late:
+        wanted = apply(settings or world.settings, changes)
+        if wanted != world.settings:
             with self.attribute_errors():
-                world.settings = apply(world.settings, late)
+                world.settings = wanted
         return world
 
-    def _call(self, settings: Settings | None, seed: int) -> World:
-        with self.attribute_errors(), stdout_kept_clean():
-            world = self._own_world(seed) if settings is None else self.function(settings, seed=seed)
-        if not isinstance(world, World):
-            what = "nothing (None)" if world is None else f"a {type(world).__name__}"
-            raise Problem(f"{self.name}: build returned {what}, not a World")
-        if world.dimensions is None:
-            raise Problem(f"{self.name}: no physics in this world: World(Physics(...))")
-        return world
-
-    @property
-    def _default(self) -> Settings | None:
-        """The default of the parameter of ``build``, if it has one."""
-        default = next(iter(inspect.signature(self.function).parameters.values())).default
-        return default if isinstance(default, Settings) else None
-
-    def _own_settings(self, seed: int) -> Settings:
-        """Those to be changed: of a build that makes its own of None, of a world that it has built."""
-        if self._default is not None:
-            return self._default
-        with contextlib.closing(self._call(None, seed)) as world:
-            return world.settings
-
-    def _own_world(self, seed: int) -> Any:
+    def _world(self, settings: Settings | None, seed: int) -> Any:
         """With the settings that ``build`` has by default, or makes of None; Settings() if it cannot take None."""
+        if settings is not None:
+            return self.function(settings, seed=seed)
+        first = next(iter(inspect.signature(self.function).parameters.values()))
         try:
-            return self.function(self._default, seed=seed)
+            return self.function(None if first.default is first.empty else first.default, seed=seed)
         except (AttributeError, TypeError):
             return self.function(Settings(), seed=seed)
 
@@ -117,14 +88,11 @@ class Loaded:
         values = {}
         for name, value in found.items():
             try:
-                numbers = np.atleast_1d(np.array(np.nan if value is None else value, float))
+                numbers = np.atleast_1d(np.array(math.nan if value is None else value, float))
             except (TypeError, ValueError):
                 numbers = np.zeros(0)
             if numbers.shape not in ((1,), (world.dimensions,)):
-                raise Problem(
-                    f"{self.name}: compared must give a number, None or a place for each name, not {value!r} for "
-                    f"{name!r}"
-                )
+                raise Problem(f"{self.name}: compared must give a number, None or a place, not {value!r} for {name!r}")
             values[str(name)] = numbers.tolist()
         return values
 
@@ -137,25 +105,14 @@ class Loaded:
         try:
             with self.siblings.at_hand() if self.siblings is not None else contextlib.nullcontext():
                 yield
+        except Problem:
+            raise
         except (Exception, SystemExit) as error:
-            if isinstance(error, Problem):
-                raise
             raise Problem(f"{self.name}{_line_in(self.file, error)}: {one_line(error)}") from error
 
 
-def _what_is_ignored(found: Settings, chosen: Settings | None, changes: dict[str, Any]) -> str | None:
-    """The option that a world's settings show nothing of; of a preset a build may change this and that, not all."""
-    for field, value in changes.items():
-        if getattr(found, field) != value:
-            return f"--set {field}={value}"
-    if chosen is None:
-        return None
-    default = Settings()
-    told = [field.name for field in dataclasses.fields(Settings)]
-    told = [name for name in told if name not in changes and getattr(chosen, name) != getattr(default, name)]
-    if told and all(getattr(found, name) != getattr(chosen, name) for name in told):
-        return "--settings"
-    return None
+def _kind(value: object) -> str:
+    return "nothing (None)" if value is None else f"a {type(value).__name__}"
 
 
 def stdout_kept_clean() -> contextlib.AbstractContextManager[Any]:
@@ -165,124 +122,75 @@ def stdout_kept_clean() -> contextlib.AbstractContextManager[Any]:
 
 def load(target: str) -> Loaded:
     """The scene named ``target``, with hyphens if one likes, or the file at that path; Problem if neither exists."""
-    name = target.replace("-", "_")
+    name, path = target.replace("-", "_"), Path(target)
     if name in scenes.names():
         scene = scenes.get(name)
         return Loaded(scene.name, scene.build, seconds=scene.seconds, view=scene.view, settings=scene.settings)
-    path = Path(target)
-    if path.is_dir():
-        raise Problem(f"{target!r} is a folder, not a scene or a file")
-    if path.is_file() and path.suffix != ".py":
-        raise Problem(f"{target!r} is not a Python file: a file of one's own ends in .py")
     if path.suffix == ".py":
         return _load_file(path)
-    if path.parent != Path():
-        raise Problem(f"no file {target!r}: a file of one's own ends in .py")
+    if path.exists() or path.parent != Path():
+        raise Problem(f"{target!r} is no scene, and no Python file: its name ends in .py")
     raise Problem(f"no scene named {target!r}{did_you_mean(target, scenes.names())} (a file of one's own ends in .py)")
 
 
 def import_file(path: Path) -> ModuleType:
-    """Import the module in that file; Problem if it does not exist or raises."""
-    _must_exist(path)
-    return _execute(path, Siblings(path))
+    """Import the module in that file, under a name of its own; Problem if it does not exist or raises."""
+    return _execute(path, _source(path))
 
 
-def _must_exist(path: Path) -> None:
-    if not path.exists():
-        siblings = [p.name for p in path.parent.glob("*.py")]
-        hint = did_you_mean(path.name, siblings) if siblings else ""
-        raise Problem(f"no file {str(path)!r}{hint if 'mean' in hint else ''}")
-    if not path.is_file():
-        raise Problem(f"{str(path)!r} is not a file")
+def _source(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        near = did_you_mean(path.name, [each.name for each in path.parent.glob("*.py")])
+        raise Problem(f"no file {str(path)!r}{near}") from None
+    except OSError as error:
+        raise Problem(f"{path}: {error.strerror}") from error
 
 
 def _load_file(path: Path) -> Loaded:
-    _must_exist(path)
-    _check_source(path)
-    siblings = Siblings(path)
-    module = _execute(path, siblings)
-    function = getattr(module, "build", None)
+    source = _source(path)
+    missing = f"{path.name} defines no build(settings, seed=0)"
+    if b"build" not in source:
+        raise Problem(missing)  # before it runs: it may be a whole game
+    module = _execute(path, source)
+    function, compared = getattr(module, "build", None), getattr(module, "compared", None)
     if not callable(function):
-        raise Problem(f"{path.name} defines no build(settings, seed=0)")
-    _check_signature(path, function)
-    seconds, view = _seconds_of(path, module), _view_of(path, module)
-    compared = getattr(module, "compared", None)
+        raise Problem(missing)
+    try:
+        inspect.signature(function).bind(None, seed=0)
+    except TypeError:
+        line = getattr(getattr(function, "__code__", None), "co_firstlineno", "?")
+        raise Problem(f"{path.name}, line {line}: build must take (settings, seed=0)") from None
+    seconds, view, settings = (getattr(module, name, getattr(module, name.upper(), None))
+                               for name in ("seconds", "view", "settings"))  # fmt: skip
+    number = isinstance(seconds, (int, float)) and not isinstance(seconds, bool)
+    if seconds is not None and not (number and 0 <= seconds < math.inf):
+        raise Problem(f"{path.name}: seconds must be a number of at least 0, not {seconds!r}")
+    try:
+        view = None if view is None or callable(view) else corners(view)
+    except (TypeError, ValueError):
+        raise Problem(f"{path.name}: view must be (lower corner, upper corner), not {view!r}") from None
     if compared is not None and not callable(compared):
         raise Problem(f"{path.name}: compared must be a function, compared(world) -> dict, not {compared!r}")
-    settings = _value_in(module, "settings")
     own = settings if isinstance(settings, Settings) else None
-    return Loaded(path.name, function, path.resolve(), seconds, view, own, siblings, compared)
+    return Loaded(path.name, function, path.resolve(), seconds, view, own, vars(module)["__siblings__"], compared)
 
 
-def _check_source(path: Path) -> None:
-    """Problem for a file without a build; such a file is not executed, since it may be a whole game."""
-    try:
-        source = path.read_bytes()
-        module = symtable.symtable(source.decode(errors="replace"), str(path), "exec")
-    except SyntaxError as error:
-        raise Problem(f"{path.name}, line {error.lineno}: {error.msg}") from error
-    except (OSError, ValueError) as error:
-        raise Problem(f"{path.name}: {one_line(error)}") from error
-    names = [symbol.get_name() for symbol in module.get_symbols() if symbol.is_assigned() or symbol.is_imported()]
-    if "build" not in names and b"import *" not in source:
-        hint = did_you_mean("build", names) if names else ""
-        raise Problem(f"{path.name} defines no build(settings, seed=0){hint if 'mean' in hint else ''}")
-
-
-def _value_in(module: Any, name: str) -> Any:
-    """What the file calls that, or the same in capitals."""
-    return getattr(module, name, getattr(module, name.upper(), None))
-
-
-def _seconds_of(path: Path, module: Any) -> float | None:
-    """The duration that the file recommends."""
-    value = _value_in(module, "seconds")
-    if value is None:
-        return None
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value < float("inf"):
-        raise Problem(f"{path.name}: seconds must be a number of at least 0, not {value!r}")
-    return float(value)
-
-
-def _view_of(path: Path, module: Any) -> Bounds | None:
-    """The file's ``view``: its lower and its upper corner."""
-    value = _value_in(module, "view")
-    if value is None or callable(value):
-        return None
-    try:
-        lower, upper = (tuple(float(x) for x in end) for end in value)
-    except (TypeError, ValueError):
-        lower, upper = (), ()
-    if not is_view((lower, upper)):
-        raise Problem(f"{path.name}: view must be (lower corner, upper corner), not {value!r}")
-    return lower, upper
-
-
-def _execute(path: Path, siblings: Siblings) -> Any:
-    """Import the file under a name of its own."""
+def _execute(path: Path, source: bytes) -> ModuleType:
     folder = hashlib.sha256(str(path.resolve().parent).encode()).hexdigest()[:8]
-    name = f"carom_file_{path.stem}_{folder}"
+    name, siblings = f"carom_file_{path.stem}_{folder}", Siblings(path)
     module = ModuleType(name)
     module.__file__, module.__siblings__ = str(path), siblings  # type: ignore[attr-defined]
     sys.modules[name] = module  # dataclasses and pickle look here
     try:
         with siblings.at_hand(), stdout_kept_clean():
-            exec(compile(path.read_bytes(), str(path), "exec", dont_inherit=True), vars(module))  # no byte code is kept
+            exec(compile(source, str(path), "exec", dont_inherit=True), vars(module))  # no byte code is kept
     except SyntaxError as error:
-        file = Path(error.filename).name if error.filename else path.name
-        raise Problem(f"{file}, line {error.lineno}: {error.msg}") from error
+        raise Problem(f"{Path(error.filename or path).name}, line {error.lineno}: {error.msg}") from error
     except (Exception, SystemExit) as error:
         raise Problem(f"{path.name}{_line_in(path.resolve(), error)}: {one_line(error)}") from error
     return module
-
-
-def _check_signature(path: Path, function: Any) -> None:
-    try:
-        inspect.signature(function).bind(None, seed=0)
-    except TypeError:
-        line = getattr(getattr(function, "__code__", None), "co_firstlineno", None)
-        where = f", line {line}" if line else ""
-        raise Problem(f"{path.name}{where}: build must take (settings, seed=0)") from None
 
 
 def _line_in(file: Path | None, error: BaseException) -> str:
@@ -290,12 +198,13 @@ def _line_in(file: Path | None, error: BaseException) -> str:
     links: list[BaseException] = []
     link: BaseException | None = error
     while link is not None and link not in links:
-        links.insert(0, link)  # the first cause is the most precise
+        links.append(link)
         link = link.__cause__ or link.__context__
-    frames = (reversed(traceback.extract_tb(link.__traceback__)) for link in links if file is not None)
-    lines = (frame.lineno for some in frames for frame in some if Path(frame.filename or ".").resolve() == file)
-    line = next(lines, None)
-    return f", line {line}" if line is not None else ""
+    for each in reversed(links):  # the first cause is the most precise
+        for frame in reversed(traceback.extract_tb(each.__traceback__)):
+            if file is not None and Path(frame.filename or ".").resolve() == file:
+                return f", line {frame.lineno}"
+    return ""
 
 
 # -- modules beside a file -------------------------------------------------------------------------------
@@ -307,8 +216,8 @@ _all: weakref.WeakSet[Siblings] = weakref.WeakSet()
 def module_of(thing: type) -> ModuleType | None:
     """The module of a class, which may lie beside a file of the user."""
     name = thing.__module__
-    found = (sys.modules.get(name), *(siblings._modules.get(name) for siblings in _all))
-    return next((module for module in found if vars(module or thing).get(thing.__name__) is thing), None)
+    found = (sys.modules.get(name), *(siblings.modules.get(name) for siblings in _all))
+    return next((module for module in found if module and vars(module).get(thing.__name__) is thing), None)
 
 
 class Siblings:
@@ -319,42 +228,37 @@ class Siblings:
 
     def __init__(self, file: Path) -> None:
         self.folder = file.resolve().parent
-        self._modules: dict[str, ModuleType] = {}
-        self._depth = 0
+        self.modules: dict[str, ModuleType] = {}
+        self._at_hand = False
         _all.add(self)
 
     @property
     def files(self) -> set[Path]:
         """Where those that have been imported come from."""
-        return {Path(file) for module in self._modules.values() if (file := getattr(module, "__file__", None))}
+        return {Path(file) for module in self.modules.values() if (file := getattr(module, "__file__", None))}
 
     @contextmanager
     def at_hand(self) -> Iterator[None]:
         """Imports find the file's siblings; afterwards ``sys.path`` and ``sys.modules`` are as they were before."""
-        if self._depth:
+        if self._at_hand:
             yield
             return
-        self._depth += 1
-        path = str(self.folder)
-        before = {name: module for name, module in sys.modules.items() if name in self._modules}
-        known = set(sys.modules) - before.keys()
-        sys.modules.update(self._modules)
+        path, before = str(self.folder), {**sys.modules}
+        sys.modules.update(self.modules)
         sys.path.insert(0, path)
+        self._at_hand = True
         try:
             yield
         finally:
-            self._depth -= 1
+            self._at_hand = False
             if path in sys.path:
                 sys.path.remove(path)
-            for name in [name for name in sys.modules if name not in known and self._is_sibling(name)]:
-                self._modules[name] = sys.modules.pop(name)
-            sys.modules.update(before)
+            own = [name for name, module in sys.modules.items() if before.get(name) is not module and self._holds(name)]
+            self.modules.update((name, sys.modules.pop(name)) for name in own)
+            sys.modules.update((name, before[name]) for name in own if name in before)
 
-    def _is_sibling(self, name: str) -> bool:
+    def _holds(self, name: str) -> bool:
         """Whether a module, or the package it belongs to, lies in the folder itself."""
         top = sys.modules.get(name.partition(".")[0])
-        file = getattr(top, "__file__", None)
-        if file is not None:
-            place = Path(file)
-            return self.folder == (place.parent.parent if place.stem == "__init__" else place.parent)
-        return any(Path(folder).parent == self.folder for folder in getattr(top, "__path__", ()))
+        places = [getattr(top, "__file__", None), *getattr(top, "__path__", ())]
+        return any(self.folder in [*Path(place).parents][:2] for place in places if place)

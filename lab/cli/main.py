@@ -25,11 +25,9 @@ COMMANDS = {
     "warm-up": ("cli.warm_up:warm_up_command", "Compile ahead, so that the first run does not wait."),
 }
 
-GONE = {"tune": "carom trade FILE --max-error E finds the cheapest settings that keep an error"}
-
 
 @click.group(
-    cls=LateCommands, late=COMMANDS, gone=GONE, context_settings={"help_option_names": ["-h", "--help"]},
+    cls=LateCommands, late=COMMANDS, context_settings={"help_option_names": ["-h", "--help"]},
     invoke_without_command=True,
 )  # fmt: skip
 @click.version_option(__version__, prog_name="carom")

@@ -22,7 +22,7 @@ from ..reporting.output import drawing_if_there, drawing_module
 from ..reporting.progress import Progress
 from ..reporting.text import NOTHING, TextTable, counted, number
 from .loading import Loaded, load, stdout_kept_clean
-from .options import above_zero, parse_view, traceback_option, world_options, writable_folder
+from .options import NOT_NEGATIVE, Corners, View, json_option, traceback_option, world_options, writable_folder
 from .usage_errors import Problem
 
 DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
@@ -31,10 +31,7 @@ DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
 @click.command("run", short_help="Run a scene or a file and show what happened.")
 @click.argument("target", metavar="SCENE|FILE.py")
 @click.option("--steps", type=click.IntRange(min=0), help="How many steps to take.")
-@click.option(
-    "--seconds", type=float, callback=above_zero("--seconds", "a number of at least 0", zero=True),
-    help="How long to simulate (default: what the scene recommends).",
-)  # fmt: skip
+@click.option("--seconds", type=NOT_NEGATIVE, help="How long to simulate (default: what the scene recommends).")
 @world_options
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True,
@@ -43,14 +40,14 @@ DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
 @click.option(
     "--record", type=click.Path(path_type=Path), metavar="FILE", help="A picture that moves: NAME.gif or NAME.webp."
 )
-@click.option("--view", "view_text", metavar="X0,Y0,X1,Y1", help="What the pictures show: two corners.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout.")
+@click.option("--view", type=View(), metavar="X0,Y0,X1,Y1", help="What the pictures show: two corners.")
+@json_option
 @click.option("--no-pictures", is_flag=True, help="Draw nothing.")
 @click.option("--profile", is_flag=True, help="Time every kernel, and show where the step's time goes.")
 @traceback_option
 def run_command(
     target: str, steps: int | None, seconds: float | None, settings: Settings | None, changes: dict[str, Any],
-    seed: int, plugins: tuple[str, ...], out: Path, record: Path | None, view_text: str | None, as_json: bool,
+    seed: int, plugins: tuple[str, ...], out: Path, record: Path | None, view: Corners | None, as_json: bool,
     no_pictures: bool, profile: bool,
 ) -> None:  # fmt: skip
     """Run a scene of the library, or a file that defines build(settings, seed=0), and show what happened."""
@@ -58,8 +55,8 @@ def run_command(
         raise Problem("--steps and --seconds exclude each other")
     added = [plugin_named(name) for name in plugins]
     loaded = load(target)
-    if view_text is not None:
-        loaded = dataclasses.replace(loaded, view=parse_view(view_text))
+    if view is not None:
+        loaded = dataclasses.replace(loaded, view=view)
     draw = _drawing(no_pictures, out)
     films = None if record is None else _recording(record)
     screen = Console(stderr=True)

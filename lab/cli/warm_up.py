@@ -30,7 +30,7 @@ from ...plugins.rotation import BoxCollider, Rotation, Spin
 from ..reporting.progress import Progress
 from ..reporting.text import TextTable
 from .loading import Loaded, load, stdout_kept_clean
-from .options import traceback_option
+from .options import json_option, traceback_option
 from .usage_errors import Problem
 
 # The plugins that ship and bring shapes.
@@ -63,7 +63,7 @@ class Row:
     help="Compile into this folder, for any processor of this platform: to ship with a game or a plugin.",
 )
 @click.option("--clear", is_flag=True, help="Empty the cache folder instead; old versions' kernels are in it too.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout.")
+@json_option
 @traceback_option
 def warm_up_command(
     targets: tuple[str, ...], everything: bool, dimensions: str | None, portable: Path | None, clear: bool,

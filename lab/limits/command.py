@@ -14,7 +14,7 @@ from rich.console import Console
 
 from ...framework import Settings, World
 from ..cli.loading import Loaded, stdout_kept_clean
-from ..cli.options import above_zero, traceback_option, world_options
+from ..cli.options import NOT_NEGATIVE, POSITIVE, traceback_option, world_options
 from ..cli.usage_errors import Problem
 from ..jobs import Jobs
 from ..plain import Plain, jsonable
@@ -34,12 +34,9 @@ DEFAULT_SECONDS = 10.0  # for a file that does not define it
 @click.command("limits", short_help="How long a scene's step may be, and what limits it.")
 @click.argument("target", metavar="SCENE|FILE.py")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout.")
+@click.option("--seconds", type=NOT_NEGATIVE, help="How long to watch it (default: what it recommends; 0: its start).")
 @click.option(
-    "--seconds", type=float, callback=above_zero("--seconds", "a number of at least 0", zero=True),
-    help="How long to watch it (default: what it recommends; 0: its start).",
-)  # fmt: skip
-@click.option(
-    "--max-error", "way", type=float, metavar="METRES", callback=above_zero("--max-error", "metres above 0"),
+    "--max-error", "way", type=POSITIVE, metavar="METRES",
     help="How far a body may be from where it should (default: 1 % of the smallest one's size).",
 )  # fmt: skip
 @world_options

@@ -11,9 +11,9 @@ from rich.console import Console
 
 from ..cli.group import STOPPED
 from ..cli.options import (
+    POSITIVE,
     WORDS,
     KeepsWords,
-    above_zero,
     case_options,
     only_options,
     out_option,
@@ -34,12 +34,12 @@ from .trade import trade
 @click.argument("scenes", metavar="SCENE|FILE.py...", nargs=-1, required=True)
 @together(
     click.option(
-        "--max-error", type=float, metavar="E", callback=above_zero("--max-error"),
+        "--max-error", type=POSITIVE, metavar="E",
         help="The cheapest settings that keep this error, a part of what the norm is relative to.",
     ),
     click.option("--absolute", is_flag=True, help="--max-error is in the scene's own units."),
     click.option(
-        "--max-cost", type=float, metavar="MS", callback=above_zero("--max-cost"),
+        "--max-cost", type=POSITIVE, metavar="MS",
         help="The best settings that take at most these milliseconds a frame of 1/60 s.",
     ),
     case_options, only_options, runs_options,

@@ -10,8 +10,11 @@ import textwrap
 
 import helpers_cli
 import pytest
-from helpers_cli import FALLING_BALL, refusal
+from helpers_cli import FALLING_BALL, refusal, report_of
 from helpers_cli_plugins import offer
+
+from carom.framework import Settings
+from carom.lab.cli.loading import load
 
 carom = helpers_cli.carom  # a fixture
 
@@ -73,8 +76,6 @@ def test_ctrl_c_while_compiling_is_one_line(tmp_path):
 
 
 def test_a_scene_may_be_named_with_hyphens():
-    from carom.lab.cli.loading import load
-
     assert load("billiards-spin").name == "billiards_spin"
 
 
@@ -89,8 +90,6 @@ LATE = FALLING_BALL.replace(
 @pytest.mark.parametrize(("text", "factor"), [(SIBLING, 1), (LATE, 2)], ids=["at the top", "inside build"])
 def test_files_of_different_folders_have_their_own_siblings(tmp_path, text, factor):
     """``import params`` and packages, in the file and in its functions; nothing of it is left behind."""
-    from carom.lab.cli.loading import load
-
     for number in (3, 7):
         folder = tmp_path / str(number)
         (folder / "tools").mkdir(parents=True)
@@ -112,20 +111,9 @@ def test_files_of_different_folders_have_their_own_siblings(tmp_path, text, fact
 # -- settings -------------------------------------------------------------------------------------
 
 
-def test_a_build_that_ignores_its_settings_is_refused(carom, tmp_path):
+def test_a_build_that_ignores_its_settings_gets_them_all_the_same(carom, tmp_path):
     (tmp_path / "deaf.py").write_text(FALLING_BALL.replace("settings=settings or Settings.balanced()", "settings=None"))
-    arguments = ("run", "deaf.py", "--steps", "1", "--no-pictures")
-    assert carom(*arguments).exit_code == 0
-    line = refusal(carom(*arguments, "--set", "dt=1/120"))
-    assert "deaf.py: build ignores its settings, so --set dt=0.00833" in line
-    line = refusal(carom(*arguments, "--settings", "fast"))
-    assert "deaf.py: build ignores its settings, so --settings has no effect" in line
-
-
-def test_set_builds_once_where_the_file_tells_its_settings(carom, tmp_path):
-    """Else a first world tells what the build makes of None."""
-    loud = FALLING_BALL.replace("    world = ", "    print('built')\n    world = ", 1)
-    (tmp_path / "loud.py").write_text(f"{loud}\nSETTINGS = Settings(substeps=8)\n")
-    result = carom("run", "loud.py", "--steps", "1", "--no-pictures", "--set", "dt=1/120")
-    assert result.exit_code == 0
-    assert result.stderr.count("built") == 1
+    arguments = ("run", "deaf.py", "--steps", "1", "--no-pictures", "--json")
+    assert report_of(carom(*arguments, "--set", "dt=1/120"))["settings"]["dt"] == 1 / 120
+    fast, settings = report_of(carom(*arguments, "--settings", "fast"))["settings"], Settings.fast()
+    assert (fast["substeps"], fast["dt"]) == (settings.substeps, settings.dt)

@@ -90,8 +90,8 @@ def test_the_command_tells_what_broke_while_it_watched(carom, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["stack", "--seconds", "-1"], "--seconds takes a number of at least 0"),
-        (["stack", "--max-error", "0"], "--max-error takes metres above 0, not 0"),
+        (["stack", "--seconds", "-1"], "'--seconds': -1.0 is not in"),
+        (["stack", "--max-error", "0"], "'--max-error': 0.0 is not in"),
         (["stak"], "no scene named 'stak'; did you mean 'stack'"),
         ([], "Missing argument"),
     ],
