@@ -14,22 +14,19 @@ import numpy as np
 
 from ...components import Collider
 from ...framework import CaromError, NoPhysicsError, World
-from ...systems import Integrator
 from ..plain import jsonable
 from .stability import stability_limits
-from .stiffness import Modes, modes_of, unmeasured
+from .stiffness import modes_of, unmeasured
 
 SAFETY = 0.9  # fraction of the limit that is suggested
-ROUNDS = 50  # more than needed to find the first pair that tunnels
+FASTEST = 200  # bodies that are compared with all others
 
 
 @dataclass(frozen=True)
 class Oscillation:
-    """What limits stability: the oscillation x'' = -frequency^2 x - (drag + damping) x' of a body or of several.
+    """x'' = -frequency^2 x - (drag + damping) x', of a body or of several; entity: the one with the largest amplitude.
 
-    entity: the body with the largest amplitude
-    frequency: rad/s; 0: drag alone
-    drag, damping: 1/s, by forces and by linear_damping
+    frequency: rad/s; drag, damping: 1/s, by forces and by linear or angular damping
     limit: s; 0 if the integrator makes it grow at any step
     """
 
@@ -42,11 +39,9 @@ class Oscillation:
 
 @dataclass(frozen=True)
 class Passage:
-    """The pair that tunnels first: two bodies that are sure to meet while speed * dt <= size.
+    """Two bodies, the faster one first, that are sure to meet while speed * dt <= size.
 
-    speed: m/s, the sum of both speeds
-    size: m, the sum of both smallest extents: w + 2 r for a ball and a wall
-    limit: s
+    speed: m/s, the sum of both; size: m, the sum of both smallest extents, w + 2 r of a wall and a ball; limit: s
     """
 
     entity: int
@@ -60,8 +55,7 @@ class Passage:
 class StepLimits:
     """What limits the step of a world in its present state; None if nothing does.
 
-    dt: s, the present step
-    integrator: as in its settings; "flight" if the world is event-driven
+    dt: s, the present step; integrator: as in its settings, "flight" if the world is event-driven
     """
 
     dt: float
@@ -77,7 +71,7 @@ class StepLimits:
 
     @property
     def tunnelling(self) -> float:
-        """s: at longer steps the fastest bodies may pass through others."""
+        """s: at longer steps fast bodies may pass through others."""
         return math.inf if self.passage is None else self.passage.limit
 
     @property
@@ -85,29 +79,25 @@ class StepLimits:
         """s: SAFETY times the smaller limit; 0 if no step is stable, inf if nothing limits it."""
         return SAFETY * min(self.stability, self.tunnelling)
 
-    def sentences(self) -> list[str]:
-        """What limits the step, and the suggested step."""
+    def __str__(self) -> str:
+        fits = "fits" if self.dt <= self.suggested else "is too long"
+        last = f"Suggested: dt = {self.suggested:.4g} s, {SAFETY:g} of the limit. The step of {self.dt:.4g} s {fits}."
         if self.suggested == math.inf:
             last = "Nothing limits the step: choose it by the accuracy you need."
         elif self.suggested == 0.0:
             last = f"No step is stable: choose another integrator than {self.integrator}."
-        else:
-            fits = "fits" if self.dt <= self.suggested else "is too long"
-            last = f"Suggested: dt = {self.suggested:.4g} s, {SAFETY:g} of the limit."
-            last += f" The step of {self.dt:.4g} s {fits}."
-        return [self._on_stability(), self._on_passage(), last]
+        return "\n".join((self._on_stability(), self._on_passage(), last))
 
     def _on_stability(self) -> str:
         found = self.oscillation
         if found is None:
             return f"Stability ({self.integrator}): no force makes a body swing, or brakes it."
-        parts = [f"swings at {found.frequency:.4g} rad/s"] * bool(found.frequency)
-        parts += [f"is braked at {found.drag:.4g} /s"] * bool(found.drag)
-        parts += [f"is damped at {found.damping:.4g} /s"] * bool(found.damping)
-        what = f"entity {found.entity} {' and '.join(parts)}"
-        if found.limit == 0.0:
-            return f"Stability: {what}, and {self.integrator} makes that grow at any step."
-        return f"Stability: {what}; {self.integrator} holds it up to dt = {found.limit:.4g} s."
+        facts = {"swings": (found.frequency, "rad/s"), "is braked": (found.drag, "/s"),
+                 "is damped": (found.damping, "/s")}  # fmt: skip
+        what = " and ".join(f"{verb} at {value:.4g} {unit}" for verb, (value, unit) in facts.items() if value)
+        held = f"; {self.integrator} holds it up to dt = {found.limit:.4g} s."
+        grows = f", and {self.integrator} makes that grow at any step."
+        return f"Stability: entity {found.entity} {what}{held if found.limit else grows}"
 
     def _on_passage(self) -> str:
         found = self.passage
@@ -119,9 +109,6 @@ class StepLimits:
             f"way of {found.size:.4g} m; they are sure to be caught up to dt = {found.limit:.4g} s."
         )
 
-    def __str__(self) -> str:
-        return "\n".join(self.sentences())
-
     def as_dict(self) -> dict[str, Any]:
         """For JSON, which has no infinity: None means no limit."""
         numbers = {name: getattr(self, name) for name in ("stability", "tunnelling", "suggested")}
@@ -129,12 +116,8 @@ class StepLimits:
 
 
 def suggest_dt(world: World) -> float:
-    """The longest step, in seconds, that is safe for ``world`` in its present state; see :func:`step_limits` for the
-    reasons.
-
-    At most SAFETY times the limits of stability of its integrator, which are known (Hairer & Wanner, Solving Ordinary
-    Differential Equations II), for instance w dt = 2 for a spring of frequency w with semi-implicit Euler. In a world
-    with discrete collisions also short enough to keep the fastest bodies from tunnelling.
+    """The longest step, in seconds, that is safe for ``world`` in its present state: SAFETY times the shorter limit of
+    stability and of tunnelling, for which see :func:`step_limits`.
 
     0.0: no step is stable, as with explicit Euler and a spring without damping. inf: nothing limits the step.
     """
@@ -142,13 +125,11 @@ def suggest_dt(world: World) -> float:
 
 
 def step_limits(world: World) -> StepLimits:
-    """What limits the step of ``world`` at its present state: positions, velocities, forces, bodies.
+    """What limits the step of ``world`` at its present state: its force systems, and speeds if collisions are discrete.
 
-    A spring that stiffens when stretched, or a ball that will fall, may set another limit later. Force systems are the
-    only user systems that are analysed. The world is left unchanged, bit for bit.
-
-    ValueError if its forces are not finite, NoPhysicsError if it has no physics, CaromError inside a step, TypeError if
-    ``world`` is not a World.
+    A spring that stiffens when stretched, or a ball that will fall, may set another limit later. The world is left
+    unchanged, bit for bit. ValueError if its forces are not finite, NoPhysicsError if it has no physics, CaromError
+    inside a step, TypeError if ``world`` is not a World.
     """
     if not isinstance(world, World):
         raise TypeError(f"world must be a World, got {world!r}")
@@ -157,94 +138,57 @@ def step_limits(world: World) -> StepLimits:
     services: Any = world.physics
     if services.table.in_step:
         raise CaromError("the limits of a step can be asked for between steps only, not inside one")
-    modes = modes_of(world)
-    integrator = type(services.integration.integrator)()
-    settings = world.settings
-    passage = first_passage(world) if settings.collision == "discrete" else None
-    oscillation = _first_to_grow(integrator, modes)
-    return StepLimits(settings.dt, services.integration.integrator_name, settings.collision, oscillation, passage)
+    settings, integration = world.settings, services.integration
+    passage = _first_passage(world) if settings.collision == "discrete" else None
+    return StepLimits(settings.dt, integration.integrator_name, settings.collision, _first_to_grow(world), passage)
 
 
-def _first_to_grow(integrator: Integrator, modes: Modes) -> Oscillation | None:
+def _first_to_grow(world: World) -> Oscillation | None:
     """The mode with the shortest limit; of several the stiffest."""
-    if not len(modes.entity):
+    services: Any = world.physics
+    modes = modes_of(world)
+    limits = stability_limits(
+        type(services.integration.integrator), world.settings.collision, modes.stiffness, modes.drag, modes.damping
+    )
+    if not np.isfinite(limits).any():
         return None
-    limits = stability_limits(integrator, modes.stiffness, modes.drag, modes.damping)
-    stiffest = np.lexsort((modes.entity, -np.abs(modes.drag), -np.abs(modes.stiffness), limits))[0]
-    limit, damping = float(limits[stiffest]), float(modes.damping[stiffest])
-    if limit == math.inf:
-        return None
-    stiffness, drag = (float(np.abs(of[stiffest])) for of in (modes.stiffness, modes.drag))
-    return Oscillation(int(modes.entity[stiffest]), math.sqrt(stiffness), drag, damping, limit)
+    first = np.lexsort((modes.entity, -np.abs(modes.drag), -np.abs(modes.stiffness), limits))[0]
+    frequency, drag = abs(modes.stiffness[first]) ** 0.5, abs(modes.drag[first])
+    numbers = frequency, drag, modes.damping[first], limits[first]
+    return Oscillation(int(modes.entity[first]), *map(float, numbers))
 
 
-def first_passage(world: World) -> Passage | None:
-    """The pair of bodies that may tunnel at the shortest step, if collisions are discrete.
+def _first_passage(world: World) -> Passage | None:
+    """The pair that may tunnel at the shortest step, of the fastest bodies and all that they may meet.
 
-    They overlap over a path as long as the sum of their smallest extents; the speed at which they may meet is the sum
-    of both speeds. Excluded: sensors, bodies with ``ccd``, pairs that never meet by their layers or groups, or
-    of which none is dynamic. A tile map counts as one body. None if no pair is left, or nothing moves.
+    Left out: sensors, what has no end, bodies with ``ccd``, pairs that layers and groups keep apart, or of which none
+    is dynamic. A tile map counts as one body.
     """
-    bodies, services = world.bodies, world.physics
-    size, solid, group = _sizes(services)
-    speed = np.zeros(len(bodies))
-    moving = slice(0, bodies.kinematic.rows.stop)
-    speed[moving] = np.linalg.norm(bodies.linear_velocity[moving], axis=1)
-    solid &= ~np.asarray(bodies.ccd, bool) & np.isfinite(speed) & np.isfinite(size)
-    if not solid.any() or not speed[solid].any():
-        return None
-    dynamic = np.arange(len(bodies)) < bodies.dynamic.rows.stop
-    layers = np.unique(np.column_stack((group, dynamic))[solid], axis=0)
-    members = [np.flatnonzero(solid & (group == g[:3]).all(axis=1) & (dynamic == g[3])) for g in layers]
-    pairs = [
-        (i, j)
-        for i, one in enumerate(layers)
-        for j, other in enumerate(layers[: i + 1])
-        if (one[3] or other[3]) and one[0] & other[1] and other[0] & one[1] and not one[2] == other[2] != 0
-    ]
-    best: tuple[float, int, int] | None = None
-    limit = 4 * float(size[solid].max()) / float(speed[solid].max())  # more than any
-    for _ in range(ROUNDS):  # Dinkelbach's method for the smallest ratio of two sums
-        room = size - limit * speed
-        firsts = [rows[np.argsort(room[rows], kind="stable")[:2]] for rows in members]
-        found = None
-        for i, j in pairs:
-            a, b = (firsts[i][0], firsts[j][0]) if i != j else (*firsts[i], -1)[:2]
-            if b >= 0 and speed[a] + speed[b] > 0:
-                candidate = (float(room[a] + room[b]), int(a), int(b))
-                found = candidate if found is None or candidate < found else found
-        if found is None:
-            return None
-        _, a, b = found
-        shorter = float((size[a] + size[b]) / (speed[a] + speed[b]))
-        if best is not None and shorter >= best[0]:
-            break
-        best = (shorter, a, b)
-        limit = shorter
-    assert best is not None
-    limit, a, b = best
-    fast, slow = (a, b) if speed[a] >= speed[b] else (b, a)
-    entity = bodies.entity
-    return Passage(int(entity[fast]), int(entity[slow]), float(speed[a] + speed[b]), float(size[a] + size[b]), limit)
-
-
-def _sizes(services: Any) -> tuple[Any, Any, Any]:
-    """Of every row: its smallest extent (m; inf if unbounded), whether it is solid, and (layer, mask, group)."""
-    table = services.table
-    count = table.count
+    bodies, count = world.bodies, len(world.bodies)
+    services: Any = world.physics
     services.refresh_for_queries()
-    size, solid, group = np.zeros(count), np.zeros(count, bool), np.zeros((count, 3), np.int64)
     if services.scene.linked is None:
-        return size, solid, group
+        return None
     services.scene.refresh_rotation()
     with unmeasured(services.state):
         services.search.index_now()  # makes the boxes
     services.queries.forget()
-    bodies, rows = services.state.bodies, np.arange(count)
-    slot = bodies.collider_slot[:count]
+    columns, rows, slot = services.state.bodies, np.arange(count), services.state.bodies.collider_slot[:count]
     names = "sensor", "layer", "mask", "group"
-    sensor, *filters = (table.stack(f"{Collider.stack}.{name}")[slot, rows] for name in names)
-    endless = np.isinf(bodies.upper[:count] - bodies.lower[:count]).all(axis=1)
-    size = np.where(endless, np.inf, bodies.min_extent[:count])
-    solid = (services.scene.levels[0, :count] >= 0) & ~sensor
-    return size, solid, np.column_stack(filters)
+    sensor, layer, mask, group = (services.table.stack(f"{Collider.stack}.{name}")[slot, rows] for name in names)
+    size, speed = columns.min_extent[:count].copy(), np.linalg.norm(bodies.linear_velocity, axis=1)
+    speed[bodies.static.rows] = 0.0
+    endless = np.isinf(columns.upper[:count] - columns.lower[:count]).all(axis=1)
+    counts = (services.scene.levels[0, :count] >= 0) & ~sensor & ~endless & ~np.asarray(bodies.ccd, bool)
+    solid = np.flatnonzero(counts & np.isfinite(speed))
+    fast = solid[np.argsort(-speed[solid], kind="stable")[:FASTEST]]
+    a, dynamic = fast[:, None], rows < bodies.dynamic.rows.stop
+    meet = (a != solid) & (dynamic[a] | dynamic[solid]) & (layer[a] & mask[solid] != 0) & (layer[solid] & mask[a] != 0)
+    meet &= (speed[a] > 0.0) & ((group[a] != group[solid]) | (group[a] == 0))
+    if not meet.any():
+        return None
+    limits = np.where(meet, size[a] + size[solid], np.inf) / np.where(meet, speed[a] + speed[solid], 1.0)
+    one, other = np.unravel_index(np.argmin(limits), limits.shape)
+    pair = np.array(sorted((fast[one], solid[other]), key=lambda row: -speed[row]))
+    numbers = speed[pair].sum(), size[pair].sum(), limits[one, other]
+    return Passage(*bodies.entity[pair].tolist(), *map(float, numbers))
