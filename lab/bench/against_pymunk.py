@@ -18,29 +18,22 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ... import scenes
-from ...framework import Settings, World
+from ...framework import Phase, Settings, System, World
 from ...framework.compilation import log
 from ...scenes import gas, player_query
 from ..cli.usage_errors import Problem
 from ..engines.pymunk_space import INDEXES, PymunkSpace
-from ..measure.body_shapes import (
-    Enclosure,
-    Floats,
-    dynamic_by_id,
-    inertia_by_id,
-    moving_rows,
-    overlaps_of,
-    shapes_of,
-    turns_by_id,
-)
+from ..measure.body_shapes import Enclosure, Floats, dynamic_by_id, overlaps_of, shapes_of
 from ..measure.run import plain_settings
 from ..measure.timing import Spread, no_garbage_collection, timed
 from ..reporting.progress import NO_PROGRESS, Progress
+from .by_id import inertia_by_id, moving_rows, turns_by_id
 from .report import Result, Row, machine
 from .suite import Subject, Window, sizes_of
 
 CAROM = "carom"
 LOOKS = 10  # at the quality of the states, per window
+INSTANT = 1e-9  # s
 REHEARSAL_SEED, REHEARSAL_STEPS = 1000, 30  # of the untimed run before the first repeat, which compiles the kernels
 
 
@@ -146,7 +139,7 @@ def _run(case: Case, repeat: int, peer: bool) -> None:
 
 
 def _run_windows(case: Case, other: World, engines: Engines) -> None:
-    """other: a world like carom's that takes no steps, in which overlaps are measured."""
+    """other: a world like carom's, in which overlaps are measured."""
     quality = {name: Quality(other) for name in engines}
     taken = 0
     for window in case.subject.windows:
@@ -302,10 +295,20 @@ def _time_query(
 # -- quality of a state ----------------------------------------------------------------------------------
 
 
+class Untouched(System):
+    """Leaves overlaps as they are."""
+
+    phase = Phase.NARROW
+
+    def process(self, dt: float) -> None:
+        self.world.contacts.enabled[:] = False
+
+
 class Quality:
     """Quality of one engine's run: call :meth:`sample` at intervals, :meth:`figures` at the end of a window.
 
-    world: one of carom at its start, which takes no steps: it gets the positions whose overlaps are asked for.
+    world: one of carom at its start, which gets the positions whose overlaps are asked for, and takes a step without a
+    motion for its contacts.
     """
 
     def __init__(self, world: World) -> None:
@@ -314,6 +317,8 @@ class Quality:
         self.start, _, self.mass = dynamic_by_id(world)
         self.kinetic, self.enclosure = world.kinetic_energy(), Enclosure.around(world)
         self.inertia = inertia_by_id(world)
+        world.settings, world.gravity = world.settings.replace(dt=INSTANT, collision="discrete"), 0
+        world.add_system(Untouched())
         self.begin()
 
     def begin(self) -> None:
@@ -325,7 +330,8 @@ class Quality:
         self.world.bodies.dynamic.position[self._order] = position
         if np.isfinite(self.inertia).any():
             self.world.bodies.rotation[moving_rows(self.world)] = angle
-        self.world.refresh_queries()
+        self.world.bodies.dynamic.linear_velocity = self.world.bodies.kinematic.linear_velocity = 0
+        self.world.step()
         self.first = position if self.first is None else self.first
         depths = overlaps_of(self.world)[2]
         self.overlap_means.append(float(depths.mean()) if len(depths) else 0.0)

@@ -143,7 +143,7 @@ def modes_of(world: World) -> Modes:
             changes = [partial(forces.change, name) for name in ("position", "linear_velocity")]
             bases = [np.eye(len(forces))] if len(forces) <= ALL else [_dominant(each, len(forces)) for each in changes]
             basis = np.linalg.qr(np.concatenate(bases, axis=1))[0]
-            return _modes_in(basis, *(_images(each, basis) for each in changes), forces)
+            return _modes_in(basis, _images(changes[0], basis), _images(changes[1], basis), forces)
         finally:
             forces.restore()
 

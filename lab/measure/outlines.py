@@ -1,4 +1,4 @@
-"""The outlines of shapes that turn, and how deep two of a plane overlap."""
+"""The outlines of shapes that turn."""
 
 from __future__ import annotations
 
@@ -33,7 +33,6 @@ NO_FACES = np.zeros((0, 3), np.int64)
 BOX_FACES = np.array([(0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)])
 FACES = {2: NO_FACES, 3: BOX_FACES}  # of a box
 FAR = 1e4  # m, how far half-spaces are drawn
-MOST_NUMBERS = 4_000_000  # in one array: more pairs are looked at by turns
 
 
 class Outline(NamedTuple):
@@ -113,12 +112,9 @@ def _tiles(grid: Any) -> Outline:
 OUTLINES = {
     BoxCollider: _box, CapsuleCollider: _capsule, ConvexPolygonCollider: _polygon, ChainSegmentCollider: _segment,
 }  # fmt: skip
-ONLY_DRAWN = {  # not measured; by the dimensions
-    2: {OneWaySegmentCollider: _segment, HalfSpaceCollider: _half_space, TileGridCollider: _tiles},
-    3: {
-        BoxCollider: _box, CapsuleCollider: _capsule, ConvexHullCollider: _hull, HalfSpaceCollider: _half_space,
-        TerrainTriangleCollider: _triangle,
-    },
+ONLY_DRAWN = {
+    OneWaySegmentCollider: _segment, HalfSpaceCollider: _half_space, TileGridCollider: _tiles,
+    ConvexHullCollider: _hull, TerrainTriangleCollider: _triangle,
 }  # fmt: skip
 
 
@@ -131,7 +127,7 @@ def outlines_of(world: World, collider: Any, entities: Rows) -> tuple[list[Float
         columns, chosen = getattr(world.bodies, collider.prefix[:-1]), np.isin(world.bodies.entity, entities)
         fields = [getattr(columns, name)[chosen] for name in collider.columns]
         rows = map(collections.namedtuple("Row", collider.columns)._make, zip(*fields, strict=True))
-    found = map({**OUTLINES, **ONLY_DRAWN[2], **ONLY_DRAWN[3]}[collider], rows)
+    found = map({**OUTLINES, **ONLY_DRAWN}[collider], rows)
     corners, rounding, size, faces = zip(*found, strict=True)
     return list(corners), np.array(rounding), np.array(size), list(faces)
 
@@ -150,39 +146,14 @@ def rounded(corners: Floats, rounding: float, points: int = 9) -> Floats:
     return (corners[:, None] + arcs).reshape(-1, 2)
 
 
-def depths(a: list[Floats], b: list[Floats], apart: Floats, reach: Floats) -> Floats:
-    """How deep each of the polygons ``a`` is in the same one of ``b``, whose centre is ``apart`` (k, 2) from its own;
-    they go ``reach`` (k,) beyond their corners, together. Negative where apart.
-
-    Along the normals of the edges, which are enough for corners that are not rounded, and the ways between corners.
-    """
-    found = np.empty(len(a))
-    corners = max(map(len, [*a, *b]), default=1)
-    some = max(1, MOST_NUMBERS // (2 * corners * (corners * corners + 2 * corners)))
-    for first in range(0, len(a), some):
-        rows = slice(first, first + some)
-        one, other = padded(a[rows], corners), padded(b[rows], corners) + apart[rows, None]
-        axes = np.concatenate([_normals(one), -_normals(other)], axis=1)
-        if reach[rows].any():
-            between = (other[:, :, None] - one[:, None]).reshape(len(one), -1, 2)
-            axes = np.concatenate([axes, _units(between)], axis=1)
-        ends = np.einsum("kad,kcd->kac", axes, other).min(axis=2), np.einsum("kad,kcd->kac", axes, one).max(axis=2)
-        gaps = np.where(axes.any(axis=2), ends[0] - ends[1], -np.inf).max(axis=1)
-        found[rows] = reach[rows] - np.where(np.isfinite(gaps), gaps, 0.0)  # two points on each other have no axis
-    return found
-
-
 def padded(polygons: list[Any], corners: int) -> NDArray[Any]:
     """(k, corners, ...): the last corner is repeated."""
     return np.array([np.concatenate([one, np.repeat(one[-1:], corners - len(one), axis=0)]) for one in polygons])
 
 
 def _normals(corners: Floats) -> Floats:
-    """Outward unit normals of the edges (..., m, 2), from each corner to the next; 0 where these are the same."""
-    edges = np.roll(corners, -1, axis=-2) - corners
-    return _units(np.stack([edges[..., 1], -edges[..., 0]], axis=-1))
-
-
-def _units(vectors: Floats) -> Floats:
-    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, lengths, out=np.zeros_like(vectors), where=lengths > 0.0)
+    """Outward unit normals of the edges (m, 2), from each corner to the next; 0 where these are the same."""
+    edges = np.roll(corners, -1, axis=0) - corners
+    normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,7 @@ from .body_shapes import QUIET, Floats, dimensions_of
 CANDIDATES = 12_000  # bodies that are recorded, to choose from
 
 
-@dataclass(frozen=True)
-class PathImpact:
+class PathImpact(NamedTuple):
     """One impact between the samples ``after - 1`` and ``after`` of the paths; ``point`` and ``normal`` (d,).
 
     ``centres``: positions of its spheres, (d,) by entity. The position of a box does not follow from the contact point.
@@ -33,8 +32,7 @@ class Traces:
     """Paths: ``positions`` (samples, bodies, d), NaN where no body was; ``entities`` (bodies,), ascending;
     ``rotations``: angles (samples, bodies) or quaternions (samples, bodies, 4).
 
-    ``moved``: number of all bodies that moved, including these. ``impacts``: the impacts of the run, if all steps are
-    shown, else None.
+    ``moved``: number of all bodies that moved, including these. ``impacts``: of all steps, if each is shown, else None.
     """
 
     entities: NDArray[np.int64]
@@ -42,12 +40,6 @@ class Traces:
     rotations: NDArray[Any]
     moved: int = 0
     impacts: list[PathImpact] | None = None
-
-    @property
-    def places(self) -> Floats:
-        """All finite points of all paths, (n, d)."""
-        points = self.positions.reshape(-1, self.positions.shape[2])
-        return points[np.isfinite(points).all(axis=1)].astype(float)
 
     @property
     def corners(self) -> Floats:
@@ -118,8 +110,7 @@ def _impacts(world: World, after: int) -> list[PathImpact]:
     for impact in world.contacts.impacts:
         point, normal = np.array(impact.point, float), np.array(impact.normal, float)
         ends = (impact.entity_a, -normal), (impact.entity_b, normal)
-        radii = {entity: _radius_of(world, entity) for entity, _ in ends}
-        centres = {int(entity): point + radii[entity] * inwards for entity, inwards in ends if radii[entity]}
+        centres = {int(entity): point + radius * way for entity, way in ends if (radius := _radius_of(world, entity))}
         found.append(PathImpact(after, point, normal, centres))
     return found
 
@@ -127,6 +118,5 @@ def _impacts(world: World, after: int) -> list[PathImpact]:
 def _radius_of(world: World, entity: int) -> float:
     """The radius of an entity whose only collider is a centred sphere; else 0."""
     parts = world.components_for_entity(entity) if world.entity_exists(entity) else ()
-    colliders = [part for part in parts if isinstance(part, Collider)]
-    spheres = [part for part in colliders if isinstance(part, SphereCollider) and not np.any(part.offset)]
-    return float(spheres[0].radius) if len(spheres) == len(colliders) == 1 else 0.0
+    one, *others = [part for part in parts if isinstance(part, Collider)] or [None]
+    return 0.0 if others or not isinstance(one, SphereCollider) or np.any(one.offset) else float(one.radius)

@@ -13,15 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...components import AABBCollider, SphereCollider
 from ...framework import World
 from ...framework.compilation import log
 from ...framework.schedule.profile_report import Stats, Totals
 from ...plugins.joints import Joints
 from ..engines.adapters import CaromEngine
-from .body_shapes import QUIET, dimensions_of
+from .body_shapes import QUIET, SOLID, dimensions_of
 from .observation import Observer
-from .outlines import OUTLINES
 from .paths import Recorder, Traces
 
 TRACED_BODIES = 200  # in a picture
@@ -269,9 +267,9 @@ def plain_settings(world: World) -> dict[str, Any]:
 
 
 def _restitutions(bodies: Any) -> NDArray[np.float64]:
-    """Of all colliders of ``bodies`` that :func:`shapes_of` knows."""
+    """Of all their solid colliders."""
     found = []
-    for collider in (SphereCollider, AABBCollider, *OUTLINES):
+    for collider in SOLID:
         has = np.asarray(bodies.has(collider), bool)
         if has.any():  # else there may be no such columns
             found.append(getattr(bodies, collider.prefix[:-1]).restitution[has])

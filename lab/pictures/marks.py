@@ -88,14 +88,14 @@ def _seen_faces(bodies: Shapes, shade: Floats, projection: Projection) -> Iterat
 def _seen_balls(sheet: Sheet, bodies: Shapes, shade: Floats, projection: Projection) -> Iterator[Painted]:
     """Balls and capsules: each with its spots, if it spins, and a highlight."""
     places, magnification, _ = projection.plane(bodies.centre)
-    radii, spins = bodies.rounding * magnification, np.asarray(np.isfinite(bodies.axes).all(axis=(1, 2)))
+    radii, spins = bodies.rounding * magnification, np.isfinite(bodies.axes).all(axis=(1, 2)) & bodies.round
     circle = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
     light, spots = (canvas.mixed(shade, *other) for other in (("#ffffff", 0.35), (canvas.PANEL, 0.6)))
     for k in np.flatnonzero(bodies.faceless).tolist():
         if bodies.round[k]:
             outer, inner = places[k] + radii[k] * circle, places[k] + 0.35 * radii[k] * circle
         else:
-            ends, _, _ = projection.plane(bodies.centre[k] + bodies.outline[k])
+            ends, _, _ = projection.plane(bodies.centre[k] + bodies.corners[k])
             outer, inner = rounded(ends, radii[k], 20), rounded(ends, 0.35 * radii[k], 20)
         yield k, outer, shade[k], canvas.BACKGROUND
         if spins[k] and radii[k] * sheet.points > OUTLINED:

@@ -11,7 +11,6 @@ from PIL import Image
 
 from ...framework import World
 from ..measure.body_shapes import QUIET, Floats, Shapes, shapes_of
-from ..measure.outlines import ONLY_DRAWN
 from ..measure.run import Run
 from . import canvas
 from .canvas import Sheet
@@ -38,7 +37,7 @@ class Recording:
 
     def after_step(self, done: int) -> None:
         if done % self.every == 0:
-            self.frames.append((shapes_of(self.world, ONLY_DRAWN), joints_of(self.world)))
+            self.frames.append((shapes_of(self.world), joints_of(self.world)))
 
     @QUIET
     def save(self, run: Run, file: Path, view: Any, drawn: Callable[[int], None]) -> Path:

@@ -14,7 +14,6 @@ from ...framework import World
 from ...plugins.joints import Joints
 from ...systems.shapes.rotation import axes_of
 from ..measure.body_shapes import QUIET, Floats, Shapes, dimensions_of, shapes_of
-from ..measure.outlines import ONLY_DRAWN
 from ..measure.paths import Traces
 from ..measure.run import Run
 from ..reporting.text import counted
@@ -45,7 +44,7 @@ class Still:
     def of(cls, run: Run) -> Still:
         """The final state of ``run``."""
         world, d = run.world, run.report.dimensions
-        shapes = shapes_of(world, ONLY_DRAWN)
+        shapes = shapes_of(world)
         ids = np.asarray(world.bodies.entity)
         order = np.argsort(ids, kind="stable")
         row = order[np.minimum(np.searchsorted(ids, shapes.entity, sorter=order), max(len(ids) - 1, 0))]
@@ -98,7 +97,8 @@ def find_view(still: Still, traces: Traces) -> tuple[Floats, Floats]:
     d = shapes.centre.shape[1]
     lows, highs = [moving.lower], [moving.upper]
     if traces.positions.size:
-        paths = traces.places
+        points = traces.positions.reshape(-1, d)
+        paths = points[np.isfinite(points).all(axis=1)].astype(float)
         size = moving.half.max(axis=0) if len(moving.entity) else np.zeros(d)
         lows.append(paths - size)
         highs.append(paths + size)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
@@ -15,7 +14,6 @@ from carom.lab.bench.against_pymunk import CaromWorld, Quality
 from carom.lab.bench.suite import SUITE
 from carom.lab.engines import pymunk_space as peer_pymunk
 from carom.lab.engines.pymunk_space import NotPlainError, PymunkSpace, moving_and_fixed
-from carom.lab.measure.body_shapes import overlaps_of
 from carom.plugins import Physics, capsule, convex_polygon
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider
@@ -168,43 +166,6 @@ def test_a_turned_box_and_space_are_refused():
 
 
 # -- the same measure for both ----------------------------------------------------------------------------------
-
-
-def overlap_of_two(a: str, b: str, place_a, place_b, half_a, half_b) -> float:
-    """Reference: discs by their centres, boxes by the axis of least overlap, a disc by its way out of a box."""
-    if a == b == "o":
-        return half_a[0] + half_b[0] - math.dist(place_a, place_b)
-    apart = [abs(p - q) for p, q in zip(place_a, place_b, strict=True)]
-    if a == b == "#":
-        return min(h + k - d for h, k, d in zip(half_a, half_b, apart, strict=True))
-    radius, box = (half_a[0], half_b) if a == "o" else (half_b[0], half_a)
-    beyond = math.hypot(*(max(d - h, 0.0) for d, h in zip(apart, box, strict=True)))
-    return radius - beyond if beyond > 0 else radius + min(h - d for h, d in zip(box, apart, strict=True))
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_overlaps_are_those_of_all_pairs(seed):
-    """Against every pair taken one by one: discs, boxes, bodies without a shape, small static boxes and a wall."""
-    random = np.random.default_rng(seed)
-    kinds = "".join(random.choice(list("oo##."), 60)) + "###"
-    half = np.concatenate([random.uniform(0.2, 0.6, (60, 2)), [(0.5, 0.5), (0.3, 0.9), (9.0, 0.5)]])
-    half[[kind == "o" for kind in kinds], 1] = half[[kind == "o" for kind in kinds], 0]
-    places = np.concatenate([random.uniform(-4, 4, (60, 2)), [(0, 0), (1, 2), (0, -4)]])
-    world = plane()
-    for k, (kind, place, extents) in enumerate(zip(kinds, places, half, strict=True)):
-        shape = {"o": [SphereCollider(extents[0])], "#": [AABBCollider(tuple(extents))], ".": []}[kind]
-        world.create_entity(Transform(tuple(place)), *[RigidBody()] * (k < 60), *shape)
-    world.bodies.dynamic.position[7] = math.nan
-    expected = []
-    for (i, (a, p, h)), (j, (b, q, k)) in itertools.combinations(enumerate(zip(kinds, places, half, strict=True)), 2):
-        if "." in (a, b) or 7 in (i, j) or i >= 60:
-            continue
-        depth = overlap_of_two(a, b, p, q, h, k)
-        if depth > 0:
-            expected.append(depth / (2 * min(*h, *k)))
-    assert len(expected) > 20
-    np.testing.assert_allclose(np.sort(overlaps_of(world)[2]), np.sort(expected), rtol=1e-12)
-    world.close()
 
 
 def test_quality_counts_what_left_and_how_far_it_went():

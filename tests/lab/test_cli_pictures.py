@@ -15,7 +15,6 @@ from PIL import Image
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
-from carom.lab.measure.body_shapes import overlaps_of, shapes_of, sizes_of
 from carom.lab.measure.run import FEW_BODIES, FEW_STEPS, run
 from carom.lab.pictures.projection import Projection
 from carom.lab.pictures.run_pictures import GHOSTS, Still, draw_final, draw_traces
@@ -82,9 +81,9 @@ def test_a_recording_of_another_kind_is_refused_before_the_run(carom):
     assert "--record takes a name that ends in .gif or .webp, not film.mp4" in line
 
 
-@pytest.mark.parametrize("view", ["0,0,4", "0,0,4,x", "0,0,4,inf", "4,3,0,0", "0,0,4,0", "0,0,0,4,4", ""])
+@pytest.mark.parametrize("view", ["0,0,4", "0,0,4,x", "4,3,0,0", "0,0,4,inf"])
 def test_a_view_that_is_none_is_refused(carom, view):
-    assert "--view takes the lower and the upper corner" in refusal(carom("run", "jump", "--view", view))
+    assert "is not a lower and an upper corner" in refusal(carom("run", "jump", "--view", view))
 
 
 def test_a_view_of_another_dimension_is_refused(carom):
@@ -364,29 +363,3 @@ def test_ropes_and_parts_in_space_are_drawn_and_the_ground_ends_with_the_view():
     assert any(np.allclose(np.ptp(polygon, axis=0), np.ptp(seen, axis=0)) for polygon in polygons)
     lower, upper = projection.frame()
     assert all((polygon > lower - 1e-9).all() and (polygon < upper + 1e-9).all() for polygon in polygons)
-
-
-def test_overlaps_of_what_turns_are_those_of_their_projections():
-    """The depth is the least overlap of the projections over all directions: here 20,000, 3e-4 rad apart."""
-    random = np.random.default_rng(1)
-    angles = np.linspace(0, 2 * np.pi, 20_000)
-    directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    found = 0
-    for _ in range(60):
-        half, radius, turns = random.uniform(0.2, 1, 2), random.uniform(0.2, 1), random.uniform(0, 6, 2)
-        places = random.uniform(-0.9, 0.9, (2, 2))
-        polygon = ConvexPolygonCollider.regular(int(random.integers(3, 7)), 0.6, corner_radius=0.2 * radius)
-        others = [BoxCollider(half[::-1]), SphereCollider(radius), CapsuleCollider(0.4 * radius, half[0]), polygon]
-        other = others[int(random.integers(4))]
-        with World(Physics(dimensions=2), Rotation(), capsule.plugin, convex_polygon.plugin) as world:
-            for place, turn, shape in zip(places, turns, (BoxCollider(half), other), strict=True):
-                world.create_entity(Transform(place, rotation=turn), RigidBody(), shape)
-            depths = overlaps_of(world)[2] * min(sizes_of(world).values())
-            shapes = shapes_of(world)
-        corners = [centre + corners for centre, corners in zip(shapes.centre, shapes.corners, strict=True)]
-        order = np.argsort(shapes.entity)
-        tops, bottoms = ([getattr(corners[k] @ directions.T, of)(axis=0) for k in order] for of in ("max", "min"))
-        least = (tops[0] - bottoms[1]).min() + shapes.rounding.sum()
-        found += least > 0
-        assert depths.tolist() == pytest.approx([least] * int(least > 0), abs=5e-4)
-    assert found > 20

@@ -13,6 +13,9 @@ from worlds import both_dimensions
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Phase, System
 from carom.lab import testing as kit
+from carom.lab.measure.body_shapes import overlaps_of
+from carom.plugins.half_space import HalfSpaceCollider
+from carom.plugins.half_space import plugin as half_space
 
 G = 9.81
 METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
@@ -196,11 +199,28 @@ def test_rest_overlap_and_contacts_of_a_wrong_world():
     with pytest.raises(AssertionError, match=rf"{box} and {floor} began to touch 0 times, expected 1"):
         log.assert_began(box, floor)
     kit.run(world, 10)
-    with pytest.raises(AssertionError, match=rf"step \d+: {box} and {floor} overlap by 0.\d+ of the smaller"):
+    with pytest.raises(AssertionError, match=rf"step \d+: {floor} and {box} overlap by 0.\d+ of the smaller"):
         kit.assert_no_overlap(world)
     with pytest.raises(AssertionError, match=rf"entity {box}, step \d+: position .* is outside of 0.5 to 2; 2 of 2"):
         kit.assert_inside(world, 0.5, 2)
     log.close()
+
+
+def test_overlaps_are_those_of_solid_bodies_of_which_one_moves():
+    """In sizes of the smaller: of balls 0.1 / 1, of boxes 0.2 / 0.5, of a ball in a half-space 0.25 / 1."""
+    world = kit.make_world(dt=1e-9)
+    world.add_plugin(half_space)
+    world.add_system(Disables())  # of what would part them
+    world.create_entity(Transform((0, -1)), HalfSpaceCollider((0, 1)))
+    kit.ball(world, (0, 9)), kit.ball(world, (0.9, 9))
+    kit.box(world, (5, 9), half=(0.5, 0.25), kind="static"), kit.box(world, (5, 9.3), half=(0.25, 0.25))
+    kit.ball(world, (9, -0.75))
+    kit.ball(world, (0, 20), sensor=True), kit.ball(world, (0.9, 20))
+    kit.box(world, (5, 20), kind="static"), kit.box(world, (5.5, 20), kind="kinematic")
+    kit.ball(world, (9, 20), mask=0), kit.ball(world, (9.5, 20))
+    world.step()
+    assert sorted(overlaps_of(world)[2]) == pytest.approx([0.1, 0.25, 0.4])
+    world.close()
 
 
 def test_a_contact_where_none_should_be():
