@@ -22,17 +22,15 @@ from carom.plugins.springs import Springs
 
 
 def test_worlds_in_which_nothing_limits():
-    empty, still, falling = make_world(), make_world(gravity=10), make_world(gravity=10)
+    still, falling, empty = make_world(gravity=10), make_world(gravity=10), make_world()
     floor(still)
     box(still, (0, 3), kind="kinematic")
     falling.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(5, 5)))
-    for world in (empty, still, falling):
+    empty.add_system(SpringAndDrag())
+    for world in (still, falling, empty):
         assert suggest_dt(world) == math.inf
         assert step_limits(world).oscillation is None
-    nobody = make_world()
-    nobody.add_system(SpringAndDrag())
-    assert suggest_dt(nobody) == math.inf
-    assert "Nothing limits the step" in str(step_limits(nobody))
+        assert "Nothing limits the step" in str(step_limits(world))
 
 
 def test_forces_that_are_not_finite_are_named():
@@ -56,14 +54,13 @@ def test_an_error_in_a_force_system_leaves_the_world_as_it_was():
 
         def add_forces(self, bodies, time):
             self.calls += 1
-            if self.calls > 3:
-                raise RuntimeError("out of fuel")
+            assert self.calls <= 3, "out of fuel"
 
     world = make_world()
     ball(world, (1, 2), (3, 4))
     world.add_system(Fails())
     before = world.state_hash()
-    with pytest.raises(RuntimeError, match="out of fuel"):
+    with pytest.raises(AssertionError, match="out of fuel"):
         suggest_dt(world)
     assert world.state_hash() == before
 
@@ -132,40 +129,34 @@ def test_a_ball_and_a_wall():
     assert step_limits(shot(ccd=True)).passage is None
     for collision in ("continuous", "event_driven"):
         assert step_limits(shot(collision)).passage is None
+    for phase in range(8):  # at the suggested step none tunnels, wherever in a step it arrives
+        world = shot()
+        world.settings = world.settings.replace(dt=suggest_dt(world))
+        world.bodies.dynamic.position[0, 0] -= phase / 8 * 30.0 * world.settings.dt
+        for _ in range(10):
+            world.step()
+        assert world.bodies.dynamic.position[0, 0] < 0.0 > world.bodies.dynamic.linear_velocity[0, 0]
+        world.close()
 
 
-def test_what_does_not_meet_does_not_count():
-    """Sensors, other layers, kinematic bodies against walls, half-spaces without an end."""
-    world = World(Physics(), half_space)
-    world.create_entity(Transform((0, 0)), AABBCollider((0.01, 5.0), sensor=True))
-    world.create_entity(Transform((1, 0)), AABBCollider((0.01, 5.0), layer=4))
-    world.create_entity(Transform((2, 0)), AABBCollider((0.02, 5.0)))
-    world.create_entity(Transform((0, -9)), HalfSpaceCollider((0.0, 1.0)))
-    world.create_entity(
-        Transform((-3, 0)), RigidBody(linear_velocity=(50, 0), kind="kinematic"), SphereCollider(0.1, mask=1)
-    )
-    assert step_limits(world).passage is None  # nothing dynamic
-    world.create_entity(Transform((-9, 0)), RigidBody(linear_velocity=(0, 10)), SphereCollider(0.3, mask=1))
-    limits = step_limits(world)
-    assert limits.tunnelling == pytest.approx(min(0.64 / 10, 0.8 / 60))
-
-
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_the_first_passage_against_all_pairs(seed):
-    """Random sizes, speeds, filters, kinds: the shortest (size + size') / (speed + speed') of all pairs that meet."""
+    """Random sizes, speeds, filters, kinds, sensors, beside a half-space without an end: the shortest
+    (size + size') / (speed + speed') of all pairs that meet."""
     random = np.random.default_rng(seed)
-    world = make_world()
+    world = World(Physics(), half_space)
+    world.create_entity(Transform((0, -90)), HalfSpaceCollider((0.0, 1.0)))
     bodies = []
     for k in range(40):
         kind = ("dynamic", "kinematic", "static")[random.integers(3)]
         velocity = np.zeros(2) if kind == "static" else random.normal(size=2) * 10 ** random.uniform(-1, 2)
         size, layer, mask = 10 ** random.uniform(-2, 1), 2 ** random.integers(3), random.integers(1, 8)
-        group = k % 3 - 1
+        filters = {"layer": int(layer), "mask": int(mask), "group": k % 3 - 1, "sensor": bool(random.integers(5) == 0)}
         world.create_entity(
-            Transform((9.0 * k, 0)), RigidBody(linear_velocity=velocity, kind=kind),
-            SphereCollider(size / 2, layer=int(layer), mask=int(mask), group=group),
-        )  # fmt: skip
-        bodies.append((kind, float(np.linalg.norm(velocity)), size, layer, mask, group))
+            Transform((9.0 * k, 0)), RigidBody(linear_velocity=velocity, kind=kind), SphereCollider(size / 2, **filters)
+        )
+        if not filters["sensor"]:
+            bodies.append((kind, float(np.linalg.norm(velocity)), size, layer, mask, filters["group"]))
     expected = min(
         (a[2] + b[2]) / (a[1] + b[1])
         for a, b in itertools.combinations(bodies, 2)
