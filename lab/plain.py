@@ -26,7 +26,7 @@ def _plain(record: Any) -> dict[str, Any]:
     return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in found.items()}
 
 
-class Plain:
+class JsonRecord:
     """A dataclass that converts to plain data."""
 
     def as_dict(self) -> dict[str, Any]:

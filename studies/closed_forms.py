@@ -10,27 +10,27 @@ import numpy as np
 
 from carom.framework import World
 from carom.lab.measure.body_shapes import Floats, dynamic_by_id
-from carom.lab.measure.observation import Seen
+from carom.lab.measure.observation import RunResult
 from carom.lab.testing.predict import bounce_times, collide, free_flight, impact_time, orbit_speed, spring
 
 SAMPLES = 2000  # of a path, to find the largest displacement
 Path = Callable[[float], Floats]  # maps seconds to positions (n, d)
 
 
-def _seen(path: Path, seconds: float, world: World, struck: bool, times: list[float], **found: Any) -> Seen:
+def _seen(path: Path, seconds: float, world: World, struck: bool, times: list[float], **found: Any) -> RunResult:
     """What a run on this path would show. The energy is constant: all scenes here are conservative."""
     start = path(0.0)
     places = np.array([path(t) for t in np.linspace(0.0, seconds, SAMPLES)])
     energy = world.kinetic_energy() + world.potential_energy()
     found.setdefault("energy_scale", world.kinetic_energy())
-    return Seen(
+    return RunResult(
         path(seconds), entities=sorted(world.bodies.dynamic.entity.tolist()),
         reach=float(np.linalg.norm(places - start, axis=2).max()), energy=energy, energy_start=energy,
         impacts=len(times), times=times, struck=[struck] * len(start), seconds=seconds, **found,
     )  # fmt: skip
 
 
-def flight(world: World, seconds: float) -> Seen:
+def flight(world: World, seconds: float) -> RunResult:
     """Parabolas without contacts; the apex is v^2 / 2g."""
     x, v, _ = dynamic_by_id(world)
     gravity = np.asarray(world.gravity, float)
@@ -40,7 +40,7 @@ def flight(world: World, seconds: float) -> Seen:
     return _seen(lambda t: free_flight(t, x, v, gravity)[0], seconds, world, False, [], apex=apex)
 
 
-def swinging(world: World, seconds: float) -> Seen:
+def swinging(world: World, seconds: float) -> RunResult:
     """The undamped spring of the scene: x(t) = x0 cos(w t); at the centre all energy is kinetic."""
     x, v, mass = dynamic_by_id(world)
     stiffness = world.force_systems[0].stiffness  # type: ignore[attr-defined]
@@ -48,7 +48,7 @@ def swinging(world: World, seconds: float) -> Seen:
     return _seen(lambda t: spring(t, stiffness, mass[0], x, v)[0], seconds, world, False, [], energy_scale=total)
 
 
-def kepler(world: World, seconds: float) -> Seen:
+def kepler(world: World, seconds: float) -> RunResult:
     """An ellipse around the origin, GM = 1, from the perihelion on the x axis, by Kepler's equation M = E - e sin E."""
     x, v, _ = dynamic_by_id(world)
     near, speed = float(x[0, 0]), float(v[0, 1])
@@ -66,7 +66,7 @@ def kepler(world: World, seconds: float) -> Seen:
     return _seen(path, seconds, world, False, [])
 
 
-def bounces(world: World, seconds: float) -> Seen:
+def bounces(world: World, seconds: float) -> RunResult:
     """Elastic balls dropped from rest: each flight is the previous one mirrored in time."""
     x, _, mass = dynamic_by_id(world)
     g = -float(np.asarray(world.gravity)[1])
@@ -83,7 +83,7 @@ def bounces(world: World, seconds: float) -> Seen:
     return _seen(path, seconds, world, True, every, energy_scale=scale)
 
 
-def one_impact(world: World, seconds: float) -> Seen:
+def one_impact(world: World, seconds: float) -> RunResult:
     """Two equal elastic discs of radius 1/2, as in the scene: straight lines with one corner each."""
     x, v, mass = dynamic_by_id(world)
     when = impact_time(x[0], v[0], x[1], v[1], 1.0)
@@ -97,6 +97,6 @@ def one_impact(world: World, seconds: float) -> Seen:
     return _seen(path, seconds, world, True, [when])
 
 
-FORMS: Mapping[str, Callable[[World, float], Seen]] = {
+FORMS: Mapping[str, Callable[[World, float], RunResult]] = {
     "jump": flight, "spring": swinging, "orbit": kepler, "bouncing": bounces, "oblique": one_impact,
 }  # fmt: skip

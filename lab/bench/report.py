@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..measure.timing import CLOCK, Spread
-from ..plain import Plain
+from ..plain import JsonRecord
 from ..reporting.text import NOTHING, TextTable, compact, number, span
 
 CAROM_SETTINGS = ("dt", "integrator", "collision", "substeps")
@@ -118,7 +118,7 @@ PACKAGES = ("carom", "numba", "numpy", "esper", "pymunk")
 
 
 @dataclass
-class Row(Plain):
+class Row(JsonRecord):
     """One window of one scene at one size, or one kind of query.
 
     ``unit``: what the milliseconds are per; medians of the steps of a repeat. ``ratio``: pymunk's median over carom's,
@@ -154,7 +154,7 @@ class Row(Plain):
 
 
 @dataclass
-class Result(Plain):
+class Result(JsonRecord):
     """A whole benchmark: machine, settings and rows."""
 
     machine: dict[str, str]

@@ -19,7 +19,7 @@ import numpy as np
 
 from ...framework import World
 from ..engines.adapters import CaromEngine, carried
-from ..plain import Plain
+from ..plain import JsonRecord
 from .body_shapes import Floats
 
 # Failures of runs; STOPPED: ended by an error.
@@ -33,7 +33,7 @@ NEAR = 0.05  # of a step: an end of a step that close to a change of the inputs 
 
 
 @dataclass
-class Seen(Plain):
+class RunResult(JsonRecord):
     """What one run showed. Lengths in the scene's units, energies in J, times in s.
 
     position (n, d): at the end, by entity id
@@ -100,7 +100,7 @@ def observe(
     engine: CaromEngine, seconds: float, dt: float, phase: float = 1.0, whole_steps: bool = False, walled: bool = True,
     inputs: Sequence[float] = (),
     values: Callable[[World], dict[str, list[float]]] | None = None,
-) -> Seen:  # fmt: skip
+) -> RunResult:  # fmt: skip
     """Run ``engine`` for ``seconds``; phase: the first step's length in steps, above 0 up to 1.
 
     whole_steps: leave out the last partial step, because a change of the step length disturbs contacts at rest. walled:
@@ -124,7 +124,7 @@ def observe(
         return seen
 
 
-def mean_of(seens: Sequence[Seen], names: Iterable[str]) -> Seen:
+def mean_of(seens: Sequence[RunResult], names: Iterable[str]) -> RunResult:
     """The averages of several runs: of these fields, and of what a game compares; all else is that of the first."""
     means: dict[str, Any] = {name: float(np.mean([getattr(seen, name) for seen in seens])) for name in names}
     values, spread = {}, {}
@@ -172,7 +172,7 @@ class Observer:
         self.start = self.settled = engine.position
         self.ids = engine.ids
         self.energies = [engine.energies]
-        self.seen = Seen(self.start, seconds=seconds)
+        self.seen = RunResult(self.start, seconds=seconds)
         self.impulse, self.late_impacts = 0.0, 0
         self.mean_overlaps = [0.0]
         self.next_sample = SETTLED * seconds
@@ -222,7 +222,7 @@ class Observer:
             self.ids = engine.ids
         return position
 
-    def finished(self) -> Seen:
+    def finished(self) -> RunResult:
         """At the end: what is known only then."""
         engine, seen = self.engine, self.seen
         position, velocity = self._followed(), engine.velocity

@@ -13,7 +13,7 @@ from typing import Any
 
 from ...framework import PhysicsWarning
 from ...framework.compilation import log
-from ..plain import Plain
+from ..plain import JsonRecord
 
 FINE = 1e-6  # s: a coarser clock cannot time a block of steps
 
@@ -50,7 +50,7 @@ def timed(work: Callable[[], Any]) -> tuple[float, bool, Any]:
 
 
 @dataclass(frozen=True)
-class Spread(Plain):
+class Spread(JsonRecord):
     """Repeated measurements: the median, the least and the largest, and all values."""
 
     median: float

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..cli.usage_errors import Problem, did_you_mean
-from ..measure.observation import BLEW_UP, NOT_FINITE, TUNNELLED, Seen, mean_of
+from ..measure.observation import BLEW_UP, NOT_FINITE, TUNNELLED, RunResult, mean_of
 from ..reporting.text import metres
 from .grid import STILL, Facts
 
@@ -29,7 +29,7 @@ CHANCE = (12.7, 4.3, 3.2, 2.8, 2.6, 2.4, 2.4, 2.3, 2.3, 2.2)  # standard errors,
 OF_MANY = 2.0  # standard errors, from many
 NEVER = 1e9  # times the limit: only one of the runs has the value
 
-Measure = Callable[[Seen, Seen], Any]
+Measure = Callable[[RunResult, RunResult], Any]
 
 
 class Figure(NamedTuple):
@@ -53,7 +53,7 @@ class Norm(NamedTuple):
     measure: Measure
     scale: Measure
     limit: Measure = lambda seen, right: math.inf
-    words: Callable[[float, Seen, Seen], str] = lambda value, seen, right: ""
+    words: Callable[[float, RunResult, RunResult], str] = lambda value, seen, right: ""
     by_body: bool = False
     mean: bool = False
     needs: str = ""
@@ -62,14 +62,14 @@ class Norm(NamedTuple):
 # -- what is measured -----------------------------------------------------------------------------------------------
 
 
-def distances(seen: Seen, right: Seen) -> tuple[np.ndarray, np.ndarray]:
+def distances(seen: RunResult, right: RunResult) -> tuple[np.ndarray, np.ndarray]:
     """How far each body that both runs have ends from where it should, (n,), and their ids, by order of creation."""
     ids, a, b = np.intersect1d(seen.entities, right.entities, return_indices=True)
     apart = seen.position[a] - right.position[b]
     return np.sqrt((apart * apart).reshape(len(ids), -1).sum(axis=1)), ids
 
 
-def other_touches(seen: Seen, right: Seen) -> list[tuple[int, int, str]]:
+def other_touches(seen: RunResult, right: RunResult) -> list[tuple[int, int, str]]:
     """Pairs of bodies that touch in one of the runs only, or in another order than in the reference."""
     mine, should = ({(a, b): at for a, b, at in one.touches} for one in (seen, right))
     found = [(*pair, "never touches") for pair in should if pair not in mine]
@@ -82,24 +82,24 @@ def other_touches(seen: Seen, right: Seen) -> list[tuple[int, int, str]]:
     return found
 
 
-def conserves(right: Seen) -> bool:
+def conserves(right: RunResult) -> bool:
     """True if the scene conserves energy according to the reference."""
     return right.energy_worst <= CONSERVED * (right.energy_scale or 1.0)
 
 
-def _energy_scale(seen: Seen, right: Seen) -> float:
+def _energy_scale(seen: RunResult, right: RunResult) -> float:
     """The largest kinetic energy, or the energy at the start if smaller, since the zero of the energy is arbitrary."""
     kinetic, total = right.energy_scale or seen.energy_scale or 1.0, abs(right.energy_start)
     return min(kinetic, total) if total > NO_ENERGY * kinetic else kinetic
 
 
-def _impact_time(seen: Seen, right: Seen) -> float:
+def _impact_time(seen: RunResult, right: RunResult) -> float:
     count = max(len(seen.times), len(right.times))
     mine, should = (times + [right.seconds] * (count - len(times)) for times in (seen.times, right.times))
     return float(np.abs(np.subtract(mine, should)).max(initial=0.0))
 
 
-def difference(seen: Seen, right: Seen, name: str) -> float:
+def difference(seen: RunResult, right: RunResult, name: str) -> float:
     """What a game compares against the right value: of numbers the difference, of places the distance; +-inf if only
     one of the runs has it."""
     mine, should = (np.array(one.values.get(name, [math.nan])) for one in (seen, right))
@@ -109,16 +109,16 @@ def difference(seen: Seen, right: Seen, name: str) -> float:
     return float(mine[0] - should[0]) if len(should) == 1 else float(np.linalg.norm(mine - should))
 
 
-def _reach(seen: Seen, right: Seen) -> float:
+def _reach(seen: RunResult, right: RunResult) -> float:
     return right.reach or seen.reach or 1.0
 
 
-def _names_places(right: Seen) -> bool:
+def _names_places(right: RunResult) -> bool:
     """True for a game that says itself which places count."""
     return any(len(value) > 1 for value in right.values.values())
 
 
-def _reliable(right: Seen) -> float:
+def _reliable(right: RunResult) -> float:
     """How far a body may be elsewhere, as far as that is known."""
     return max(right.tolerance, 2 * right.doubt)
 
@@ -126,7 +126,7 @@ def _reliable(right: Seen) -> float:
 def _judged(limit: Measure) -> Measure:
     """That limit where bodies can be compared; else nothing is noticed."""
 
-    def found(seen: Seen, right: Seen) -> float:
+    def found(seen: RunResult, right: RunResult) -> float:
         known = seen.fixed and not _names_places(right) and right.doubt <= right.tolerance
         return limit(seen, right) if known else math.inf
 
@@ -141,7 +141,7 @@ def _where_any(limit: float) -> Measure:
 def _relative(field: str, text: str, **more: Any) -> Norm:
     """A quantity whose right value is 1."""
 
-    def scale(seen: Seen, right: Seen) -> float:
+    def scale(seen: RunResult, right: RunResult) -> float:
         return abs(getattr(right, field)) or abs(getattr(seen, field)) or 1.0
 
     return Norm(text, lambda seen, right: getattr(seen, field) - getattr(right, field), scale, needs=field, **more)
@@ -152,17 +152,17 @@ def _own(field: str, text: str, **more: Any) -> Norm:
     return Norm(text, lambda seen, right: getattr(seen, field), _one, **more)
 
 
-def _ends(value: float, seen: Seen, right: Seen) -> str:
+def _ends(value: float, seen: RunResult, right: RunResult) -> str:
     apart, ids = distances(seen, right)
     return f"entity {ids[int(np.argmax(apart))]} ends {metres(value)} from where it should"
 
 
-def _touching(value: float, seen: Seen, right: Seen) -> str:
+def _touching(value: float, seen: RunResult, right: RunResult) -> str:
     one, other, how = other_touches(seen, right)[0]
     return f"entity {one} {how} entity {other}{f' ({value:.0f} such pairs)' if value > 1 else ''}"
 
 
-def _one(seen: Seen, right: Seen) -> float:
+def _one(seen: RunResult, right: RunResult) -> float:
     return 1.0
 
 
@@ -229,22 +229,22 @@ NORMS: Mapping[str, Norm] = {
 }  # fmt: skip
 
 
-def _rests(right: Seen) -> bool:
+def _rests(right: RunResult) -> bool:
     return right.met and right.speed <= STILL
 
 
 def game_norm(name: str, place: bool = False, chaotic: bool = False) -> Norm:
     """Of a number, or a place, that a game compares by that name."""
 
-    def scale(seen: Seen, right: Seen) -> float:
+    def scale(seen: RunResult, right: RunResult) -> float:
         values = [abs(one.values.get(name, [math.nan])[0]) for one in (right, seen)]
         return _reach(seen, right) if place else next((size for size in values if 0 < size < math.inf), 1.0)
 
-    def limit(seen: Seen, right: Seen) -> float:
+    def limit(seen: RunResult, right: RunResult) -> float:
         value = right.values[name][0]
         return right.tolerance if place else max(SHARE * abs(value), 0.5 if value % 1 == 0 else 0.0)
 
-    def words(value: float, seen: Seen, right: Seen) -> str:
+    def words(value: float, seen: RunResult, right: RunResult) -> str:
         should = right.values[name][0]
         if math.isinf(value):
             return f"{name}: {'one, and there should be none' if value > 0 else f'none instead of {should:.4g}'}"
@@ -287,7 +287,7 @@ def norms_for(name: str, facts: Facts, asked: Sequence[str]) -> tuple[dict[str, 
 # -- the reference --------------------------------------------------------------------------------------------------
 
 
-def failure_of(seen: Seen, right: Seen, chaotic: bool) -> str | None:
+def failure_of(seen: RunResult, right: RunResult, chaotic: bool) -> str | None:
     """The reason why the run has no error figure, or None.
 
     Tunnelled: a body that touches something in the reference has touched nothing.
@@ -305,9 +305,9 @@ def failure_of(seen: Seen, right: Seen, chaotic: bool) -> str | None:
 
 
 def reference_of(
-    name: str, facts: Facts, norms: Mapping[str, Norm], shown: Sequence[str], seens: Sequence[Seen],
+    name: str, facts: Facts, norms: Mapping[str, Norm], shown: Sequence[str], seens: Sequence[RunResult],
     tolerance: float | None = None,
-) -> tuple[Seen, dict[str, float]]:  # fmt: skip
+) -> tuple[RunResult, dict[str, float]]:  # fmt: skip
     """What is right, and its own error by norm. seens: of a chaotic scene runs of several seeds; else two runs with the
     finest steps, extrapolated to a step of 0 (Richardson), and two of another method. tolerance: how far a body may be
     elsewhere, m (default: a share of its size). Problem if they have failed, and if all norms are 0 throughout."""
@@ -336,14 +336,16 @@ def reference_of(
     return right, agreement
 
 
-def _own_error(measure: Measure, right: Seen, finest: Seen, other: Seen, other_finest: Seen) -> float:
+def _own_error(
+    measure: Measure, right: RunResult, finest: RunResult, other: RunResult, other_finest: RunResult
+) -> float:
     """What the extrapolation has changed; or how far another method is, if its own step does not explain that."""
     apart = abs(measure(other_finest, right))
     explained = apart <= EXPLAINED * abs(measure(other, other_finest))
     return float(max(abs(measure(finest, right)), 0.0 if explained else apart))
 
 
-def _extrapolated(fine: Seen, finest: Seen, order: int) -> Seen:
+def _extrapolated(fine: RunResult, finest: RunResult, order: int) -> RunResult:
     """The finest run, with its places, heights and energies as they would be with a step of 0."""
     if fine.entities != finest.entities:
         return finest
@@ -353,7 +355,7 @@ def _extrapolated(fine: Seen, finest: Seen, order: int) -> Seen:
 
 
 def figures_of(
-    seens: Sequence[Seen], right: Seen, norms: Mapping[str, Norm], chaotic: bool = False
+    seens: Sequence[RunResult], right: RunResult, norms: Mapping[str, Norm], chaotic: bool = False
 ) -> dict[str, Figure]:  # fmt: skip
     """By norm, of the runs of a setting that have not failed."""
     found: dict[str, Figure] = {}

@@ -22,7 +22,7 @@ from ..cli.usage_errors import Problem
 from ..engines.adapters import CaromEngine
 from ..inputs import forget_asked, times_asked
 from ..jobs import Jobs
-from ..measure.observation import ESCAPED, STOPPED, Seen, observe
+from ..measure.observation import ESCAPED, STOPPED, RunResult, observe
 from ..measure.timing import faults_in_results, timed
 from .subject import Subject
 
@@ -80,7 +80,7 @@ class Task:
 
 
 @faults_in_results()
-def perform(task: Task) -> Seen:
+def perform(task: Task) -> RunResult:
     """What the run shows; of one that an error ends that it has failed, and why."""
     try:
         loaded = task.subject.loaded
@@ -94,7 +94,7 @@ def perform(task: Task) -> Seen:
                 seen.detail = "; ".join(engine.world.faults[:1])
             return seen
     except Problem as problem:
-        return Seen(np.zeros((0, 2)), failure=STOPPED, detail=problem.message, seconds=task.seconds)
+        return RunResult(np.zeros((0, 2)), failure=STOPPED, detail=problem.message, seconds=task.seconds)
 
 
 def nudge(world: World, size: float, seed: int = 0) -> None:
@@ -144,7 +144,7 @@ class Facts:
     """
 
     settings: Settings
-    trial: Seen
+    trial: RunResult
     seconds: float
     seeded: bool
     walled: bool
@@ -196,7 +196,7 @@ def survey(subject: Subject, seconds: float, jobs: Jobs) -> Facts:
         other.step()
     task = Task(subject, swept, seconds, subject.seed, inputs=times_asked(seconds))
 
-    def tried(task: Task) -> Seen:
+    def tried(task: Task) -> RunResult:
         seen = jobs.all(perform, [task], f"{subject.name}: trial runs")[0]
         if seen.failure not in (None, ESCAPED):
             raise Problem(

@@ -20,7 +20,7 @@ from ..bench.report import machine
 from ..cli.usage_errors import Problem
 from ..engines.adapters import work_of
 from ..jobs import Jobs
-from ..measure.observation import Seen
+from ..measure.observation import RunResult
 from ..plain import jsonable
 from ..reporting.progress import NO_PROGRESS, Progress
 from ..reporting.text import number
@@ -203,7 +203,7 @@ def measured(
         math.inf if max_error is None else max_error / (scale if absolute else 1.0),
         math.inf if max_cost is None else 60 * max_cost,
     )  # fmt: skip
-    seens: dict[Settings, list[Seen]] = {}
+    seens: dict[Settings, list[RunResult]] = {}
     times: dict[Settings, float | None] = {}
 
     def run(some: Sequence[Settings], count: int) -> None:
@@ -241,7 +241,7 @@ def measured(
 
 
 def _point(
-    cell: Settings, asked: bool, seens: Sequence[Seen], right: Seen, norms: Mapping[str, Norm], chaotic: bool,
+    cell: Settings, asked: bool, seens: Sequence[RunResult], right: RunResult, norms: Mapping[str, Norm], chaotic: bool,
     milliseconds: float | None,
 ) -> Point:  # fmt: skip
     """What the runs of a setting have shown, against what is right."""

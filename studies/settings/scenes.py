@@ -18,7 +18,7 @@ from carom.framework import Settings, World
 from carom.lab import testing as kit
 from carom.lab.engines.adapters import CaromEngine
 from carom.lab.measure.body_shapes import Enclosure
-from carom.lab.measure.observation import Seen, observe
+from carom.lab.measure.observation import RunResult, observe
 from carom.lab.trading.errors import NORMS
 from carom.plugins import Physics
 from carom.scenes import drops, galperin, random_numbers
@@ -40,7 +40,7 @@ def scene_of(name: str, **options: Any) -> Build:
     return lambda settings: function(settings, **options)
 
 
-def seen(make: Make, seconds: float, phase: float = 1.0) -> Seen:
+def seen(make: Make, seconds: float, phase: float = 1.0) -> RunResult:
     """The observation of a run."""
     with make() as world:
         return observe(CaromEngine(world), seconds, world.settings.dt, phase)
@@ -73,7 +73,7 @@ def orbit(make: Make, seconds: float) -> Errors:
     }
 
 
-def _closed_form(name: str, make: Make, seconds: float) -> Seen:
+def _closed_form(name: str, make: Make, seconds: float) -> RunResult:
     with make() as world:
         return FORMS[name](world, seconds)
 

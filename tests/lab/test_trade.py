@@ -18,7 +18,7 @@ from carom.framework import ForceSystem, Settings, System, World
 from carom.lab import Trade, trade
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.jobs import Jobs
-from carom.lab.measure.observation import Seen, mean_of, step_lengths
+from carom.lab.measure.observation import RunResult, mean_of, step_lengths
 from carom.lab.trading.answer import answer
 from carom.lab.trading.errors import NEVER, NORMS, Figure, figures_of, game_norm, norms_for, other_touches, reference_of
 from carom.lab.trading.grid import Facts, grid, perform, survey, tasks_of
@@ -296,7 +296,8 @@ def test_settings_as_a_line_to_paste(settings, line):
 
 
 def seen(values=None, **more):
-    return Seen(np.zeros((1, 2)), values=values or {}, seconds=1.0, reach=4.0, entities=[1], tolerance=0.01, **more)
+    known = {"seconds": 1.0, "reach": 4.0, "entities": [1], "tolerance": 0.01}
+    return RunResult(np.zeros((1, 2)), values=values or {}, **{**known, **more})
 
 
 @pytest.mark.parametrize(("mine", "right", "error", "words"), [
