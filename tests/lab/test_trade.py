@@ -430,10 +430,6 @@ def unseeded(settings, seed=0):
     return thrown(settings, np.random.default_rng().uniform(1, 3, 2))
 
 
-def own_step(settings, seed=0):
-    return thrown((settings or Settings()).replace(dt=1 / 120))
-
-
 def spoilt(settings, seed=0):
     class Spoiler(System):
         def process(self, dt):
@@ -450,7 +446,6 @@ def spoilt(settings, seed=0):
     [
         (still, "still: no body moves within 2 s: nothing to measure"),
         (unseeded, r"unseeded: build makes another world each time.*default_rng\(seed\)"),
-        (own_step, r"own_step: build must hand its settings to the World as they are.* has dt=0\.00833\d* instead"),
         (spoilt, r"spoilt: the trial run .* failed after 0\.5333 s: not finite; entity 1: linear_velocity is \[nan"),
         pytest.param(stars, "stars is chaotic: two starts", marks=pytest.mark.slow),
     ],
@@ -492,9 +487,10 @@ def test_functions_are_measured_here_and_their_options_reach_them():
     assert found["velocity_verlet", "discrete", 1 / 10] < 1e-12
 
 
-def test_build_must_use_its_settings():
-    with pytest.raises(Problem, match="must hand its settings to the World"):
-        case_of(lambda settings, seed=0: scenes.get("jump").build(None), seconds=1.0)
+def test_a_build_with_settings_of_its_own_is_measured_with_those_that_are_asked_for():
+    case = case_of(lambda settings, seed=0: scenes.get("jump").build(None), seconds=1.0, vary={"dt": (1 / 60, 1 / 120)})
+    assert {point.settings.dt for point in case.points} == {1 / 60, 1 / 120}
+    assert len({point.work for point in case.points}) > 1
 
 
 def test_the_names_of_the_laboratory():
