@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 import re
@@ -15,13 +14,13 @@ from rich.console import Console
 
 from ...framework import Settings
 from ...framework.schedule.profile_report import Stats
-from ..measure.run import Drift, Run, RunReport, run
+from ..measure.run import Drift, RunReport, run
 from ..plain import jsonable
 from ..plugins.command import plugin_named
 from ..reporting.output import drawing_if_there, drawing_module
 from ..reporting.progress import Progress
 from ..reporting.text import NOTHING, TextTable, counted, number
-from .loading import Loaded, load, stdout_kept_clean
+from .loading import load, stdout_kept_clean
 from .options import NOT_NEGATIVE, Corners, View, json_option, traceback_option, world_options, writable_folder
 from .usage_errors import Problem
 
@@ -55,81 +54,49 @@ def run_command(
         raise Problem("--steps and --seconds exclude each other")
     added = [plugin_named(name) for name in plugins]
     loaded = load(target)
-    if view is not None:
-        loaded = dataclasses.replace(loaded, view=view)
-    draw = _drawing(no_pictures, out)
-    films = None if record is None else _recording(record)
-    screen = Console(stderr=True)
+    view = view or loaded.view
+    # What is missing, or cannot be written, is told before a long run.
+    pictures = None if no_pictures else drawing_if_there("pictures.run_pictures", "no pictures,")
+    if pictures is not None:
+        writable_folder(out.parent if pictures.is_file(out) else out, out)
+    films = None if record is None else drawing_module("pictures.recording", "--record:")
+    if films is not None and record is not None:
+        if record.suffix.lower() not in films.KINDS:
+            raise Problem(f"--record takes a name that ends in {' or '.join(films.KINDS)}, not {record}")
+        writable_folder(record.parent, record, "--record")
 
     world = loaded.build(settings, changes, seed, added)
-    if loaded.view is not None and len(loaded.view[0]) != world.dimensions:
-        raise Problem(f"{loaded.name}: view has {len(loaded.view[0])} dimensions, the world {world.dimensions}")
+    if view is not None and len(view[0]) != world.dimensions:
+        raise Problem(f"{loaded.name}: view has {len(view[0])} dimensions, the world {world.dimensions}")
     if steps is None:
-        wanted = seconds if seconds is not None else (loaded.seconds or DEFAULT_SECONDS)
-        steps = round(wanted / world.settings.dt)
+        steps = round((loaded.seconds or DEFAULT_SECONDS if seconds is None else seconds) / world.settings.dt)
     film = None if films is None else films.Recording(world, steps)
-    finished = _run_with_progress(loaded, world, steps, seed, screen, profile, film)
-    finished.report.compared = loaded.values_of(finished.world)
-    if draw is not None:
-        with screen.status("drawing ..."):
-            try:
-                finished.report.pictures = [str(path) for path in draw(finished, out, loaded.view)]
-            except OSError as error:
-                raise Problem(f"--out {out}: {error.strerror or error}") from error
-    if film is not None and record is not None:
-        finished.report.pictures.append(_save_film(film, finished, record, loaded, screen))
 
-    if as_json:
-        click.echo(json.dumps(jsonable(finished.report), indent=2, allow_nan=False))
-        return
-    console = Console()
-    print_report(finished.report, console, finished.profile)
-    for picture in finished.report.pictures:
-        console.print(f"picture: {picture}", highlight=False, soft_wrap=True)
-
-
-def _drawing(no_pictures: bool, out: Path) -> Any:
-    """The drawing function, or None; missing packages and permissions are reported before a long run."""
-    if no_pictures:
-        return None
-    pictures = drawing_if_there("pictures.run_pictures", "no pictures,")
-    if pictures is None:
-        return None
-    writable_folder(out.parent if pictures.is_file(out) else out, out)
-    return pictures.draw_run
-
-
-def _recording(file: Path) -> Any:
-    """The module that records; Problem, before a long run, if it cannot write that file."""
-    films = drawing_module("pictures.recording", "--record:")
-    if file.suffix.lower() not in films.KINDS:
-        raise Problem(f"--record takes a name that ends in {' or '.join(films.KINDS)}, not {file}")
-    writable_folder(file.parent, file, "--record")
-    return films
-
-
-def _save_film(film: Any, finished: Run, file: Path, loaded: Loaded, screen: Console) -> str:
-    with Progress(screen) as bar:
-        bar.begin(len(film.frames))
-        bar.say(f"drawing {file.name}")
-        try:
-            return str(film.save(finished, file, loaded.view, lambda _: bar.advance(1)))
-        except OSError as error:
-            raise Problem(f"--record {file}: {error.strerror or error}") from error
-
-
-def _run_with_progress(
-    loaded: Loaded, world: Any, steps: int, seed: int, screen: Console, profile: bool, film: Any
-) -> Run:
     def after_step(done: int) -> None:
         bar.advance(1)
         if film is not None:
             film.after_step(done)
 
-    with Progress(screen) as bar, loaded.attribute_errors(), stdout_kept_clean():
+    with Progress(Console(stderr=True)) as bar:
         bar.begin(steps)
         bar.say(loaded.name)
-        return run(world, steps, scene=loaded.name, seed=seed, after_step=after_step, profile=profile)
+        with loaded.attribute_errors(), stdout_kept_clean():
+            finished = run(world, steps, scene=loaded.name, seed=seed, after_step=after_step, profile=profile)
+        report = finished.report
+        report.compared = loaded.values_of(world)
+        bar.say("drawing")
+        try:
+            if pictures is not None:
+                report.pictures += map(str, pictures.draw_run(finished, out, view))
+            if film is not None:
+                bar.begin(len(film.frames))
+                report.pictures.append(str(film.save(finished, record, view, lambda _: bar.advance(1))))
+        except OSError as error:
+            raise Problem(f"{error.filename or out}: {error.strerror or error}") from error
+    if as_json:
+        click.echo(json.dumps(jsonable(report), indent=2, allow_nan=False))
+        return
+    print_report(report, finished.profile)
 
 
 # -- what happened, in tables ----------------------------------------------------------------------------
@@ -140,8 +107,9 @@ FAULTS_SHOWN = 3
 AT_REST = 1e-2  # of the energy: a smaller kinetic energy is no scale for a drift
 
 
-def print_report(report: RunReport, console: Console, profile: Stats | None = None) -> None:
+def print_report(report: RunReport, profile: Stats | None = None) -> None:
     """Print the tables: settings, cost by system, the profile by kernel if there is one, and accuracy."""
+    console = Console()
     console.print(f"\n{summary(report)}\n", highlight=False, markup=False)
     cost(report).show()
     console.print()
@@ -151,6 +119,8 @@ def print_report(report: RunReport, console: Console, profile: Stats | None = No
     quality(report).show()
     for line in fault_lines(report.faults):
         console.print(f"! {line}", style=WARNING, highlight=False)
+    for picture in report.pictures:
+        console.print(f"picture: {picture}", highlight=False, soft_wrap=True)
 
 
 def fault_lines(faults: list[str]) -> list[str]:
