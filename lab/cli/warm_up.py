@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import click
@@ -82,20 +83,23 @@ def warm_up_command(
     folder = cache_folder()
     if folder is None:
         raise Problem(f"no folder can be written to keep kernels in; {CACHE_FOLDER_VARIABLE} names one")
+    before = cache_contents()[0]
+    rows: list[Row] = []
     if clear:
-        _clear(folder, as_json)
-        return
-    wanted = {int(dimensions)} if dimensions else {2, 3}
-    before = cache_contents()
-    with Progress(Console(stderr=True)) as status:
-        rows = warm_up(_work(targets, everything, wanted), status.say)
-    copy_used()
+        count, size = clear_cache()
+    else:
+        with Progress(Console(stderr=True)) as status:
+            rows = warm_up(_work(targets, everything, [int(dimensions)] if dimensions else [2, 3]), status.say)
+        copy_used()
     after = cache_contents()
     if as_json:
-        cache = {"folder": str(folder), "kernels_before": before[0], "kernels": after[0], "bytes": after[1]}
-        click.echo(json.dumps({"cache": cache, "targets": [dataclasses.asdict(row) for row in rows]}, indent=2))
-        return
-    _print(rows, folder, before, after)
+        cache = {"folder": str(folder), "kernels_before": before, "kernels": after[0], "bytes": after[1]}
+        found = {"cache": cache} if clear else {"cache": cache, "targets": [dataclasses.asdict(row) for row in rows]}
+        click.echo(json.dumps(found, indent=2))
+    elif clear:
+        click.echo(f"{count:,} kernels deleted from {folder} ({_megabytes(size)})")
+    else:
+        _print(rows, folder, before, after)
 
 
 def warm_up(work: Iterator[Work], say: Callable[[str], None]) -> list[Row]:
@@ -111,16 +115,14 @@ def warm_up(work: Iterator[Work], say: Callable[[str], None]) -> list[Row]:
     return rows
 
 
-def _work(targets: tuple[str, ...], everything: bool, dimensions: set[int]) -> Iterator[Work]:
+def _work(targets: tuple[str, ...], everything: bool, dimensions: list[int]) -> Iterator[Work]:
     if not targets:
-        for d in sorted(dimensions):
-            yield f"spheres and boxes, {d}D", lambda d=d: prepare_built_in(d)
-            yield f"shapes of the plugins, {d}D", lambda d=d: prepare_shipped_plugins(d)
-            yield f"bodies that spin, {d}D", lambda d=d: prepare_rotation(d)
-            yield f"joints, terrain, {d}D", lambda d=d: prepare_joints(d)
+        for d in dimensions:
+            for name, prepare in SHIPPED_WORLDS.items():
+                yield f"{name}, {d}D", partial(prepare, d)
     names = [name for name in scenes.names() if scenes.get(name).dimensions in dimensions] if everything else targets
     for loaded in [load(name) for name in names]:  # report missing scenes before anything compiles
-        yield loaded.name, lambda loaded=loaded: _prepare_scene(loaded)
+        yield loaded.name, partial(_prepare_scene, loaded)
 
 
 def prepare_built_in(dimensions: int) -> None:
@@ -139,18 +141,14 @@ def prepare_shipped_plugins(dimensions: int) -> None:
         world.prepare(SphereCollider, AABBCollider, *shapes)
 
 
-def prepare_rotation(dimensions: int) -> None:
-    """What worlds need in which spheres and boxes spin."""
-    _prepare_spinning(dimensions)
-
-
 def prepare_joints(dimensions: int) -> None:
     """What worlds need in which spheres and boxes spin and have joints, on flat ground and on terrain."""
-    _prepare_spinning(dimensions, Joints())
-    _prepare_spinning(dimensions, Joints(), terrain.plugin)
+    prepare_rotation(dimensions, Joints())
+    prepare_rotation(dimensions, Joints(), terrain.plugin)
 
 
-def _prepare_spinning(dimensions: int, *plugins: Plugin) -> None:
+def prepare_rotation(dimensions: int, *plugins: Plugin) -> None:
+    """What worlds need in which spheres and boxes spin."""
     with closing(World(Physics(dimensions=dimensions), Rotation(), *plugins)) as world:
         for collider in (SphereCollider(0.5), BoxCollider(0.5)):
             world.create_entity(Transform((0.0,) * dimensions), RigidBody(), Spin(), collider)
@@ -161,6 +159,12 @@ def _prepare_spinning(dimensions: int, *plugins: Plugin) -> None:
         world.prepare()
 
 
+SHIPPED_WORLDS: dict[str, Callable[[int], None]] = {
+    "spheres and boxes": prepare_built_in, "shapes of the plugins": prepare_shipped_plugins,
+    "bodies that spin": prepare_rotation, "joints, terrain": prepare_joints,
+}  # fmt: skip
+
+
 def _prepare_scene(loaded: Loaded) -> None:
     with closing(loaded.build(None, {}, 0)) as world, loaded.attribute_errors():
         world.prepare()
@@ -168,30 +172,11 @@ def _prepare_scene(loaded: Loaded) -> None:
             world.step()
 
 
-def _clear(folder: Path, as_json: bool) -> None:
-    count, size = clear_cache()
-    if as_json:
-        click.echo(json.dumps({"cache": {"folder": str(folder), "kernels_before": count, "kernels": 0, "bytes": 0}}))
-        return
-    click.echo(f"{count:,} kernels deleted from {folder} ({_megabytes(size)})")
-
-
-def _print(rows: list[Row], folder: Path, before: tuple[int, int], after: tuple[int, int]) -> None:
-    console = Console()
+def _print(rows: list[Row], folder: Path, before: int, after: tuple[int, int]) -> None:
     cells = [(row.target, str(len(row.compiled)), str(row.found), f"{row.seconds:.1f}") for row in rows]
     TextTable("", ("needed by", "compiled", "in the cache already", "seconds"), cells).show()
-    variants: dict[str, list[float]] = {}  # seconds by kernel name: variants differ in shapes and dimensions
-    for kernel, seconds in (item for row in rows for item in row.compiled):
-        variants.setdefault(kernel, []).append(seconds)
-    if variants:
-        slowest = sorted(variants.items(), key=lambda item: -sum(item[1]))
-        words = (f"{kernel}{f' x{len(s)}' if len(s) > 1 else ''} {sum(s):.1f}" for kernel, s in slowest)
-        console.print(f"compiled, with seconds: {', '.join(words)}", highlight=False)
-    console.print(
-        f"cache: {folder}, {after[0]:,} kernels, {_megabytes(after[1])} ({before[0]:,} kernels before)",
-        highlight=False,
-        soft_wrap=True,
-    )
+    text = f"cache: {folder}, {after[0]:,} kernels, {_megabytes(after[1])} ({before:,} kernels before)"
+    Console().print(text, highlight=False, soft_wrap=True)
 
 
 def _megabytes(size: int) -> str:
@@ -218,8 +203,8 @@ def compile_portable(folder: Path, arguments: Sequence[str]) -> None:
         raise click.exceptions.Exit(done.returncode)
     write_index(folder, PORTABLE)
     sizes = [file.stat().st_size for file in folder.iterdir()]
-    size = f"{sum(sizes) / 1e6:.1f} MB"
-    click.echo(f"{folder}: {len(sizes) - 1:,} kernels for any processor of this platform, {size}")
+    what = f"{len(sizes) - 1:,} kernels for any processor of this platform"
+    click.echo(f"{folder}: {what}, {_megabytes(sum(sizes))}")
 
 
 def copy_used() -> None:

@@ -42,13 +42,10 @@ class Progress:
         log.listeners.remove(self._compiles)
         self._bar.stop()
 
-    def begin(self, total: float, done: float = 0.0) -> None:
-        """Set the total amount of work, in any unit, and the part done by an earlier process.
-
-        That part fills the bar and is not used for the time left.
-        """
-        self.done, self._total = done, total
-        self._bar.update(self._task, total=total, completed=done)
+    def begin(self, total: float) -> None:
+        """Set the total amount of work, in any unit."""
+        self.done, self._total = 0.0, total
+        self._bar.update(self._task, total=total, completed=0.0)
         self._show(0.0)
 
     def say(self, what: str) -> None:
