@@ -19,7 +19,7 @@ from ..plain import jsonable
 from ..plugins.command import plugin_named
 from ..reporting.output import drawing_if_there, drawing_module
 from ..reporting.progress import Progress
-from ..reporting.text import NOTHING, TextTable, counted, number
+from ..reporting.text import NOTHING, TextTable, counted, number, values_text
 from .loading import load, stdout_kept_clean
 from .options import NOT_NEGATIVE, Corners, View, json_option, traceback_option, world_options, writable_folder
 from .usage_errors import Problem
@@ -187,9 +187,7 @@ def quality(report: RunReport) -> TextTable:
     outside, broken = report.escaped["outside"], report.escaped["non_finite"]
     parts = [f"{outside:,} beyond the walls"] * bool(outside) + [f"{broken:,} not finite"] * bool(broken)
     rows.append(("escaped bodies", f"{outside + broken:,}", ", ".join(parts)))
-    for name, values in report.compared.items():
-        place = ", ".join(f"{value:.4g}" for value in values)
-        rows.append((name, "none" if any(map(math.isnan, values)) else f"({place})" if len(values) > 1 else place, ""))
+    rows += [(name, values_text(values), "") for name, values in report.compared.items()]
     return TextTable("what happened", ("", "", ""), rows, left=(2,))
 
 

@@ -17,7 +17,7 @@ from ..cli.usage_errors import Problem
 from ..plain import jsonable
 from ..plugins.command import plugin_named
 from ..reporting.progress import Progress
-from ..reporting.text import metres, number
+from ..reporting.text import metres, number, values_text
 from .step_length import StepLimits, step_limits
 
 LOOKS = 20  # times that a running scene is examined
@@ -41,11 +41,14 @@ def limits_command(
     loaded = load(target)
     if seconds is None:
         seconds = DEFAULT_SECONDS if loaded.seconds is None else loaded.seconds
-    added = [plugin_named(name) for name in plugins]
-    with Progress(Console(stderr=True)) as bar, closing(loaded.build(settings, changes, seed, added)) as world:
+
+    def build() -> World:
+        return loaded.build(settings, changes, seed, [plugin_named(name) for name in plugins])
+
+    with Progress(Console(stderr=True)) as bar, closing(build()) as world:
         bar.begin(3 * round(seconds / world.settings.dt))
         found = _run(loaded, world, seconds, bar)
-        with closing(loaded.build(settings, changes, seed, added)) as half:
+        with closing(build()) as half:
             half.settings = half.settings.replace(dt=world.settings.dt / 2)
             _run(loaded, half, seconds, bar)
             difference = _difference(loaded, world, half)
@@ -60,7 +63,7 @@ def limits_command(
         way = f"entity {difference['entity']} ends {metres(difference['farthest'])} from where it does, the farthest"
         click.echo(f"After {seconds:.4g} s with half of the step {way}.")
     for name, values in difference["compared"].items():
-        click.echo(f"{name}: {values[0]}, with half of the step {values[1]}.")
+        click.echo(f"{name}: {values_text(values[0])}, with half of the step {values_text(values[1])}.")
 
 
 def _run(loaded: Loaded, world: World, seconds: float, bar: Progress) -> list[tuple[float, StepLimits]]:
@@ -91,5 +94,5 @@ def _difference(loaded: Loaded, one: World, other: World) -> dict[str, Any]:
             if entity in places[1]}  # fmt: skip
     entity = max(ways, key=lambda each: ways[each], default=None)
     values = [loaded.values_of(world) for world in (one, other)]
-    compared = {name: [value, values[1].get(name)] for name, value in values[0].items()}
+    compared = {name: [value, values[1].get(name, [np.nan])] for name, value in values[0].items()}
     return {"entity": entity, "farthest": None if entity is None else ways[entity], "compared": compared}

@@ -92,9 +92,9 @@ class StepLimits:
         found = self.oscillation
         if found is None:
             return f"Stability ({self.integrator}): no force makes a body swing, or brakes it."
-        facts = {"swings": (found.frequency, "rad/s"), "is braked": (found.drag, "/s"),
-                 "is damped": (found.damping, "/s")}  # fmt: skip
-        what = " and ".join(f"{verb} at {value:.4g} {unit}" for verb, (value, unit) in facts.items() if value)
+        numbers = found.frequency, found.drag, found.damping
+        words = "swings at {:.4g} rad/s", "is braked at {:.4g} /s", "is damped at {:.4g} /s"
+        what = " and ".join(each.format(value) for each, value in zip(words, numbers, strict=True) if value)
         held = f"; {self.integrator} holds it up to dt = {found.limit:.4g} s."
         grows = f", and {self.integrator} makes that grow at any step."
         return f"Stability: entity {found.entity} {what}{held if found.limit else grows}"

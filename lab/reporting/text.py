@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,6 +38,12 @@ def span(spread: Any) -> str:
 def counted(count: int, what: str, plural: str = "") -> str:
     """`1 run`, `2,000 runs`; plural: of a word that takes no s."""
     return f"{count:,} {what if count == 1 else plural or what + 's'}"
+
+
+def values_text(values: Sequence[float]) -> str:
+    """What a game compares: a number, a place, or `none` for NaN."""
+    text = ", ".join(f"{value:.4g}" for value in values)
+    return "none" if any(map(math.isnan, values)) else f"({text})" if len(values) > 1 else text
 
 
 def metres(value: float) -> str:
