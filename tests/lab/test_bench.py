@@ -181,7 +181,7 @@ def test_without_pymunk_it_times_carom_and_says_what_is_missing(carom, tiny, no_
         (["bench", "--scenes", "gas2"], ["'gas2' is not measured", "did you mean 'gas2d'?"]),
         (["bench", "--scenes", "jump"], ["'jump' is not measured"]),
         (["bench", "--sizes", "many"], ["--sizes", "'many'"]),
-        (["bench", "--sizes", "0"], ["--sizes", "'0'"]),
+        (["bench", "--sizes", "0"], ["--sizes", "0 is not in the range"]),
         (["bench", "--quick", "--large"], ["--quick"]),
         (["bench", "--json", "--markdown"], ["exclude each other"]),
         (["bench", "--repeats", "0"], ["--repeats"]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import helpers_cli
@@ -16,15 +17,14 @@ carom, ball = helpers_cli.carom, helpers_cli.ball  # fixtures
 
 def test_json_is_the_only_output_and_holds_what_the_table_shows(carom):
     report = report_of(carom("run", "gas2d", "--steps", "20", "--json", "--no-pictures", "--seed", "4"))
-    assert report["scene"] == "gas2d"
-    assert report["seed"] == 4
-    assert report["steps"] == 20
+    assert (report["scene"], report["seed"], report["steps"]) == ("gas2d", 4, 20)
     assert report["simulated_seconds"] == pytest.approx(20 / 60)
     assert report["bodies"] == {"total": 1004, "dynamic": 1000, "kinematic": 0, "static": 4}
     assert report["contacts"]["impacts"] > 0
     assert report["step_milliseconds"] > 0
-    assert sum(report["system_milliseconds"].values()) > 0
+    assert 0 < sum(report["system_milliseconds"].values()) <= report["step_milliseconds_mean"]
     assert abs(report["energy"]["relative"]) < 1e-11
+    assert report["energy_changes"] == []
     assert report["escaped"] == {"outside": 0, "non_finite": 0}
     assert report["deepest_overlap"] < 1.0
     assert report["pictures"] == []
@@ -56,15 +56,12 @@ def test_bodies_that_are_not_finite_are_counted_and_the_rest_is_still_drawn(caro
     ball.write_text(ball.read_text().replace("    return world", f"{fast}\n    return world"))
     result = carom("run", "ball.py", "--steps", "3", "--set", "dt=1e150", "--json")
     report = report_of(result)
-    assert "NaN" not in result.stdout
-    assert "Infinity" not in result.stdout
+    assert not {"NaN", "Infinity"} & set(result.stdout.split())
     assert report["energy"]["start"] is None
     assert report["escaped"]["non_finite"] >= 1
-
-
-def test_to_jump_over_an_obstacle_is_no_escape(carom):
-    report = report_of(carom("run", "jump", "--json", "--no-pictures"))
-    assert report["escaped"] == {"outside": 0, "non_finite": 0}
+    shown = carom("run", "ball.py", "--steps", "3", "--no-pictures").stdout
+    assert "not representable" in shown
+    assert "nan" not in shown
 
 
 def test_the_worlds_faults_are_shown(carom, ball):
@@ -92,18 +89,10 @@ def test_the_progress_says_what_compiles(tmp_path):
     assert "100%" in result.stderr
 
 
-def test_energy_that_overflows_is_said_to(carom, ball):
-    fast = "    world.create_entity(Transform((5, 5)), RigidBody(linear_velocity=(1e200, 0)))"
-    ball.write_text(ball.read_text().replace("    return world", f"{fast}\n    return world"))
-    result = carom("run", "ball.py", "--steps", "3", "--no-pictures")
-    assert "not representable" in result.stdout
-    assert "nan" not in result.stdout
-
-
 def test_energy_that_is_not_conserved_says_why(carom):
-    assert "restitution below 1" in carom("run", "jump", "--no-pictures").stdout
-    report = report_of(carom("run", "gas2d", "--steps", "9", "--json", "--no-pictures"))
-    assert report["energy_changes"] == []
+    result = carom("run", "jump", "--no-pictures")
+    for words in ("restitution below 1", "everything else", "escaped bodies +0 "):
+        assert re.search(words, result.stdout)
     report = report_of(carom("run", "billiards", "--steps", "300", "--json", "--no-pictures"))
     assert report["energy_changes"] == ["restitution below 1", "damping"]
     report = report_of(carom("run", "car", "--steps", "30", "--json", "--no-pictures"))
@@ -130,20 +119,6 @@ class Push(System):
     assert "restitution below 1" not in report["energy_changes"]
 
 
-def test_sensors_do_not_overlap(carom, ball):
-    sensor = "    world.create_entity(Transform((0, 9)), AABBCollider(half_extents=(3, 3), sensor=True))"
-    ball.write_text(ball.read_text().replace("    return world", f"{sensor}\n    return world"))
-    report = report_of(carom("run", "ball.py", "--steps", "9", "--json"))
-    assert report["contacts"]["end"] == 1
-    assert report["deepest_overlap"] == 0
-
-
-def test_the_rows_of_the_step_add_up(carom):
-    report = report_of(carom("run", "gas2d", "--steps", "30", "--json", "--no-pictures"))
-    assert 0 < sum(report["system_milliseconds"].values()) <= report["step_milliseconds_mean"]
-    assert "everything else" in carom("run", "jump", "--steps", "30", "--no-pictures").stdout
-
-
 TOUCHED = """
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Component, System, World
@@ -167,15 +142,16 @@ def build(settings, seed=0):
     world.create_entity(Transform((0.2, 0)), SphereCollider(0.3, sensor=True), Coin())
     world.create_entity(Transform((5, 0)), AABBCollider((1, 1)))
     world.create_entity(Transform((5.5, 0)), RigidBody(kind="kinematic"), AABBCollider((1, 1)))
+    world.create_entity(Transform((-0.2, 0)), AABBCollider((0.3, 0.3), sensor=True))
     return world
 """
 
 
-def test_neither_what_is_taken_nor_a_platform_in_a_wall_is_an_overlap(carom):
+def test_neither_sensors_nor_what_is_taken_nor_a_platform_in_a_wall_is_an_overlap(carom):
     Path("touched.py").write_text(TOUCHED)
     report = report_of(carom("run", "touched.py", "--steps", "3", "--json", "--no-pictures"))
-    assert report["bodies"]["static"] == 1
-    assert report["contacts"]["most"] == 2
+    assert report["bodies"]["static"] == 2
+    assert report["contacts"]["most"] == 3
     assert report["deepest_overlap"] == 0
 
 
