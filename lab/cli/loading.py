@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import inspect
 import math
+import symtable
 import sys
 import traceback
 import weakref
@@ -148,10 +149,19 @@ def _source(path: Path) -> bytes:
         raise Problem(f"{path}: {error.strerror}") from error
 
 
+def _binds_build(source: bytes) -> bool:
+    try:
+        symbols = symtable.symtable(source.decode(errors="replace"), "", "exec").get_symbols()
+    except (SyntaxError, ValueError):
+        return True  # its execution will say where
+    own = {symbol.get_name() for symbol in symbols if symbol.is_assigned() or symbol.is_imported()}
+    return "build" in own or b"import *" in source
+
+
 def _load_file(path: Path) -> Loaded:
     source = _source(path)
     missing = f"{path.name} defines no build(settings, seed=0)"
-    if b"build" not in source:
+    if not _binds_build(source):
         raise Problem(missing)  # before it runs: it may be a whole game
     module = _execute(path, source)
     function, compared = getattr(module, "build", None), getattr(module, "compared", None)

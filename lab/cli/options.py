@@ -44,14 +44,17 @@ class KeepsWords(click.Command):
 # -- types of values --------------------------------------------------------------------------------------
 
 
+VALUES = {"true": True, "false": False, "none": None}
+
+
 def value_of(text: str) -> Any:
     """A number, of which 1/120 is an exact one, or true, false or none; else the word itself."""
-    words = {"true": True, "false": False, "none": None}
-    readers: tuple[Callable[[str], Any], ...] = int, float, lambda ratio: float(Fraction(ratio)), words.__getitem__
-    for read in readers:
-        with contextlib.suppress(ValueError, KeyError, ZeroDivisionError):
-            return read(text.strip())
-    return text.strip()
+    text = text.strip()
+    for kind in (int, float, Fraction):
+        with contextlib.suppress(ValueError, ZeroDivisionError):
+            number = kind(text)
+            return float(number) if kind is Fraction else number
+    return VALUES.get(text.lower(), text)
 
 
 class Real(click.FloatRange):

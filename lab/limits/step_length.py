@@ -24,31 +24,24 @@ FASTEST = 200  # bodies that are compared with all others
 
 @dataclass(frozen=True)
 class Oscillation:
-    """x'' = -frequency^2 x - (drag + damping) x', of a body or of several; entity: the one with the largest amplitude.
+    """x'' = -frequency^2 x - (drag + damping) x', of a body or of several."""
 
-    frequency: rad/s; drag, damping: 1/s, by forces and by linear or angular damping
-    limit: s; 0 if the integrator makes it grow at any step
-    """
-
-    entity: int
-    frequency: float
-    drag: float
-    damping: float
-    limit: float
+    entity: int  # the one with the largest amplitude
+    frequency: float  # rad/s
+    drag: float  # 1/s, by forces
+    damping: float  # 1/s, linear or angular
+    limit: float  # s; 0 if the integrator makes it grow at any step
 
 
 @dataclass(frozen=True)
 class Passage:
-    """Two bodies, the faster one first, that are sure to meet while speed * dt <= size.
-
-    speed: m/s, the sum of both; size: m, the sum of both smallest extents, w + 2 r of a wall and a ball; limit: s
-    """
+    """Two bodies, the faster one first, that are sure to meet while speed * dt <= size."""
 
     entity: int
     other: int
-    speed: float
-    size: float
-    limit: float
+    speed: float  # m/s, the sum of both
+    size: float  # m, the sum of both smallest extents: w + 2 r of a wall and a ball
+    limit: float  # s
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,10 @@ def test_settings_come_from_the_scene_then_the_preset_then_set(carom):
 
     assert settings()["dt"] == pytest.approx(1 / 960)
     assert settings("--settings", "accurate")["substeps"] == Settings.accurate().substeps
-    changed = settings("--set", "substeps=7", "--set", "restitution_threshold=0.25")
+    changed = settings("--set", "substeps=7", "--set", "restitution_threshold=0.25", "--set", "sleeping=true")
     assert (changed["dt"], changed["substeps"], changed["restitution_threshold"]) == (1 / 960, 7, 0.25)
+    assert changed["sleeping"] is True
+    assert settings("--set", "slop=0.1", "--set", "slop=None")["slop"] is None
 
 
 def test_seconds_and_steps(carom, ball):
@@ -92,7 +94,7 @@ def test_the_settings_that_a_file_has_itself(carom, ball, old, new):
 
 
 def test_a_file_without_build_is_not_executed(carom, tmp_path):
-    (tmp_path / "game.py").write_text("open('played', 'w').close()\nwhile True: pass\n")
+    (tmp_path / "game.py").write_text("def build_level(): pass\nopen('played', 'w').close()\nwhile True: pass\n")
     assert "defines no build" in refusal(carom("run", "game.py"))
     assert not (tmp_path / "played").exists()
 
