@@ -21,12 +21,13 @@ class Commands(click.Group):
             result = super().main(*args, **options)
         except click.exceptions.Abort:
             click.echo("carom: stopped", err=True)
-            sys.exit(STOPPED)
+            result = STOPPED
         except click.ClickException as error:
             if traceback_wanted:
                 raise
             click.echo(f"carom: {' '.join(error.format_message().split())}", err=True)
             sys.exit(2)
+        exec("")  # else Python has no exit code after a Ctrl-C that came in code made of a string, as of named tuples
         sys.exit(result if isinstance(result, int) else 0)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import math
 import os
 from collections.abc import Callable, Mapping
@@ -24,13 +25,7 @@ Corners = tuple[tuple[float, ...], tuple[float, ...]]
 
 def together(*options: Option) -> Option:
     """Several options as one decorator; the help shows them in this order."""
-
-    def decorated(function: Any) -> Any:
-        for option in reversed(options):
-            function = option(function)
-        return function
-
-    return decorated
+    return lambda function: functools.reduce(lambda made, option: option(made), reversed(options), function)
 
 
 class KeepsWords(click.Command):
