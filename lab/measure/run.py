@@ -192,28 +192,24 @@ class Meter:
         noise = KEPT * max(kinetic, float(np.abs(energies).max()))
         if np.ptp(energies) <= noise:
             return []
-        bodies = self.world.bodies
-        dynamic, reasons = bodies.dynamic, []
-        any_pair = self.world.settings.restitution_mixing != "max"  # "max": a pair has at least a body's own value
-        touched = bodies if any_pair else dynamic
+        world, bodies, dynamic = self.world, self.world.bodies, self.world.bodies.dynamic
+        # Of "max" a pair has at least a body's own restitution; an impact never adds any energy.
+        touched = dynamic if world.settings.restitution_mixing == "max" else bodies
         met = self.observer.seen.impacts > 0 or max(self.contact_counts, default=0) > 0
-        fell = (np.maximum.accumulate(energies) - energies).max() > noise  # an impact never adds any
-        if met and fell and (_restitutions(touched) < 1).any():
-            reasons.append("restitution below 1")
-        if np.any(dynamic.linear_damping):
-            reasons.append("damping")
-        own_forces = [force for force in self.world.force_systems if not hasattr(force, "potential_energy")]
-        if np.any(dynamic.constant_force) or np.any(dynamic.applied_force) or own_forces:
-            reasons.append("forces")
-        if any(not type(system).__module__.startswith("carom.systems.") for system in self.world.systems):
-            reasons.append("systems of the game")
-        if np.any(bodies.kinematic.linear_velocity):
-            reasons.append("kinematic bodies that move")
-        if any(isinstance(plugin, Joints) and plugin.changes_energy for plugin in self.world.plugins):
-            reasons.append("joints that drive, spring or stop")
-        if not self.engine.fixed:
-            reasons.append("bodies that came or went")
-        return reasons
+        fell = (np.maximum.accumulate(energies) - energies).max() > noise
+        own_forces = [force for force in world.force_systems if not hasattr(force, "potential_energy")]
+        reasons = {
+            "restitution below 1": met and fell and (_restitutions(touched) < 1).any(),
+            "damping": np.any(dynamic.linear_damping),
+            "forces": np.any(dynamic.constant_force) or np.any(dynamic.applied_force) or own_forces,
+            "systems of the game": any(not type(one).__module__.startswith("carom.systems.") for one in world.systems),
+            "kinematic bodies that move": np.any(bodies.kinematic.linear_velocity),
+            "joints that drive, spring or stop": any(
+                isinstance(plugin, Joints) and plugin.changes_energy for plugin in world.plugins
+            ),
+            "bodies that came or went": not self.engine.fixed,
+        }
+        return [reason for reason, holds in reasons.items() if holds]
 
 
 def _drift(values: NDArray[np.float64], scale: float) -> Drift:
