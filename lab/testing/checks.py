@@ -145,12 +145,12 @@ def energy(world: World) -> float:
 
 
 def assert_position(world: World, entity: int, expected: Any, within: float = 1e-9) -> None:
-    """The entity is at that position, to ``within`` metres on every axis."""
+    """The entity is at ``expected``, (d,) m, to ``within`` m on every axis."""
     _assert_vector(world, entity, "position", "m", expected, within)
 
 
 def assert_velocity(world: World, entity: int, expected: Any, within: float = 1e-9) -> None:
-    """The entity has that velocity, to ``within`` m/s on every axis."""
+    """The entity has the velocity ``expected``, (d,) m/s, to ``within`` m/s on every axis."""
     _assert_vector(world, entity, "linear_velocity", "m/s", expected, within)
 
 
@@ -165,7 +165,7 @@ def _assert_vector(world: World, entity: int, name: str, unit: str, expected: An
 
 
 def assert_inside(world: World, lower: Any, upper: Any) -> None:
-    """No dynamic body's position is outside these bounds, (d,) or one number for all axes."""
+    """All positions of dynamic bodies are from ``lower`` to ``upper``, (d,) m or one number for all axes."""
     moving = world.bodies.dynamic
     inside = ((moving.position >= lower) & (moving.position <= upper)).all(axis=1)
     for row in np.flatnonzero(~inside)[:1]:
@@ -223,13 +223,13 @@ def touching(world: World, a: int, b: int) -> bool:
 
 
 def assert_touching(world: World, a: int, b: int) -> None:
-    """They touched in the last step."""
+    """a and b touched in the last step."""
     others = sorted({contact.entity_b for contact in world.contacts.of(a)})
     assert touching(world, a, b), f"step {world.step_count}: {a} does not touch {b}; it touches {others or 'nothing'}"
 
 
 def assert_apart(world: World, a: int, b: int) -> None:
-    """They did not touch in the last step."""
+    """a and b did not touch in the last step."""
     for contact in world.contacts.of(a):
         if contact.entity_b == b:
             raise AssertionError(f"step {world.step_count}: {a} touches {b}, overlapping by {contact.depth:.3g} m")
@@ -270,7 +270,7 @@ class ContactLog:
         self._assert("contact_end", "ceased to touch", a, b, times)
 
     def assert_struck(self, a: int, b: int, times: int = 1) -> None:
-        """They had exactly that many impacts."""
+        """They had exactly ``times`` impacts."""
         self._assert("impact", "struck each other", a, b, times)
 
     def _assert(self, event: str, verb: str, a: int, b: int, times: int) -> None:
@@ -279,7 +279,7 @@ class ContactLog:
 
 
 def assert_no_overlap(world: World, sizes: float = 0.01) -> None:
-    """No two solid shapes, one of them dynamic, overlap by more than that fraction of the smaller one.
+    """No two solid shapes, one of them dynamic, overlap by more than ``sizes`` of the smaller one.
 
     As the contacts of the last step have it.
     """
@@ -294,7 +294,8 @@ def assert_no_overlap(world: World, sizes: float = 0.01) -> None:
 
 
 def assert_same_bits(one: World, other: World) -> None:
-    """Equal ids and equal bits in all columns of bodies; the message names the first entity and column that differ."""
+    """``one`` and ``other`` have equal ids and equal bits in all columns of bodies; the message names the first entity
+    and column that differ."""
     if one.state_hash() == other.state_hash():
         return
     bodies, others = one.bodies, other.bodies
@@ -316,7 +317,7 @@ def assert_same_bits(one: World, other: World) -> None:
 
 
 def assert_frame_rate_free(build: Callable[[], World], seconds: float = 2.0, rates: Any = (30, 60, 144)) -> None:
-    """Worlds from ``build`` reach the same bits after ``seconds`` at any frame rate."""
+    """Worlds from ``build`` reach the same bits after ``seconds`` at each of the frame ``rates``, 1/s."""
     worlds = []
     for rate in rates:
         world = build()
