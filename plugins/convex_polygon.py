@@ -72,7 +72,7 @@ class ConvexPolygonCollider(Collider):
     rotates: ClassVar[bool] = True
 
     vertices: ArrayField = array_column(2, rows=(3, 2**31), check=wrong_with, convert=_counter_clockwise)
-    corner_radius: float = column(default=0.0, minimum=0.0, kw_only=True)
+    corner_radius: float = column(default=0.0, minimum=0.0, kw_only=True, unit="m")
 
     @classmethod
     def box(cls, half_extents: Any, **common: Any) -> Self:

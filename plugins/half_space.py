@@ -46,7 +46,7 @@ class HalfSpaceCollider(Collider):
     __slots__ = ()
 
     rotates = True
-    normal: VectorField = DirectionColumn(item="vector")  # type: ignore[assignment]
+    normal: VectorField = DirectionColumn(item="vector", unit="1")  # type: ignore[assignment]
 
     @staticmethod
     def bounds(shape, dimensions):

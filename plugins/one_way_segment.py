@@ -43,8 +43,8 @@ class OneWaySegmentCollider(Collider):
 
     rotates = True
     dimensions = (2,)
-    start: VectorField = column(item="vector")
-    end: VectorField = column(item="vector")
+    start: VectorField = column(item="vector", unit="m")
+    end: VectorField = column(item="vector", unit="m")
     front: Literal["left", "right"] = column(default="left", choices=FRONTS)
 
     def _fill(self, given: Mapping[str, Any]) -> None:

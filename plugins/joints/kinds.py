@@ -47,11 +47,11 @@ class Distance(Joint):
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(default=WORLD, dtype=int, minimum=0)
-    point_a: Vector | None = optional(item="vector", largest=MOST, also=("anchor_a",))
-    point_b: Vector | None = optional(item="vector", largest=MOST, also=("anchor_b",))
-    least: float | None = optional(minimum=0.0, largest=MOST)
-    most: float | None = optional(minimum=0.0, largest=MOST)
-    frequency: float | None = optional(positive=True, largest=MOST)
+    point_a: Vector | None = optional(unit="m", item="vector", largest=MOST, also=("anchor_a",))
+    point_b: Vector | None = optional(unit="m", item="vector", largest=MOST, also=("anchor_b",))
+    least: float | None = optional(unit="m", minimum=0.0, largest=MOST)
+    most: float | None = optional(unit="m", minimum=0.0, largest=MOST)
+    frequency: float | None = optional(unit="Hz", positive=True, largest=MOST)
     damping_ratio: float = special_column(unit="1", default=0.0, minimum=0.0, largest=MOST, kw_only=True)
     # whether it has hold of each body where that was taken: what is moved is one of the two
     held_a: bool = special_column(default=False, init=False, dtype=bool)
@@ -133,7 +133,7 @@ class Hinge(Driven):
     b: int | None = special_column(dtype=int, minimum=0)
     anchor: Vector = special_column(unit="m", item="vector", largest=MOST)
     axis: Vector = special_column(unit="1", default=0.0, item="vector", largest=MOST, kw_only=True)
-    max_torque: float | None = optional(minimum=0.0)
+    max_torque: float | None = optional(unit="N m", minimum=0.0)
 
     def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:
         super().__init__(*args, limits=limits, **values)  # stands here for checkers of types
@@ -203,7 +203,7 @@ class Slider(Driven):
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(dtype=int, minimum=0)
     direction: Vector = special_column(unit="1", item="vector", largest=MOST)
-    max_force: float | None = optional(minimum=0.0)
+    max_force: float | None = optional(unit="N", minimum=0.0)
 
     def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:
         super().__init__(*args, limits=limits, **values)  # stands here for checkers of types
@@ -252,7 +252,7 @@ class Wheel(Driven):
     anchor: Vector = special_column(unit="m", item="vector", largest=MOST)
     direction: Vector = special_column(unit="1", item="vector", largest=MOST)
     axis: Vector = special_column(unit="1", default=0.0, item="vector", largest=MOST, kw_only=True)
-    max_torque: float | None = optional(minimum=0.0)
+    max_torque: float | None = optional(unit="N m", minimum=0.0)
 
     def __init__(self, *args: Any, limits: Any = None, **values: Any) -> None:
         super().__init__(*args, limits=limits, **values)  # stands here for checkers of types
@@ -298,9 +298,9 @@ class Motor(Joint):
 
     a: int | None = special_column(dtype=int, minimum=0)
     b: int | None = special_column(default=WORLD, dtype=int, minimum=0)
-    speed: float | None = optional(largest=MOST)
-    angle: float | None = optional(largest=MOST)
-    max_torque: float | None = optional(minimum=0.0)
+    speed: float | None = optional(unit="rad/s", largest=MOST)
+    angle: float | None = optional(unit="rad", largest=MOST)
+    max_torque: float | None = optional(unit="N m", minimum=0.0)
     axis: Vector = special_column(unit="1", default=0.0, item="vector", largest=MOST, kw_only=True)
 
     def check(self) -> None:
@@ -340,8 +340,8 @@ class Cone(Joint):
     anchor: Vector = special_column(unit="m", item="vector", largest=MOST)
     axis: Vector = special_column(unit="1", item="vector", largest=MOST)
     swing: float = special_column(unit="rad", default=math.pi, minimum=0.0, kw_only=True)
-    lower: float | None = optional(largest=MOST)
-    upper: float | None = optional(largest=MOST)
+    lower: float | None = optional(unit="rad", largest=MOST)
+    upper: float | None = optional(unit="rad", largest=MOST)
     twist = ends_of("twist")
 
     def __init__(self, *args: Any, twist: Any = None, **values: Any) -> None:
@@ -386,7 +386,7 @@ class MousePull(Joint):
     b: int | None = special_column(dtype=int, minimum=0)
     grip: Vector = special_column(unit="m", item="vector", largest=MOST)
     target: Vector = special_column(unit="m", item="vector", largest=MOST)
-    max_force: float | None = optional(minimum=0.0)
+    max_force: float | None = optional(unit="N", minimum=0.0)
     frequency: float = special_column(unit="Hz", default=5.0, largest=MOST, positive=True, kw_only=True)
     damping_ratio: float = special_column(unit="1", default=1.0, minimum=0.0, largest=MOST, kw_only=True)
     a: int | None = special_column(default=WORLD, init=False, dtype=int)

@@ -53,11 +53,11 @@ class ChainSegmentCollider(Collider):
 
     dimensions: ClassVar[tuple[int, ...]] = (2,)
     excludes: ClassVar[Mapping[type[Component], str]] = {RigidBody: "terrain is static, leave it out"}
-    start: VectorField = column(item="vector")
-    end: VectorField = column(item="vector")
-    before: VectorField = column(item="vector")
-    after: VectorField = column(item="vector")
-    thickness: float = column(default=0.0, minimum=0.0)
+    start: VectorField = column(item="vector", unit="m")
+    end: VectorField = column(item="vector", unit="m")
+    before: VectorField = column(item="vector", unit="m")
+    after: VectorField = column(item="vector", unit="m")
+    thickness: float = column(default=0.0, minimum=0.0, unit="m")
 
     def _fill(self, given: Mapping[str, Any]) -> None:
         super()._fill(given)

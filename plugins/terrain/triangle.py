@@ -42,13 +42,13 @@ class TerrainTriangleCollider(Collider):
 
     dimensions: ClassVar[tuple[int, ...]] = (3,)
     excludes: ClassVar[Mapping[type[Component], str]] = {RigidBody: "terrain is static, leave it out"}
-    a: VectorField = column(item="vector")
-    b: VectorField = column(item="vector")
-    c: VectorField = column(item="vector")
-    beyond_ab: VectorField = column(item="vector")
-    beyond_bc: VectorField = column(item="vector")
-    beyond_ca: VectorField = column(item="vector")
-    thickness: float = column(default=0.0, minimum=0.0)
+    a: VectorField = column(item="vector", unit="m")
+    b: VectorField = column(item="vector", unit="m")
+    c: VectorField = column(item="vector", unit="m")
+    beyond_ab: VectorField = column(item="vector", unit="m")
+    beyond_bc: VectorField = column(item="vector", unit="m")
+    beyond_ca: VectorField = column(item="vector", unit="m")
+    thickness: float = column(default=0.0, minimum=0.0, unit="m")
 
     def _fill(self, given: Mapping[str, Any]) -> None:
         super()._fill(given)

@@ -45,7 +45,7 @@ class TileGridCollider(Collider):
     convex: ClassVar[bool] = False
 
     packed: ArrayField = array_column(1, rows=(7, 2**31), check=wrong_with, leading=leading_of)
-    tile_size: float = column(positive=True)
+    tile_size: float = column(positive=True, unit="m")
     faces: Faces = column(default="all", choices=FACES)
 
     def __init__(
