@@ -27,8 +27,8 @@ wheel: .venv/plot  # for this platform and Python, with compiled kernels, into d
 	rm -rf framework/prebuilt build/lib build/bdist*
 	$(BIN)/carom warm-up --portable framework/prebuilt
 	$(PIP) wheel --quiet --no-deps --wheel-dir dist .; status=$$?; rm -rf framework/prebuilt build/lib build/bdist*; exit $$status
-bench: .venv/bench  # carom against pymunk; ARGS="--quick", see docs/benchmarks.md
-	$(BIN)/carom bench $(ARGS)
+bench: .venv/bench  # carom against pymunk and Box2D; ARGS="--quick", see docs/benchmarks.md
+	$(BIN)/python -m studies bench $(ARGS)
 typecheck: .venv/test .venv/dev
 	$(BIN)/pyright
 lint: .venv/dev

@@ -18,6 +18,7 @@ from carom.lab.reporting.text import TextTable
 
 from . import joints, ladder, scaling, settings, spins, startup
 from .accuracy import accuracy_command
+from .bench import timing as bench
 from .limits import tables as limits
 from .page import between_marks, into_option, show
 from .runner import Axis, Result, run
@@ -59,6 +60,9 @@ def _draw_limits(result: Result, folder: Path) -> Path:
 
 
 STUDIES = {
+    "bench": Study(
+        "carom against pymunk and Box2D, on the same bodies.", bench.axes, bench.report, 3, long="100,000 bodies too.",
+    ),
     "joints": Study("What substeps and shorter steps buy joints, and what they cost.", joints.axes, joints.report, 5),
     "ladder": Study("What each feature costs, switched on alone.", ladder.axes, ladder.report, 5),
     "limits": Study(

@@ -11,8 +11,8 @@ from typing import Any
 
 from carom.framework import World
 from carom.lab import testing as kit
-from carom.lab.bench.report import machine
 from carom.lab.cli.usage_errors import Problem
+from carom.lab.measure.machine import machine
 from carom.lab.measure.timing import Spread, no_garbage_collection, timed
 from carom.lab.reporting.progress import NO_PROGRESS, Progress
 
@@ -129,3 +129,8 @@ def nanoseconds_per_step(make: Callable[[], World], what: str, steps: int, enoug
         else:  # kernels loaded meanwhile are ready next time
             tries += 1
     raise Problem(f"{what}: kernels were compiled in all steps; run it once more")
+
+
+def ratios(one: Spread, other: Spread) -> Spread:
+    """How many times as large one is, within each repeat."""
+    return Spread.of([a / b for a, b in zip(one.values, other.values, strict=True)])

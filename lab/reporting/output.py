@@ -5,13 +5,11 @@ from __future__ import annotations
 import importlib
 import json
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import click
 from rich.console import Console
 
-from ..cli.options import writable_folder
 from ..cli.usage_errors import Problem
 from .text import TextTable, as_markdown
 
@@ -47,22 +45,12 @@ def show_tables(tables: list[TextTable], remarks: list[str]) -> None:
         console.print(remark, style="dim", highlight=False)
 
 
-def drawing_into(out: Path | None, charts: str) -> Any:
-    """The lab's module that draws charts into that folder, None for no folder; Problem, before the long run, if that
-    cannot be."""
-    if out is None:
-        return None
-    module = drawing_module(charts, "--out:", "bench")
-    writable_folder(out)
-    return module
-
-
-def drawing_module(name: str, what: str, extra: str = "plot") -> Any:
+def drawing_module(name: str, what: str) -> Any:
     """A module of the lab that draws; Problem, with the name of the extra, if matplotlib is missing."""
     try:
         return importlib.import_module(f"..{name}", __package__)
     except ImportError as error:
-        reason = f"matplotlib is missing; it comes with the extra: pip install 'carom[{extra}]'"
+        reason = "matplotlib is missing; it comes with the extra: pip install 'carom[plot]'"
         raise Problem(f"{what} {reason}") from error
 
 

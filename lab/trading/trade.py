@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any
 
 from ...framework import Settings
-from ..bench.report import machine
 from ..cli.usage_errors import Problem
 from ..engines.adapters import work_of
 from ..jobs import Jobs
+from ..measure.machine import machine
 from ..measure.observation import RunResult
 from ..plain import jsonable
 from ..reporting.progress import NO_PROGRESS, Progress

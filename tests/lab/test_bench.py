@@ -1,213 +1,287 @@
-"""``carom bench``: the timed steps, results as records, and the command.
+"""``python -m studies bench``: the same bodies in three engines, one measure for all, and what the figures mean.
 
-Nothing here asserts a time, because any time is possible on a busy machine. The tests check the meaning of the figures.
+Nothing here asserts a time, because any time is possible on a busy machine.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
-import json
-import re
+import math
 import sys
 
-import helpers_cli
+import numpy as np
 import pytest
+from click.testing import CliRunner
 
-from carom.framework.jit.log import CompilationLog
-from carom.lab.bench import report as bench_report
-from carom.lab.bench.against_pymunk import QUERIES, bench
-from carom.lab.bench.suite import Subject, Window, subjects
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import Settings, World
 from carom.lab.cli.usage_errors import Problem
-from carom.lab.engines import pymunk_space as peer_pymunk
-from carom.lab.measure import timing as bench_clock
-from carom.lab.reporting.progress import Progress
+from carom.plugins import Physics, capsule, convex_polygon
+from carom.plugins.capsule import CapsuleCollider
+from carom.plugins.convex_polygon import ConvexPolygonCollider
+from carom.plugins.joints import Hinge, Joints, Slider
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
+from studies.__main__ import cli
+from studies.bench import suite, timing
+from studies.bench.engines import CAROM, PEERS, Carom, State
+from studies.bench.plain import NotPlainError, bodies_of
+from studies.bench.quality import Quality
+from studies.bench.suite import cases
+from studies.runner import run
 
-carom = helpers_cli.carom  # fixture
-SHORT_GAS = Subject("gas2d", (Window("first", 2, 12), Window("later", 20, 40)))
-
-
-@pytest.fixture
-def no_pymunk(monkeypatch):
-    """As if pymunk were not installed."""
-    monkeypatch.setitem(sys.modules, "pymunk", None)
-
-
-# -- the runs ---------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def result() -> bench_report.Result:
-    return bench([SHORT_GAS], (30,), repeats=3)
+both = pytest.mark.parametrize("name", PEERS)
 
 
-def test_a_row_for_each_window_with_ratios_within_repeats(result):
-    assert [row.window for row in result.rows] == ["first", "later"]
-    assert [row.timed for row in result.rows] == [10, 20]
-    for row in result.rows:
-        assert row.bodies == 30
-        assert row.peer_index in peer_pymunk.INDEXES
-        assert len(row.ratio.values) == len(row.carom_ms.values) == len(row.peer_ms.values) == 3
-        for ratio, own, other in zip(row.ratio.values, row.carom_ms.values, row.peer_ms.values, strict=True):
-            assert ratio == pytest.approx(other / own)
-        assert row.ratio.low <= row.ratio.median <= row.ratio.high
-        for figures in row.quality.values():
-            assert figures["kinetic_end"] == pytest.approx(figures["kinetic_start"], rel=0.05)
-            assert figures["escaped"] == 0
+def plane(gravity=(0.0, -9.81), *plugins, **settings) -> World:
+    return World(Physics(dimensions=2, gravity=gravity), *plugins, settings=Settings(**settings))
 
 
-def test_settings_of_both_are_stated(result):
-    assert result.settings["carom"]["dt"] == 1 / 60
-    peer = dict(result.settings["pymunk"])
-    assert peer.pop("collision_slop") == pytest.approx(0.1)
-    assert peer.pop("collision_bias") == pytest.approx(0.9**60, rel=1e-4)
-    assert peer == {"iterations": 10, "damping": 1.0, "threads": 1, "sleeping": False}
-    text = "\n".join(bench_report.remarks(result))
-    for word in ("dt 1/60", "substeps", "iterations 10", "collision_slop 0.1", "pymunk 7", "compiling"):
-        assert word in text
+# -- the same bodies ------------------------------------------------------------------------------
 
 
-def test_settings_of_a_subject_are_used_kept_and_named():
-    """Swept, no disc leaves the box that some leave otherwise; the settings of other subjects stay at their
-    defaults."""
-    window = (Window("", 0, 40),)
-    swept = Subject("fastgas", window, variant="swept", settings={"collision": "continuous"}, sizes=(100,))
-    plain = Subject("fastgas", window, variant="plain", sizes=(100,))
-    found = bench([swept, plain], (1000,), repeats=1, peer=False)
-    assert [row.settings for row in found.rows] == [{"collision": "continuous"}, {}]
-    one, other = (row.quality["carom"]["escaped"] for row in found.rows)
-    assert one == 0 < other
-    assert found.settings["carom"]["collision"] == "discrete"
-    assert "collision discrete, substeps 4; fastgas, swept: collision continuous" in bench_report.remarks(found)[2]
+@both
+def test_every_scene_begins_alike(name):
+    """Places, velocities, angles and spins are those of the scene, to the peer's precision; after two steps most bodies
+    are where carom has them. Of mass and moment the energy tells."""
+    for case in {case.scene: case for case in cases((40,)) if case.scene != "fastgas"}.values():
+        few = {option: value if option == "crates" else min(value, 8) for option, value in case.options.items()}
+        case = dataclasses.replace(case, options=few)
+        with case.build(seed=3) as world:
+            own, peer, quality = Carom(world), PEERS[name](world), Quality(case.build)
+            for what, ours, theirs in zip(State._fields, own.state(), peer.state(), strict=True):
+                apart = theirs - ours if what != "angle" else np.remainder(theirs - ours + 1.0, 2 * math.pi) - 1.0
+                assert np.abs(apart).max() <= 1e-6 * max(1.0, np.abs(ours).max()), (case, what)
+            assert quality.figures(own.state())["energy"] == pytest.approx(world.kinetic_energy(), rel=1e-9)
+            for engine in (own, peer):
+                engine.step(2)
+            apart = np.linalg.norm(peer.state().position - own.state().position, axis=1)
+            assert np.median(apart) < 0.02, case
 
 
-def test_queries_find_the_same_in_both_engines():
-    """But for boxes: pymunk tests the bounding boxes of the discs, and finds a few more."""
-    rows = bench(subjects(["player_query"]), (300,), repeats=1).rows
-    assert [row.window for row in rows] == [query.name for query in QUERIES]
-    for row in rows:
-        (own,), (other,) = (figures.values() for figures in row.quality.values())
-        if row.window.startswith("box"):
-            assert own <= other <= 1.05 * own
-        else:
-            assert own == pytest.approx(other, rel=1e-9)
+@both
+def test_a_disc_and_a_box_fall_and_bounce_alike(name):
+    """Dropped from 3 m with restitution 1, all bring them back near 3 m after 2 sqrt(2 h / g) = 1.4 s.
+
+    A peer may find the contact up to a step late (v dt = 0.12 m) and moves with the old velocity, carom with the new
+    one (g t dt / 2 = 0.1 m at 1.4 s): they can differ by half a metre at most.
+    """
+    with plane() as world:
+        world.create_entity(Transform((0, -0.5)), AABBCollider((20, 0.5), restitution=1.0))
+        world.create_entity(Transform((0, 3.5)), RigidBody(mass=2.0), SphereCollider(0.5, restitution=1.0))
+        world.create_entity(Transform((4, 3.25)), RigidBody(mass=0.1), AABBCollider((1.0, 0.25), restitution=1.0))
+        own, peer, lowest = Carom(world), PEERS[name](world), np.full(2, np.inf)
+        for _ in range(84):  # 1.4 s
+            own.step(1)
+            peer.step(1)
+            lowest = np.minimum(lowest, peer.state().position[:, 1])
+            np.testing.assert_allclose(own.state().position, peer.state().position, atol=0.5)
+        assert np.all(lowest < [0.75, 0.5])
+        np.testing.assert_allclose(peer.state().position, [(0, 3.5), (4, 3.25)], atol=0.3)
 
 
-def test_steps_in_which_kernels_came_do_not_count(monkeypatch):
-    """The first step of each window is disturbed: its time is left out, for both engines."""
-    calls = itertools.count()
-
-    def timed(work):
-        work()
-        number = next(calls)
-        return (1000.0, False, None) if number == 0 else (3.0, True, None)
-
-    monkeypatch.setattr("carom.lab.bench.against_pymunk.timed", timed)
-    subject = Subject("gas2d", (Window("", 0, 10),))
-    row = bench([subject], (10,), repeats=1).rows[0]
-    assert row.ratio is not None
-    assert row.carom_ms.median == pytest.approx(3000.0)
-    assert row.ratio.median == pytest.approx(1.0)
-    monkeypatch.setattr("carom.lab.bench.against_pymunk.timed", lambda work: (1.0, False, None))
-    with pytest.raises(Problem, match="run it once more"):
-        bench([subject], (10,), repeats=1)
-
-
-def test_a_quick_comparison_leaves_out_what_turns_slowly_unless_it_is_named():
-    left_out = {subject.name for subject in subjects()} - {subject.name for subject in subjects(quick=True)}
-    assert left_out == {"pyramid, turning", "tumbler", "rubble", "bridge", "bridge, a chain", "ragdoll"}
-    assert {subject.scene for subject in subjects(["rubble"], quick=True)} == {"rubble"}
+@both
+def test_what_turns_turns_alike(name):
+    """A box turned by .3 and one of each other kind fall into a corner of a drum that turns for a second, which holds
+    them: the peer's bodies have the mass, the shapes and the angles of carom's."""
+    with plane((0.0, -9.81), Rotation(), capsule.plugin, convex_polygon.plugin) as world:
+        for x, y in ((1, 0), (0, -1)):
+            wall = BoxCollider((0.5, 4) if x else (4, 0.5), offset=(4 * x, 4 * y), friction=0.5)
+            world.create_entity(Transform((0, 0)), RigidBody(kind="kinematic"), Spin(-0.5), wall)
+        shapes = BoxCollider((0.5, 0.25)), CapsuleCollider(0.25, 0.5), ConvexPolygonCollider.regular(5, 0.5), None
+        for k, shape in enumerate(shapes):
+            shape = shape or SphereCollider(0.5)
+            shape.friction = 0.5
+            world.create_entity(Transform((1.2 * k - 2, -2.5), rotation=0.3), RigidBody(), Spin(), shape)
+        own, peer = Carom(world), PEERS[name](world)
+        own.step(60)
+        peer.step(60)
+        np.testing.assert_allclose(peer.state().position, own.state().position, atol=0.25)
+        np.testing.assert_allclose(peer.state().angle, own.state().angle, atol=0.3)
+        np.testing.assert_allclose(peer.state().angle[:2], -0.5, rtol=0, atol=1e-6)
 
 
-def test_progress_ends_where_it_said():
-    class Recorder(Progress):
-        total = 0.0
-
-        def begin(self, total):
-            self.total = total
-
-    recorder = Recorder()
-    bench([SHORT_GAS], (10, 20), repeats=2, peer=False, progress=recorder)
-    assert recorder.done == pytest.approx(recorder.total)
-
-
-def test_timed_says_what_came_meanwhile(monkeypatch):
-    log = CompilationLog()
-    monkeypatch.setattr(bench_clock, "log", log)
-    assert bench_clock.timed(lambda: 7)[1:] == (True, 7)
-    assert bench_clock.timed(lambda: setattr(log, "waited", 0.1))[1] is False
+@both
+@pytest.mark.parametrize("floor", [0.4, None])
+def test_friction_means_the_same(name, floor):
+    """Sliding at 3 m/s on a floor of 0.4 under a body of 0.9: mu = sqrt(0.36) = 0.6, so 3^2 / (2 mu g) = 0.76 m; a
+    floor without friction of its own takes the body's."""
+    with plane() as world:
+        world.create_entity(Transform((0, -0.5)), AABBCollider((20, 0.5), friction=floor))
+        body = RigidBody(linear_velocity=(3, 0))
+        world.create_entity(Transform((0, 0.5)), body, AABBCollider((0.5, 0.5), friction=0.9 if floor else 0.6))
+        peer = PEERS[name](world)
+        peer.step(90)
+        assert peer.state().position[0, 0] == pytest.approx(9 / (2 * 0.6 * 9.81), rel=0.05)  # a step is 0.05 m
+        assert np.abs(peer.state().velocity).max() < 1e-5
 
 
-# -- the command ------------------------------------------------------------------------------------------------
+@both
+@pytest.mark.parametrize(("mask", "group", "apart"), [(1, 0, False), (2, 0, True), (-1, 0, True), (-1, 4, False)])
+def test_layers_masks_and_groups_are_those_of_carom(name, mask, group, apart):
+    with plane((0.0, 0.0)) as world:
+        for x, layer in ((0.0, 1), (0.5, 2)):
+            filters = {"layer": layer, "mask": mask | layer // 2, "group": group}
+            world.create_entity(Transform((x, 0)), RigidBody(), SphereCollider(0.5, **filters))
+        for engine in (Carom(world), PEERS[name](world)):
+            engine.step(30)
+            (one, _), (other, _) = engine.state().position
+            assert (other - one > 0.6) == apart
 
 
-TINY = ("bench", "--scenes", "fastgas", "--repeats", "1")
+@both
+def test_hinges_have_the_limits_and_motors_of_carom(name):
+    """A motor of 2 rad/s turns a bar against the world for .25 s; another one falls to the limit at -.4 rad."""
+    with plane((0.0, -9.81), Rotation(), Joints()) as world:
+        for x, joint in ((0.0, {"motor_speed": 2.0}), (5.0, {"limits": (-0.4, 0.4)})):
+            bar = world.create_entity(Transform((x + 0.5, 0.0), 0.2), RigidBody(), BoxCollider((0.5, 0.1)), Spin())
+            world.create_entity(Hinge(None, bar, (x, 0.0), **joint))
+        own, peer = Carom(world), PEERS[name](world)
+        for engine, steps in itertools.product((own, peer), (15, 45)):
+            engine.step(steps)
+            if steps == 15:
+                assert engine.state().angle[0] == pytest.approx(0.7, abs=0.04)  # a step is .033
+            else:
+                assert engine.state().angle[1] == pytest.approx(-0.2, abs=0.05)
+
+
+@both
+def test_the_car_is_the_same_car(name):
+    """Its springs give as much, and its motor takes it as far up the first hill; a step at its speed is .2 m."""
+    (case,) = (case for case in cases() if case.scene == "car")
+    with case.build() as world:
+        own, peer = Carom(world), PEERS[name](world)
+        for engine in (own, peer):
+            engine.step(120)
+        np.testing.assert_allclose(peer.state().position, own.state().position, atol=0.4)
+        sunk = [engine.state().position[0, 1] - engine.state().position[1:, 1].mean() for engine in (own, peer)]
+        assert sunk[0] == pytest.approx(sunk[1], abs=0.03)
+
+
+@pytest.mark.parametrize(("words", "parts"), [
+    ("sensor", (RigidBody(), SphereCollider(0.5, sensor=True))),
+    ("two colliders", (RigidBody(), SphereCollider(0.75), AABBCollider((0.5, 0.5)))),
+    ("linear_damping", (RigidBody(linear_damping=0.1), SphereCollider(0.5))),
+    ("gravity_scale is 2", (RigidBody(gravity_scale=2),)),
+    ("max_linear_speed", (RigidBody(max_linear_speed=3),)),
+    ("AABBCollider with a rotation", (Transform((5, 5), rotation=0.5), RigidBody(), AABBCollider((1, 1)))),
+])  # fmt: skip
+def test_what_does_not_translate_is_refused(words, parts):
+    with plane() as world:
+        world.create_entity(*([] if isinstance(parts[0], Transform) else [Transform((5, 5))]), *parts)
+        with pytest.raises(NotPlainError, match=words):
+            bodies_of(world)
+
+
+def test_space_and_other_joints_are_refused():
+    with World(Physics(dimensions=3)) as world, pytest.raises(NotPlainError, match="3 dimensions"):
+        bodies_of(world)
+    with plane((0, 0), Rotation(), Joints()) as world:
+        body = world.create_entity(Transform((0, 0)), RigidBody(), Spin(inertia=1.0))
+        world.create_entity(Slider(None, body, (1.0, 0.0)))
+        with pytest.raises(NotPlainError, match="a Slider"):
+            PEERS["pymunk"](world)
+
+
+# -- one measure ----------------------------------------------------------------------------------
+
+
+def test_overlaps_escapes_and_energies_are_those_of_the_state():
+    """Discs of diameter 1: one .25 in the floor, two .2 in each other, one beyond the floor's middle."""
+
+    def build(settings):
+        world = World(Physics(dimensions=2), settings=settings)
+        world.create_entity(Transform((0, 0)), AABBCollider((9, 1)))
+        places = Transform.many([(0, 2), (3, 3), (6, 4), (-5, 5)])
+        world.create_entities(4, places, RigidBody.many(mass=2.0), SphereCollider.many(0.5))
+        return world
+
+    quality = Quality(build)
+    with build(Settings()) as world:
+        state = Carom(world).state()
+        assert len(quality.overlaps(state)) == quality.figures(state)["escaped"] == 0
+        state.position[:] = (0, 1.25), (3, 3), (3, 3.8), (-5, -2)
+        state.velocity[1] = 3.0, 4.0
+        np.testing.assert_allclose(np.sort(quality.overlaps(state)), [0.2, 0.25], atol=1e-7)
+        figures = quality.figures(state)
+        assert (figures["escaped"], figures["sinks"], figures["gap"]) == (1, 7.0, 0.0)
+        assert figures["energy"] == pytest.approx(25.0)
+
+
+def test_quality_sees_how_bodies_are_turned_and_gaps_of_hinges():
+    """Two boxes of side 2 side by side, .1 apart; one turns by 45 degrees, with its corner then in the other, and its
+    hinge, .05 beside it at the height of its middle, goes with it."""
+
+    def build(settings):
+        world = World(Physics(dimensions=2), Rotation(), Joints(), settings=settings)
+        for x in (0.0, 2.1):
+            last = world.create_entity(Transform((x, 0)), RigidBody(mass=3.0), Spin(), BoxCollider((1, 1)))
+        world.create_entity(Hinge(None, last, (1.05, 0.0)))
+        return world
+
+    quality = Quality(build)
+    with build(Settings()) as world:
+        state = Carom(world).state()
+        assert len(quality.overlaps(state)) == 0
+        assert quality.figures(state)["gap"] == pytest.approx(0.0, abs=1e-12)
+        state.angle[1], state.spin[1] = math.pi / 4, 2.0
+        assert quality.overlaps(state).max() == pytest.approx(math.sqrt(2) - 1.1)
+        figures = quality.figures(state)
+        assert figures["energy"] == pytest.approx(0.5 * (3.0 * 4 / 6) * 2.0**2)  # m side^2 / 6
+        assert figures["gap"] == pytest.approx(2 * 1.05 * math.sin(math.pi / 8))
+
+
+# -- times and tables -----------------------------------------------------------------------------
 
 
 @pytest.fixture
 def tiny(monkeypatch):
-    """One scene, 20 bodies, 10 steps."""
-    monkeypatch.setattr("carom.lab.bench.suite.SUITE", (Subject("fastgas", (Window("", 0, 10),), sizes=(20,)),))
+    """Two scenes of a few bodies."""
+    some = [case for case in cases((30,)) if case.scene in ("gas2d", "player_query")]
+    monkeypatch.setattr(suite, "cases", lambda sizes: some)
+    return some
 
 
-def test_json_is_all_there_is_on_stdout(carom, tiny):
-    done = carom(*TINY, "--json")
-    assert done.exit_code == 0, done.stderr
-    assert json.loads(done.stdout)["rows"][0]["scene"] == "fastgas"
+def test_ratios_are_within_repeats_and_queries_find_the_same(tiny):
+    """But for boxes: pymunk tests the bounding boxes of the discs, and finds a few more."""
+    result = run(timing.axes(), repeats=3)
+    (times, quality), _ = timing.report(result)
+    assert times.headings == ("scene", "carom", "pymunk", "Box2D", "pymunk / carom", "Box2D / carom")
+    rows = [f"player_query 30 {name}" for name in ("box 4 x 4", "disc r = 2", "nearest within 2", "ray across")]
+    assert [row[0] for row in times.rows] == [row[0] for row in quality.rows] == ["gas2d 30", *rows]
+    figures = result.lines[0].samples[0].figures
+    values = [[of / own for of, own in zip(figures[f"/{name}/ms"].values, figures["/carom/ms"].values, strict=True)]
+              for name in PEERS]  # fmt: skip
+    for cell, ratios in zip(times.rows[0][4:], values, strict=True):
+        assert cell.startswith(f"{float(np.median(ratios)):.3g}"[:3])
+    assert all(figures[f"/{name}/p10"].median <= figures[f"/{name}/ms"].median for name in (CAROM, *PEERS))
+    assert figures["/carom/kept"].median == pytest.approx(1.0, abs=1e-6)
+    answers = result.lines[1].samples[0].figures
+    for row in rows:
+        own, other = (answers[f"{row[16:]}/{name}/answer"].median for name in ("carom", "pymunk"))
+        assert own <= other <= 1.1 * own if "box" in row else own == pytest.approx(other, rel=1e-9)
 
 
-def test_tables_and_charts(carom, tiny, tmp_path):
-    done = carom(*TINY, "--markdown", "--out", "pictures")
-    assert done.exit_code == 0, done.stderr
-    assert "| fastgas 20 |" in done.stdout
-    assert (tmp_path / "pictures" / "bench.png").stat().st_size > 1000
-    plain = carom(*TINY)
-    assert "fastgas 20" in plain.stdout
-    assert "quality" in plain.stdout
+def test_steps_in_which_kernels_came_do_not_count(tiny, monkeypatch):
+    calls = itertools.count()
+
+    def timed(work):
+        work()
+        return (1000.0, False, None) if next(calls) == 0 else (3.0, True, None)
+
+    monkeypatch.setattr(timing, "timed", timed)
+    figures = timing.measure(tiny[0], 0, [])
+    assert figures["/carom/ms"] == pytest.approx(3000.0 / timing.SEVERAL)
+    monkeypatch.setattr(timing, "timed", lambda work: (1.0, False, None))
+    with pytest.raises(Problem, match="run it once more"):
+        timing.measure(tiny[0], 0, [])
 
 
-def test_without_pymunk_it_times_carom_and_says_what_is_missing(carom, tiny, no_pymunk):
-    done = carom(*TINY, "--json")
-    assert done.exit_code == 0, done.stderr
-    assert "carom[bench]" in done.stderr
-    assert json.loads(done.stdout)["rows"][0]["ratio"] is None
-    alone = carom(*TINY, "--no-peer", "--out", "p").stderr
-    assert "carom[bench]" not in alone
-    assert "no chart: nothing is compared" in alone
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["bench", "--scenes", "gas2"], ["'gas2' is not measured", "did you mean 'gas2d'?"]),
-        (["bench", "--scenes", "jump"], ["'jump' is not measured"]),
-        (["bench", "--sizes", "many"], ["--sizes", "'many'"]),
-        (["bench", "--sizes", "0"], ["--sizes", "0 is not in the range"]),
-        (["bench", "--quick", "--large"], ["--quick"]),
-        (["bench", "--json", "--markdown"], ["exclude each other"]),
-        (["bench", "--repeats", "0"], ["--repeats"]),
-    ],
-    ids=lambda value: " ".join(value[1:]) if value and value[0] == "bench" else "",
-)
-def test_wrong_names_and_values(carom, arguments, words):
-    done = carom(*arguments)
-    assert done.exit_code == 2
-    lines = done.stderr.splitlines()
-    assert len(lines) == 1
-    for word in words:
-        assert word in lines[0]
-
-
-def test_ctrl_c_stops_with_one_line(carom, monkeypatch):
-    def interrupted(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("carom.lab.bench.command.bench", interrupted)
-    done = carom("bench")
-    assert done.exit_code == 130
-    assert done.stderr.strip().splitlines()[-1] == "carom: stopped"
-
-
-def test_a_scene_that_begins_at_rest_shows_what_energy_is_left(carom):
-    result = carom("bench", "--scenes", "pyramid", "--no-peer", "--repeats", "1")
-    assert result.exit_code == 0, result.stderr
-    assert re.search(r"pyramid.* J ", result.stdout)
+def test_without_the_others_it_times_carom_and_says_what_is_missing(tiny, monkeypatch):
+    for module in ("pymunk", "pyb2d3"):
+        monkeypatch.setitem(sys.modules, module, None)
+    done = CliRunner(env={"COLUMNS": "200"}).invoke(cli, ["bench", "gas2d", "--quick"])
+    assert done.exit_code == 0, done.output
+    lines = [line for line in done.stderr.splitlines() if "carom[bench]" in line]
+    assert [("pymunk" in line, "pyb2d3" in line) for line in lines] == [(True, False), (False, True)]
+    assert done.stdout.count(" - ") >= 3
