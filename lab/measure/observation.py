@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from ...framework import World
-from ..engines.adapters import CaromEngine, carried
 from ..plain import JsonRecord
 from .body_shapes import Floats
+from .engine import CaromEngine, carried
 
 # Failures of runs; STOPPED: ended by an error.
 NOT_FINITE, ESCAPED, TUNNELLED, BLEW_UP, STOPPED = "not finite", "escaped", "tunnelled", "blew up", "stopped"

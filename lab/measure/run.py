@@ -17,8 +17,8 @@ from ...framework import World
 from ...framework.compilation import log
 from ...framework.schedule.profile_report import Stats, Totals
 from ...plugins.joints import Joints
-from ..engines.adapters import CaromEngine
 from .body_shapes import QUIET, SOLID, dimensions_of
+from .engine import CaromEngine
 from .observation import Observer
 from .paths import Recorder, Traces
 

@@ -19,9 +19,9 @@ from ...framework import Settings, World
 from ...framework.settings import COLLISION_MODES
 from ..cli.loading import stdout_kept_clean
 from ..cli.usage_errors import Problem
-from ..engines.adapters import CaromEngine
 from ..inputs import forget_asked, times_asked
 from ..jobs import Jobs
+from ..measure.engine import CaromEngine
 from ..measure.observation import ESCAPED, STOPPED, RunResult, observe
 from ..measure.timing import faults_in_results, timed
 from .subject import Subject

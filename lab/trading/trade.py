@@ -17,8 +17,8 @@ from typing import Any
 
 from ...framework import Settings
 from ..cli.usage_errors import Problem
-from ..engines.adapters import work_of
 from ..jobs import Jobs
+from ..measure.engine import work_of
 from ..measure.machine import machine
 from ..measure.observation import RunResult
 from ..plain import jsonable

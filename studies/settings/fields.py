@@ -14,7 +14,7 @@ from typing import Any
 from carom.framework import Settings, World
 from carom.framework.settings import COLLISION_MODES
 from carom.lab import testing as kit
-from carom.lab.engines.adapters import counts_of, work_of
+from carom.lab.measure.engine import counts_of, work_of
 from carom.lab.trading.grid import METHODS
 
 from ..runner import WARM_UP_STEPS, Axis, nanoseconds_per_step

@@ -16,8 +16,8 @@ from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
 from carom.lab import testing as kit
-from carom.lab.engines.adapters import CaromEngine
 from carom.lab.measure.body_shapes import Enclosure
+from carom.lab.measure.engine import CaromEngine
 from carom.lab.measure.observation import RunResult, observe
 from carom.lab.trading.errors import NORMS
 from carom.plugins import Physics

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ...framework import World
-from ..measure.body_shapes import Enclosure, Floats, sensor_entities, sizes_of
-from ..measure.timing import timed
+from .body_shapes import Enclosure, Floats, sensor_entities, sizes_of
+from .timing import timed
 
 MOST_TOUCHES = 400  # pairs whose first contact is kept
 
