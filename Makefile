@@ -56,5 +56,5 @@ figures: .venv/bench  # measure again what the tables and charts of docs/tables 
 	for scene in $(ACCURACY); do \
 	  $(STUDIES) accuracy $$scene --out docs/pictures --into docs/tables/accuracy.md || exit 1; \
 	done
-	$(STUDIES) limits --long --into docs/tables/limits.md --out docs/pictures
+	$(STUDIES) limits --into docs/tables/limits.md --out docs/pictures
 	$(STUDIES) settings --into docs/tables/settings.md

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import click
@@ -16,10 +17,11 @@ from carom.lab.cli.usage_errors import Problem, did_you_mean
 from carom.lab.reporting.progress import Progress
 from carom.lab.reporting.text import TextTable
 
-from . import joints, ladder, scaling, settings, spins, startup
+from . import features, joints, scaling, settings, startup
 from .accuracy import accuracy_command
 from .bench import timing as bench
-from .limits import tables as limits
+from .features import LADDER, SPINS
+from .limits import search as limits
 from .page import between_marks, into_option, show
 from .runner import Axis, Result, run
 from .stages import stages_command
@@ -54,9 +56,9 @@ class Study:
 
 
 def _draw_limits(result: Result, folder: Path) -> Path:
-    from .limits.chart import draw_limits  # matplotlib is needed for pictures alone
+    from .limits.chart import draw  # matplotlib is needed for pictures alone
 
-    return draw_limits(result, folder)
+    return draw(result, folder)
 
 
 STUDIES = {
@@ -64,17 +66,23 @@ STUDIES = {
         "carom against pymunk and Box2D, on the same bodies.", bench.axes, bench.report, 3, long="100,000 bodies too.",
     ),
     "joints": Study("What substeps and shorter steps buy joints, and what they cost.", joints.axes, joints.report, 5),
-    "ladder": Study("What each feature costs, switched on alone.", ladder.axes, ladder.report, 5),
+    "ladder": Study(
+        "What each feature costs, switched on alone.", partial(features.axes, LADDER, features.BODIES),
+        partial(features.report, LADDER), 5,
+    ),
     "limits": Study(
         "Where carom fails: one quantity at a time, until the error passes 1 % and 10 %, and until it breaks.",
-        limits.axes, limits.report, long="Runs of a million steps too: about ten minutes more.", draw=_draw_limits,
+        limits.axes, limits.report, draw=_draw_limits,
     ),
     "scaling": Study(
         "How the time per body grows with their number.", scaling.axes, scaling.report, 3,
         long="A million bodies too: needs some gigabytes.",
     ),
     "settings": Study("What each field of Settings costs and buys.", settings.axes, settings.report, 5),
-    "spins": Study("What bodies that turn cost.", spins.axes, spins.report, 5),
+    "spins": Study(
+        "What bodies that turn cost.", partial(features.axes, SPINS, features.TURNING),
+        partial(features.report, SPINS), 5,
+    ),
     "startup": Study(
         "The time to the first step of a new process, by scene.", startup.axes, startup.report, 3,
         usual=(startup.COMMANDS_AXIS, "asteroids"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 from carom.framework import World
 from carom.lab import testing as kit
 from carom.lab.cli.usage_errors import Problem
+from carom.lab.jobs import Jobs
 from carom.lab.measure.machine import machine
 from carom.lab.measure.timing import Spread, no_garbage_collection, timed
 from carom.lab.reporting.progress import NO_PROGRESS, Progress
@@ -26,12 +27,12 @@ class Sample:
 
     value: Any
     figures: dict[str, Spread]
-    facts: dict[str, Any]
+    facts: dict[Any, Any]
 
 
 @dataclass
 class Line:
-    """One axis in one scene, or by one method; the samples in the order of the values."""
+    """One axis, with its samples in the order of the values."""
 
     axis: str
     of: str
@@ -53,65 +54,71 @@ class Result:
     repeats: int
     lines: list[Line]
 
-    def line(self, axis: str, of: str) -> Line:
-        """That axis there; KeyError if it was not measured."""
-        for line in self.lines:
-            if (line.axis, line.of) == (axis, of):
-                return line
-        raise KeyError(f"{axis}, {of} was not measured")
-
 
 @dataclass(frozen=True)
 class Axis:
     """One quantity that is varied.
 
-    of: the scene or the method
-    values: measured in each repeat
-    measure: (value, repeat) -> figures by name, which may differ between repeats; None: there are no repeats
-    facts: value -> what is the same in every repeat
+    of: the scene, or what else the values have in common
+    values: of the quantity, in any order
+    measure: (value, repeat) -> figures by name, which may differ between repeats, such as times; None: there are none
+    facts: value -> what is the same in every repeat; found on all cores
     rotate: True: each repeat begins with another value, so that none is always measured after the same one
-    explore: the samples so far, by value -> values to sample; the runner adds each sample before it asks for the next
-    value. None: ``values``
     """
 
     name: str
     of: str
-    values: tuple[Any, ...] = ()
+    values: tuple[Any, ...]
     measure: Callable[[Any, int], Mapping[str, float]] | None = None
-    facts: Callable[[Any], dict[str, Any]] | None = None
+    facts: Callable[[Any], dict[Any, Any]] | None = None
     rotate: bool = True
-    explore: Callable[[Mapping[Any, Sample]], Iterator[Any]] | None = None
+
+
+@dataclass(frozen=True)
+class Fact:
+    """The facts of one value, as a job."""
+
+    axis: Axis
+    value: Any
+    key: str = ""  # it is not kept
+    cost: float = 2.0  # s, about
+
+    def find(self) -> dict[Any, Any]:
+        return {} if self.axis.facts is None else self.axis.facts(self.value)
 
 
 def run(axes: Sequence[Axis], repeats: int = 1, progress: Progress = NO_PROGRESS) -> Result:
-    """Measure these axes, one after the other."""
-    progress.begin(sum(_amount(axis, repeats) for axis in axes))
-    return Result(machine(), repeats, [_line(axis, repeats, progress) for axis in axes])
+    """Measure these axes: the times one after the other, then the facts."""
+    taken = [_measured(axis, repeats, progress) for axis in axes]
+    facts = [Fact(axis, value) for axis in axes if axis.facts is not None for value in axis.values]
+    found = iter(Jobs(None, progress=progress).all(Fact.find, facts, "facts"))
+    lines = []
+    for axis, figures in zip(axes, taken, strict=True):
+        samples = [
+            Sample(value, {name: Spread.of(all_of) for name, all_of in figures[value].items()},
+                   {} if axis.facts is None else next(found))
+            for value in axis.values
+        ]  # fmt: skip
+        lines.append(Line(axis.name, axis.of, samples))
+    return Result(machine(), repeats, lines)
 
 
-def _amount(axis: Axis, repeats: int) -> int:
-    return 1 + (repeats * len(axis.values) if axis.measure is not None else 0)
-
-
-def _line(axis: Axis, repeats: int, progress: Progress) -> Line:
+def _measured(axis: Axis, repeats: int, progress: Progress) -> dict[Any, dict[str, list[float]]]:
+    """The figures by value and name, one for each repeat."""
     taken: dict[Any, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
-    if axis.measure is not None:
-        for repeat in range(repeats):
-            first = repeat % len(axis.values) if axis.rotate else 0
-            for value in (*axis.values[first:], *axis.values[:first]):
-                progress.say(f"{axis.name} {value}: {axis.of}, repeat {repeat + 1} of {repeats}")
-                with no_garbage_collection():
-                    figures = axis.measure(value, repeat)
-                for name, figure in figures.items():
-                    taken[value][name].append(figure)
-                progress.advance(1)
-    samples: dict[Any, Sample] = {}
-    for value in axis.values if axis.explore is None else axis.explore(samples):
-        progress.say(f"{axis.name} {value}: {axis.of}")
-        figures = {name: Spread.of(found) for name, found in taken[value].items()}
-        samples[value] = Sample(value, figures, {} if axis.facts is None else axis.facts(value))
-    progress.advance(1)
-    return Line(axis.name, axis.of, list(samples.values()))
+    if axis.measure is None:
+        return taken
+    progress.begin(repeats * len(axis.values))
+    for repeat in range(repeats):
+        first = repeat % len(axis.values) if axis.rotate else 0
+        for value in (*axis.values[first:], *axis.values[:first]):
+            progress.say(f"{axis.name} {value}, repeat {repeat + 1} of {repeats}")
+            with no_garbage_collection():
+                figures = axis.measure(value, repeat)
+            for name, figure in figures.items():
+                taken[value][name].append(figure)
+            progress.advance(1)
+    return taken
 
 
 def nanoseconds_per_step(make: Callable[[], World], what: str, steps: int, enough: float = 0.0) -> float:

@@ -8,7 +8,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
 
 from carom import scenes
 from carom.framework.jit.cache import CACHE_FOLDER_VARIABLE
@@ -19,10 +18,10 @@ from .runner import Axis, Result
 
 STEPS = 600  # after the first
 COMMANDS = {
-    "python -c pass": ["-c", "pass"],
-    "import carom.framework": ["-c", "import carom.framework"],
-    "carom --help": ["-m", "carom", "--help"],
-    "carom scenes": ["-m", "carom", "scenes"],
+    "python -c pass": ("-c", "pass"),
+    "import carom.framework": ("-c", "import carom.framework"),
+    "carom --help": ("-m", "carom", "--help"),
+    "carom scenes": ("-m", "carom", "scenes"),
 }
 COMMANDS_AXIS = "commands"
 EMPTY, KEPT, SHIPPED = "none", "kept on disk", "shipped"  # kernels that are compiled already
@@ -53,9 +52,16 @@ print(json.dumps(found))
 def axes(quick: bool = False, long: bool = False) -> list[Axis]:
     """Commands that need no kernel, and the scenes of the library by what is compiled already."""
     del quick, long
-    commands = Axis(COMMANDS_AXIS, "", tuple(COMMANDS), lambda name, repeat: {"seconds": _seconds_of(COMMANDS[name])})
-    kernels = (EMPTY, KEPT, SHIPPED)
-    return [commands, *(Axis(name, "kernels", kernels, Starts(name), rotate=False) for name in scenes.names())]
+    commands = Axis(COMMANDS_AXIS, "", tuple(COMMANDS), _command)
+    return [commands, *(Axis(name, "", (EMPTY, KEPT, SHIPPED), Starts(name), rotate=False) for name in scenes.names())]
+
+
+def _command(name: str, repeat: int) -> dict[str, float]:
+    """Processor seconds that it takes in a process of its own."""
+    before = os.times()
+    _run(*COMMANDS[name])
+    after = os.times()
+    return {"seconds": sum(after[2:4]) - sum(before[2:4])}
 
 
 class Starts:
@@ -68,7 +74,6 @@ class Starts:
         self._folders: list[tempfile.TemporaryDirectory[str]] = []  # removed with the last reference to them
 
     def __call__(self, kernels: str, repeat: int) -> dict[str, float]:
-        del repeat
         if kernels == SHIPPED and not self._shipped:
             self._shipped = self._folder()
             _ship(self.scene, self._shipped)
@@ -81,32 +86,20 @@ class Starts:
         return self._folders[-1].name
 
 
-def _seconds_of(command: list[str]) -> float:
-    """Processor seconds that it takes in a process of its own."""
-
-    def of_ended() -> float:
-        ended = os.times()
-        return ended.children_user + ended.children_system
-
-    before = of_ended()
-    _run([sys.executable, *command], {})
-    return of_ended() - before
-
-
 def _ship(scene: str, folder: str) -> None:
-    _run([sys.executable, "-m", "carom", "warm-up", scene, "--portable", folder], {})
+    _run("-m", "carom", "warm-up", scene, "--portable", folder)
 
 
 def _start(scene: str, cache: str, shipped: str) -> dict[str, float]:
     """Of one process, by name: seconds by the wall clock to the end of its first step; processor seconds of imports and
     of building the world with the first step; seconds of the longest step after it; kernels that were compiled; MB."""
     started = time.time()
-    found = json.loads(_run([sys.executable, "-c", PROGRAM, scene, shipped], {CACHE_FOLDER_VARIABLE: cache}))
+    found = json.loads(_run("-c", PROGRAM, scene, shipped, **{CACHE_FOLDER_VARIABLE: cache}))
     return {"seconds": found.pop("at") - started, **found}
 
 
-def _run(command: Sequence[str], environment: dict[str, str]) -> str:
-    done = subprocess.run(command, env={**os.environ, **environment}, capture_output=True, text=True)
+def _run(*words: str, **environment: str) -> str:
+    done = subprocess.run((sys.executable, *words), env={**os.environ, **environment}, capture_output=True, text=True)
     if done.returncode:
         raise Problem(f"the process that was timed failed: {(done.stderr.splitlines() or ['no message'])[-1]}")
     return done.stdout
@@ -114,27 +107,25 @@ def _run(command: Sequence[str], environment: dict[str, str]) -> str:
 
 def report(result: Result) -> tuple[list[TextTable], list[str]]:
     """The times of commands that need no kernel, and those of scenes."""
-    tables, cells = [], []
+    commands, starts = [], []
     for line in result.lines:
-        found = [(sample.value, sample.figures) for sample in line.samples]
-        if line.axis == COMMANDS_AXIS:
-            rows = [(name, compact(of["seconds"].median), span(of["seconds"])) for name, of in found]
-            tables.append(TextTable("commands that need no kernel", ("command", "CPU s", "from .. to"), rows))
-            continue
-        cells += [
-            (
-                line.axis, kernels, f"{of['compiled'].median:.0f}", compact(of["seconds"].median), span(of["seconds"]),
+        for sample in line.samples:
+            of, seconds = sample.figures, sample.figures["seconds"]
+            if line.axis == COMMANDS_AXIS:
+                commands.append((sample.value, compact(seconds.median), span(seconds)))
+                continue
+            starts.append((
+                line.axis, sample.value, f"{of['compiled'].median:.0f}", compact(seconds.median), span(seconds),
                 compact(of["imports"].median), compact(of["first"].median), compact(of["worst"].median * 1e3),
                 f"{of['peak'].median:.0f}",
-            )
-            for kernels, of in found
-        ]  # fmt: skip
+            ))  # fmt: skip
     columns = (
         "scene", "kernels", "compiled", "first step after s", "from .. to", "imports CPU s", "first step CPU s",
         f"worst of {STEPS} ms", "peak MB",
     )  # fmt: skip
-    title = (
-        "from starting a process to the end of its first step, and the longest step after it, medians of "
-        f"{result.repeats}"
+    title = "from starting a process to the end of its first step, and the longest step after it, medians of "
+    tables = (
+        TextTable("commands that need no kernel", ("command", "CPU s", "from .. to"), commands),
+        TextTable(f"{title}{result.repeats}", columns, starts),
     )
-    return [*tables, TextTable(title, columns, cells)] if cells else tables, []
+    return [table for table in tables if table.rows], []

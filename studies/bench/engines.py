@@ -19,7 +19,7 @@ from .plain import Body, Floats, NotPlainError, Shape, bodies_of, joints_of
 CAROM, PYMUNK, BOX2D = "carom", "pymunk", "Box2D"
 MODULES = {PYMUNK: "pymunk", BOX2D: "pyb2d3"}
 SUBSTEPS = 4  # of Box2D: what its manual recommends
-HASHED = 5000  # bodies from which pymunk's spatial hash is faster than its tree of boxes
+HASHED = 5000  # moving shapes from which pymunk's spatial hash is faster than its tree of boxes
 CELL, CELLS = 2.0, 2  # of that hash: over the largest body's size; for each body
 ARM = 10.0  # m above a wheel where its spring ends
 FILTER_BITS = {PYMUNK: 2**32 - 1, BOX2D: 2**64 - 1}
@@ -102,9 +102,10 @@ class Pymunk(Engine):
                 self.space.add(shape)
         for joint in joints_of(world):
             self._join(joint)
-        if len(self.moving) >= HASHED:
-            sizes = (body.shape.rounding + np.abs(body.shape.corners).max() for body in bodies if body.shape)
-            self.space.use_spatial_hash(CELL * 2 * min(sizes), CELLS * len(bodies))
+        moving = [body.shape for body in bodies if body.shape and body.kind == "dynamic"]
+        if len(moving) >= HASHED:
+            size = 2.0 * max(shape.rounding + np.abs(shape.corners).max() for shape in moving)
+            self.space.use_spatial_hash(CELL * size, CELLS * len(bodies))
 
     def _made(self, body: Body) -> Any:
         if body.kind == "static":

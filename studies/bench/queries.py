@@ -22,9 +22,10 @@ EDGE = 0.02  # m from the wall, where rays begin: the discs are farther away
 
 
 def _rays(at: Floats, side: float) -> tuple[Floats, Floats]:
-    """Rays from one side of the box to the other at the heights of the places; both ends (m, 2), outside all discs."""
+    """Rays from one side of the box to the other, from the height x to the height y of each place; both ends (m, 2),
+    outside all discs."""
     starts, ends = np.full_like(at, EDGE), np.full_like(at, side - EDGE)
-    starts[:, 1] = ends[:, 1] = at[:, 1]
+    starts[:, 1], ends[:, 1] = at.T
     return starts, ends
 
 

@@ -141,7 +141,8 @@ def report(result: Result) -> tuple[list[TextTable], list[str]]:
                 of = ratios(ms, sample.figures[f"{window}/{CAROM}/ms"])
                 beside.append(f"{compact(of.median)} ({span(of)})")
             times.append((label, *cells, *beside[1:]))
-            quality.append((label, *_quality(sample, window, there)))
+            if sample.value.size >= SMALL:
+                quality.append((label, *_quality(sample, window, there)))
     engines = [CAROM, *PEERS]
     title = f"ms per step, of player_query per 1,000 queries: median, tenth percentile; medians of {result.repeats}"
     heads = ("scene", *engines, *(f"{name} / {CAROM}" for name in PEERS))

@@ -1,4 +1,4 @@
-"""Where carom fails, one quantity at a time.
+"""Where carom fails: one quantity is increased until the error passes 1 % and 10 %, and until the simulation breaks.
 
-Reads worlds made for each quantity. Writes tables and a chart.
+:mod:`worlds` has the quantities, :mod:`search` finds where they pass a level, and shows it.
 """

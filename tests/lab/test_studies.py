@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from carom.lab.cli.usage_errors import Problem
-from studies import joints, ladder, spins, startup
+from studies import features, joints, startup
 from studies.__main__ import STUDIES, cli
 from studies.accuracy import KNOWN
 from studies.runner import Axis, run
@@ -34,28 +34,14 @@ def test_each_value_is_measured_in_each_repeat_another_one_first():
         taken.append((repeat, value))
         return {"ns": 10.0 * value + repeat}
 
-    result = run([Axis("n", "here", (1, 2, 3), measure, lambda value: {"even": value % 2 == 0})], repeats=2)
-    assert taken == [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (1, 1)]
-    sample = result.line("n", "here").sample(2)
+    axes = [Axis(name, "here", (1, 2, 3), measure, lambda value: {"even": value % 2 == 0}) for name in "nm"]
+    _, line = run([axes[0], replace(axes[1], rotate=False)], repeats=2).lines
+    assert taken[:6] == [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (1, 1)]
+    assert taken[6:] == [(0, 1), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3)]
+    sample = line.sample(2)
     assert (sample.figures["ns"].values, sample.facts) == ((20.0, 21.0), {"even": True})
-    with pytest.raises(KeyError, match="n, here: 4 was not measured"):
-        result.line("n", "here").sample(4)
-    with pytest.raises(KeyError, match="n, there was not measured"):
-        result.line("n", "there")
-    taken.clear()
-    run([Axis("n", "here", (1, 2), measure, rotate=False)], repeats=2)
-    assert taken == [(0, 1), (0, 2), (1, 1), (1, 2)]
-
-
-def test_an_axis_may_choose_by_what_it_has_found():
-    def explore(samples):
-        value = 1
-        while not samples or samples[value].facts["square"] < 10:
-            value = max(samples, default=0) + 1
-            yield value
-
-    (line,) = run([Axis("n", "here", facts=lambda value: {"square": value**2}, explore=explore)]).lines
-    assert [sample.value for sample in line.samples] == [1, 2, 3, 4]
+    with pytest.raises(KeyError, match="m, here: 4 was not measured"):
+        line.sample(4)
 
 
 # -- the command and its pages -------------------------------------------------------------------
@@ -81,7 +67,7 @@ def test_a_study_prints_draws_and_fills_a_page(studies, tmp_path):
         (("limits", "sped"), "no axis 'sped'; did you mean 'speed'?"),
         (("settings", "substep"), "no axis 'substep'; did you mean 'substeps'"),
         (("startup", "nothing"), "no axis 'nothing'"),
-        (("limits", "--quick", "--long"), "--quick and --long exclude each other"),
+        (("scaling", "--quick", "--long"), "--quick and --long exclude each other"),
         (("ladder", "--long"), "No such option"),
         (("scaling", "--repeats", "0"), "0 is not in the range x>=1"),
         (("limits", "--into", "nowhere.md"), "--into nowhere.md: No such file"),
@@ -108,34 +94,38 @@ def test_the_axes_of_a_study_have_names_of_their_own(name):
 # -- scaling, ladder, startup --------------------------------------------------------------------
 
 
-def test_the_ladder_measures_each_rung_beside_another():
-    result = run([ladder.axis(bodies=30, steps=2)], repeats=2)
-    (table,), _ = ladder.report(result)
-    assert [row[0] for row in table.rows] == [rung.feature for rung in ladder.RUNGS]
-    kernels = {row[0]: set(filter(None, row[2].split(", "))) for row in table.rows}
-    assert {"sum_forces", "semi_implicit_euler"} <= kernels["drifting"]
-    for feature in ("gravity", "linear_damping", "rotation", "friction", "contacts at rest"):
-        assert not kernels[feature]  # the same stages have more to do
-    assert kernels["velocity_verlet"] == {"verlet_drift"}
-    assert kernels["two levels"] == {"evaluate_levels"}
-    assert {"box_motions", "evaluate_pairs", "solve_contacts", "resolve_impacts"} <= kernels["spheres, apart"]
+@pytest.mark.parametrize("rungs", [features.LADDER, features.SPINS], ids=["ladder", "spins"])
+def test_features_are_measured_beside_the_same_scene_without(rungs, monkeypatch):
+    monkeypatch.setattr(features, "STEPS", 2)
+    result = run(features.axes(rungs, 30), repeats=2)
+    (table,), _ = features.report(rungs, result)
+    assert [row[:2] for row in table.rows] == [(feature, beside) for feature, (beside, _) in rungs.items()]
     (line,) = result.lines
-    bare, gravity, spheres = (line.sample(name) for name in ("drifting", "gravity", "spheres, apart"))
-    assert spheres.facts["bytes"] > bare.facts["bytes"] > 0
-    pairs = zip(gravity.figures["ns"].values, bare.figures["ns"].values, strict=True)
-    assert ladder.extra(gravity, bare).values == tuple(one - other for one, other in pairs)
+    for feature, beside, ns, more, times, _ in table.rows:
+        of = line.sample(feature).figures["ns"]
+        assert float(ns.replace(",", "")) == pytest.approx(of.median, rel=0.01)
+        if beside:
+            other = line.sample(beside).figures["ns"]
+            assert float(more) == pytest.approx(of.median - other.median, abs=0.06)
+            pairs = [one / two for one, two in zip(of.values, other.values, strict=True)]
+            assert float(times.replace(",", "")) == pytest.approx(sum(pairs) / 2, rel=0.01)
 
 
-def test_what_turns_is_measured_beside_the_same_scene_without():
-    result = run([ladder.axis(20, 2, spins.BY_FEATURE)], repeats=2)
-    (table,), _ = spins.report(result)
-    assert [row[:2] for row in table.rows] == [(rung.feature, rung.beside) for rung in spins.RUNGS if rung.beside]
-    (line,) = result.lines
-    still, turning = line.sample("stacks of AABBs"), line.sample("stacks of boxes with a Spin")
-    more = set(turning.facts["kernels"]) - set(still.facts["kernels"])
-    assert {"turn_bodies", "share_spins", "solve_turning_contacts", "take_spins"} <= more
-    pairs = zip(turning.figures["ns"].values, still.figures["ns"].values, strict=True)
-    assert spins.times(turning, still).values == tuple(one / other for one, other in pairs)
+def test_a_feature_adds_what_it_says():
+    def kernels(build):
+        with build(30) as world:
+            world.step()
+            return {row.kernel for row in world.plan().kernels}
+
+    for rungs, feature, more in (
+        (features.LADDER, "velocity_verlet", {"verlet_drift"}), (features.LADDER, "two levels", {"evaluate_levels"}),
+        (features.LADDER, "gravity", set()), (features.LADDER, "friction", set()),
+        (features.SPINS, "stacks of boxes with a Spin", {"turn_bodies", "share_spins", "solve_turning_contacts",
+                                                         "take_spins"}),
+    ):  # fmt: skip
+        beside, build = rungs[feature]
+        added = kernels(build) - kernels(rungs[beside][1])
+        assert added >= more if more else not added
 
 
 def test_what_substeps_and_shorter_steps_buy_joints():
