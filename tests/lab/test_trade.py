@@ -11,6 +11,7 @@ import math
 import numpy as np
 import pytest
 from helpers_trade_scenes import BALL, BULLET, CROWD, REST, SPRING, scene_file
+from oracles.closed_forms import FORMS
 
 from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
@@ -26,7 +27,6 @@ from carom.lab.trading.subject import Subject
 from carom.lab.trading.trade import Point, SceneTrade, next_better, recommended, settings_line
 from carom.plugins import Physics
 from carom.scenes import jump, spring, stack
-from studies.closed_forms import FORMS
 
 HERE = {"timing": False, "workers": 1}
 JOBS = Jobs(1)
