@@ -60,10 +60,9 @@ class Axis:
     """One quantity that is varied.
 
     of: the scene, or what else the values have in common
-    values: of the quantity, in any order
+    values: of the quantity; each repeat begins with another one, so that none is always measured after the same one
     measure: (value, repeat) -> figures by name, which may differ between repeats, such as times; None: there are none
     facts: value -> what is the same in every repeat; found on all cores
-    rotate: True: each repeat begins with another value, so that none is always measured after the same one
     """
 
     name: str
@@ -71,7 +70,6 @@ class Axis:
     values: tuple[Any, ...]
     measure: Callable[[Any, int], Mapping[str, float]] | None = None
     facts: Callable[[Any], dict[Any, Any]] | None = None
-    rotate: bool = True
 
 
 @dataclass(frozen=True)
@@ -110,7 +108,7 @@ def _measured(axis: Axis, repeats: int, progress: Progress) -> dict[Any, dict[st
         return taken
     progress.begin(repeats * len(axis.values))
     for repeat in range(repeats):
-        first = repeat % len(axis.values) if axis.rotate else 0
+        first = repeat % len(axis.values)
         for value in (*axis.values[first:], *axis.values[:first]):
             progress.say(f"{axis.name} {value}, repeat {repeat + 1} of {repeats}")
             with no_garbage_collection():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import subprocess
@@ -50,10 +51,10 @@ print(json.dumps(found))
 
 
 def axes(quick: bool = False, long: bool = False) -> list[Axis]:
-    """Commands that need no kernel, and the scenes of the library by what is compiled already."""
+    """Commands that need no kernel, and each scene of the library."""
     del quick, long
-    commands = Axis(COMMANDS_AXIS, "", tuple(COMMANDS), _command)
-    return [commands, *(Axis(name, "", (EMPTY, KEPT, SHIPPED), Starts(name), rotate=False) for name in scenes.names())]
+    each = [Axis(name, "", (name,), _starts) for name in scenes.names()]
+    return [Axis(COMMANDS_AXIS, "", tuple(COMMANDS), _command), *each]
 
 
 def _command(name: str, repeat: int) -> dict[str, float]:
@@ -64,26 +65,21 @@ def _command(name: str, repeat: int) -> dict[str, float]:
     return {"seconds": sum(after[2:4]) - sum(before[2:4])}
 
 
-class Starts:
-    """Starts processes that build a scene and step it. In each repeat the first has an empty cache folder, which the
-    second uses again; the third has another empty one, and kernels to load that were shipped."""
+def _starts(scene: str, repeat: int) -> dict[str, float]:
+    """Three processes that build the scene and step it: with an empty cache folder, with what the first has left there,
+    and with another empty one and kernels that were shipped."""
+    with tempfile.TemporaryDirectory() as cache, tempfile.TemporaryDirectory() as other:
+        started = {EMPTY: _start(scene, cache, ""), KEPT: _start(scene, cache, "")}
+        started[SHIPPED] = _start(scene, other, _shipped(scene).name)
+    return {f"{kernels} {name}": value for kernels, found in started.items() for name, value in found.items()}
 
-    def __init__(self, scene: str) -> None:
-        self.scene = scene
-        self._cache = self._shipped = ""
-        self._folders: list[tempfile.TemporaryDirectory[str]] = []  # removed with the last reference to them
 
-    def __call__(self, kernels: str, repeat: int) -> dict[str, float]:
-        if kernels == SHIPPED and not self._shipped:
-            self._shipped = self._folder()
-            _ship(self.scene, self._shipped)
-        if kernels != KEPT:  # which comes after EMPTY
-            self._cache = self._folder()
-        return _start(self.scene, self._cache, self._shipped if kernels == SHIPPED else "")
-
-    def _folder(self) -> str:
-        self._folders.append(tempfile.TemporaryDirectory())
-        return self._folders[-1].name
+@functools.cache
+def _shipped(scene: str) -> tempfile.TemporaryDirectory[str]:
+    """A folder with the scene's kernels, as a game ships them."""
+    folder = tempfile.TemporaryDirectory()
+    _ship(scene, folder.name)
+    return folder
 
 
 def _ship(scene: str, folder: str) -> None:
@@ -110,15 +106,19 @@ def report(result: Result) -> tuple[list[TextTable], list[str]]:
     commands, starts = [], []
     for line in result.lines:
         for sample in line.samples:
-            of, seconds = sample.figures, sample.figures["seconds"]
             if line.axis == COMMANDS_AXIS:
+                seconds = sample.figures["seconds"]
                 commands.append((sample.value, compact(seconds.median), span(seconds)))
                 continue
-            starts.append((
-                line.axis, sample.value, f"{of['compiled'].median:.0f}", compact(seconds.median), span(seconds),
-                compact(of["imports"].median), compact(of["first"].median), compact(of["worst"].median * 1e3),
-                f"{of['peak'].median:.0f}",
-            ))  # fmt: skip
+            for kernels in (EMPTY, KEPT, SHIPPED):
+                compiled, seconds, imports, first, worst, peak = (
+                    sample.figures[f"{kernels} {name}"]
+                    for name in ("compiled", "seconds", "imports", "first", "worst", "peak")
+                )
+                starts.append((
+                    sample.value, kernels, f"{compiled.median:.0f}", compact(seconds.median), span(seconds),
+                    compact(imports.median), compact(first.median), compact(1e3 * worst.median), f"{peak.median:.0f}",
+                ))  # fmt: skip
     columns = (
         "scene", "kernels", "compiled", "first step after s", "from .. to", "imports CPU s", "first step CPU s",
         f"worst of {STEPS} ms", "peak MB",
