@@ -50,11 +50,8 @@ clean:
 	$(PYTHON) -m venv .venv || { $(PYTHON) -m venv --clear --without-pip .venv && $(PYTHON) -m pip --python $@ install --quiet pip; }
 
 STUDIES := $(BIN)/python -m studies
-ACCURACY := spring orbit jump bouncing stack thermal_gas billiards
 
 figures: .venv/bench  # measure again what the tables and charts of docs/tables show
-	for scene in $(ACCURACY); do \
-	  $(STUDIES) accuracy $$scene --out docs/pictures --into docs/tables/accuracy.md || exit 1; \
-	done
+	$(STUDIES) accuracy --into docs/tables/accuracy.md --out docs/pictures
 	$(STUDIES) limits --into docs/tables/limits.md --out docs/pictures
 	$(STUDIES) settings --into docs/tables/settings.md

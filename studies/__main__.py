@@ -17,8 +17,7 @@ from carom.lab.cli.usage_errors import Problem, did_you_mean
 from carom.lab.reporting.progress import Progress
 from carom.lab.reporting.text import TextTable
 
-from . import features, joints, scaling, settings, startup
-from .accuracy import accuracy_command
+from . import accuracy, features, joints, scaling, settings, startup
 from .bench import timing as bench
 from .features import LADDER, SPINS
 from .limits import search as limits
@@ -31,23 +30,21 @@ from .stages import stages_command
 class Study:
     """A table of axes and its report.
 
-    axes: (quick, long) -> all axes; quick: fewer values, long: more
+    axes: (quick) -> all axes; quick: fewer values
     usual: names of the axes that run if none is named; empty: all
-    long: what ``--long`` adds; empty: nothing
-    draw: draws a chart into a folder, and returns its path
+    draw: draws charts into a folder, and returns their paths
     """
 
     what: str
-    axes: Callable[[bool, bool], Sequence[Axis]]
+    axes: Callable[[bool], Sequence[Axis]]
     report: Callable[[Result], tuple[list[TextTable], list[str]]]
     repeats: int = 1
     usual: tuple[str, ...] = ()
-    long: str = ""
-    draw: Callable[[Result, Path], Path] | None = None
+    draw: Callable[[Result, Path], list[Path]] | None = None
 
-    def chosen(self, names: Sequence[str], quick: bool, long: bool) -> list[Axis]:
+    def chosen(self, names: Sequence[str], quick: bool) -> list[Axis]:
         """The axes of these names; Problem for a name that there is not."""
-        axes = self.axes(quick, long)
+        axes = self.axes(quick)
         known = list(dict.fromkeys(axis.name for axis in axes))
         for name in names:
             if name not in known:
@@ -55,16 +52,12 @@ class Study:
         return [axis for axis in axes if axis.name in (names or self.usual or known)]
 
 
-def _draw_limits(result: Result, folder: Path) -> Path:
-    from .limits.chart import draw  # matplotlib is needed for pictures alone
-
-    return draw(result, folder)
-
-
 STUDIES = {
-    "bench": Study(
-        "carom against pymunk and Box2D, on the same bodies.", bench.axes, bench.report, 3, long="100,000 bodies too.",
+    "accuracy": Study(
+        "What methods and steps buy in scenes with a known answer.", accuracy.axes, accuracy.report,
+        draw=accuracy.draw_charts,
     ),
+    "bench": Study("carom against pymunk and Box2D, on the same bodies.", bench.axes, bench.report, 3),
     "joints": Study("What substeps and shorter steps buy joints, and what they cost.", joints.axes, joints.report, 5),
     "ladder": Study(
         "What each feature costs, switched on alone.", partial(features.axes, LADDER, features.BODIES),
@@ -72,12 +65,9 @@ STUDIES = {
     ),
     "limits": Study(
         "Where carom fails: one quantity at a time, until the error passes 1 % and 10 %, and until it breaks.",
-        limits.axes, limits.report, draw=_draw_limits,
+        limits.axes, limits.report, draw=limits.draw_chart,
     ),
-    "scaling": Study(
-        "How the time per body grows with their number.", scaling.axes, scaling.report, 3,
-        long="A million bodies too: needs some gigabytes.",
-    ),
+    "scaling": Study("How the time per body grows with their number.", scaling.axes, scaling.report, 3),
     "settings": Study("What each field of Settings costs and buys.", settings.axes, settings.report, 5),
     "spins": Study(
         "What bodies that turn cost.", partial(features.axes, SPINS, features.TURNING),
@@ -103,12 +93,9 @@ def _command(name: str, study: Study) -> click.Command:
     @into_option
     @traceback_option
     def command(
-        names: tuple[str, ...], quick: bool, repeats: int | None, into: Path | None, long: bool = False,
-        out: Path | None = None,
-    ) -> None:  # fmt: skip
-        if quick and long:
-            raise Problem("--quick and --long exclude each other")
-        axes, mark = study.chosen(names, quick, long), f"studies {name}"
+        names: tuple[str, ...], quick: bool, repeats: int | None, into: Path | None, out: Path | None = None
+    ) -> None:
+        axes, mark = study.chosen(names, quick), f"studies {name}"
         if into is not None:
             between_marks(into, mark)  # Problem, before the long run, for a page without the marks
         if out is not None:
@@ -116,20 +103,15 @@ def _command(name: str, study: Study) -> click.Command:
         with Progress(Console(stderr=True)) as bar:
             result = run(axes, repeats or (1 if quick else study.repeats), bar)
         show(*study.report(result), into, mark)
-        if out is not None and study.draw is not None:
-            click.echo(f"chart: {study.draw(result, out)}", err=True)
+        for path in study.draw(result, out) if out is not None and study.draw is not None else ():
+            click.echo(f"chart: {path}", err=True)
 
-    if study.long:
-        command = click.option("--long", is_flag=True, help=study.long)(command)
-    if study.draw is not None:
-        command = out_option("Draw a chart into this folder.")(command)
-    return command
+    return command if study.draw is None else out_option("Draw charts into this folder.")(command)
 
 
 for _name, _study in STUDIES.items():
     cli.add_command(_command(_name, _study))
-for _other in (accuracy_command, stages_command):
-    cli.add_command(_other)
+cli.add_command(stages_command)
 
 if __name__ == "__main__":
     in_command(cli)

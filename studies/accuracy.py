@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 import math
-import shlex
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import click
-from rich.console import Console
-
 from carom.framework.settings import COLLISION_MODES
-from carom.lab.cli.options import WORDS, KeepsWords, out_option
-from carom.lab.cli.usage_errors import Problem, did_you_mean
-from carom.lab.reporting.progress import Progress
 from carom.lab.reporting.text import NOTHING, TextTable, compact, number
 from carom.lab.trading.answer import curves, remarks
-from carom.lab.trading.chart import draw
 from carom.lab.trading.grid import METHODS
-from carom.lab.trading.trade import Point, SceneTrade, trade
+from carom.lab.trading.trade import Point, SceneTrade, Trade, trade
 
-from .page import between_marks, into_option, show
+from .runner import Axis, Result
 
 ALL = ("explicit_euler", *METHODS)
 TARGETS = (0.1, 0.01, 0.001, 1e-6)
@@ -63,30 +55,40 @@ KNOWN = {
 }
 
 
-@click.command("accuracy", cls=KeepsWords)
-@click.argument("scene")
-@click.option("--runs", "kept", type=click.Path(path_type=Path), default=Path("out/runs"), show_default=True)
-@out_option("Draw a chart into this folder.")
-@into_option
-@click.pass_context
-def accuracy_command(context: click.Context, scene: str, kept: Path, out: Path | None, into: Path | None) -> None:
-    """Measure a scene with all methods and many steps: a row per method."""
-    if scene not in KNOWN:
-        raise Problem(f"no scene {scene!r} here{did_you_mean(scene, KNOWN)}")
-    mark, known = f"studies accuracy {scene}", KNOWN[scene]
-    if into is not None:
-        between_marks(into, mark)  # Problem, before the long run, for a page without the marks
-    vary: dict[str, Sequence[Any]] = {"dt": known.steps, **({"integrator": known.methods} if known.methods else {})}
+def axes(quick: bool = False) -> list[Axis]:
+    """The scenes."""
+    del quick
+    return [Axis(scene, "", (scene,), facts=_facts) for scene in KNOWN]
+
+
+def _facts(scene: str) -> dict[str, SceneTrade]:
+    """The trade of the scene, with all methods and steps."""
+    known, vary = KNOWN[scene], {"dt": KNOWN[scene].steps}
+    vary |= {"integrator": known.methods} if known.methods else {}
     vary |= {"collision": COLLISION_MODES} if scene == "thermal_gas" else {}  # else not all, of what is chaotic
-    with Progress(Console(stderr=True)) as bar:
-        result = trade(
-            scene, norms=known.norms, vary=vary, seconds=known.seconds, repeats=known.repeats, options=known.options,
-            timing=False, thorough=True, folder=kept, progress=bar,
-            command=shlex.join(["python", "-m", "studies", "accuracy", *context.meta[WORDS]]),
-        )  # fmt: skip
-    show([summary(result.scenes[0])], remarks(result), into, mark)
-    for path in draw(result, out, known.norms[0]) if out is not None else ():
-        click.echo(f"chart: {path}", err=True)
+    result = trade(
+        scene, norms=known.norms, vary=vary, seconds=known.seconds, repeats=known.repeats, options=known.options,
+        timing=False, thorough=True, workers=1,
+    )  # fmt: skip
+    return {"trade": result.scenes[0]}
+
+
+def _trades(result: Result) -> list[SceneTrade]:
+    return [line.samples[0].facts["trade"] for line in result.lines]
+
+
+def report(result: Result) -> tuple[list[TextTable], list[str]]:
+    """A table for each scene, and what was measured against what."""
+    cases = _trades(result)
+    return [summary(case) for case in cases], remarks(Trade(result.machine, "", cases))
+
+
+def draw_charts(result: Result, folder: Path) -> list[Path]:
+    """A chart for each scene."""
+    from carom.lab.trading.chart import draw  # matplotlib is needed for pictures alone
+
+    trades = [Trade(result.machine, "", [case]) for case in _trades(result)]
+    return [path for one in trades for path in draw(one, folder, one.scenes[0].norm)]
 
 
 def summary(case: SceneTrade, targets: Sequence[float] = TARGETS) -> TextTable:

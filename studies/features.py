@@ -143,9 +143,8 @@ SPINS: Rungs = {
 }  # fmt: skip
 
 
-def axes(rungs: Rungs, bodies: int, quick: bool = False, long: bool = False) -> list[Axis]:
+def axes(rungs: Rungs, bodies: int, quick: bool = False) -> list[Axis]:
     """Nanoseconds per body and step of each rung."""
-    del long
     n = FEW if quick else bodies
 
     def measure(feature: str, repeat: int) -> dict[str, float]:

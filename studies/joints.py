@@ -58,9 +58,8 @@ def _time(dial: str, value: int, repeat: int) -> dict[str, float]:
     return {"ns": rate * nanoseconds_per_step(lambda: chain(dial, value)[0], f"{dial} {value}", STEPS)}
 
 
-def axes(quick: bool = False, long: bool = False) -> list[Axis]:
+def axes(quick: bool = False) -> list[Axis]:
     """Both dials."""
-    del long
     of = f"{CHAIN} links that swing, {BOXES} boxes that are welded"
     return [
         Axis(dial, of, values[1:4] if quick else values, partial(_time, dial), partial(_facts, dial))

@@ -14,7 +14,7 @@ from carom.lab import testing as kit
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.jobs import Jobs
 from carom.lab.measure.machine import machine
-from carom.lab.measure.timing import Spread, no_garbage_collection, timed
+from carom.lab.measure.timing import Spread, faults_in_results, no_garbage_collection, timed
 from carom.lab.reporting.progress import NO_PROGRESS, Progress
 
 WARM_UP_STEPS = 2
@@ -81,6 +81,7 @@ class Fact:
     key: str = ""  # it is not kept
     cost: float = 2.0  # s, about
 
+    @faults_in_results()
     def find(self) -> dict[Any, Any]:
         return {} if self.axis.facts is None else self.axis.facts(self.value)
 

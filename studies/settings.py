@@ -257,9 +257,9 @@ VARIED = (
 )  # fmt: skip
 
 
-def axes(quick: bool = False, long: bool = False) -> list[Axis]:
+def axes(quick: bool = False) -> list[Axis]:
     """All of them."""
-    del quick, long
+    del quick
     return [Axis(each.field, each.scene, each.values, each.time, each.facts) for each in VARIED]
 
 

@@ -50,9 +50,9 @@ print(json.dumps(found))
 """
 
 
-def axes(quick: bool = False, long: bool = False) -> list[Axis]:
+def axes(quick: bool = False) -> list[Axis]:
     """Commands that need no kernel, and each scene of the library."""
-    del quick, long
+    del quick
     each = [Axis(name, "", (name,), _starts) for name in scenes.names()]
     return [Axis(COMMANDS_AXIS, "", tuple(COMMANDS), _command), *each]
 

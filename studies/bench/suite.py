@@ -9,7 +9,7 @@ from typing import Any
 from carom import scenes
 from carom.framework import Settings, World
 
-SIZES, QUICK, LONG = (1000, 10_000), (1000,), (1000, 10_000, 100_000)
+QUICK, SIZES, LARGE = (1000,), (1000, 10_000), 100_000
 ESCAPED, SINKS, GAP = "escaped", "sinks", "gap"  # figures of quality that say most of a case
 FALLING = {"falling": (0, 300), "settled": (600, 900)}
 
@@ -43,14 +43,15 @@ def _case(
     return Case(scene, variant, size, options, Settings(collision=collision), {"": (first, last)}, watch)
 
 
-def cases(sizes: tuple[int, ...] = SIZES) -> list[Case]:
-    """All that is timed; sizes: of the scenes that come in any."""
-    found = [
+def cases(sizes: tuple[int, ...] = SIZES, large: int = LARGE) -> list[Case]:
+    """All that is timed; sizes: of the scenes that come in any; large: of two with little to do."""
+    return [
         _case("few", 20, 10, 200, variant="at rest", n=20),
         _case("few", 20, 10, 200, variant="bouncing", n=20, height=5.0, restitution=0.8),
         _case("few", 20, 10, 200, variant="flying", n=20, height=1000.0),
         _case("few", 200, 10, 200, variant="at rest", n=200),
-        *(_case(name, n, 10, 600, ESCAPED, n=n) for name in ("gas2d", "mixed2d") for n in sizes),
+        *(_case("gas2d", n, 10, 600, ESCAPED, n=n) for n in dict.fromkeys((*sizes, large))),
+        *(_case("mixed2d", n, 10, 600, ESCAPED, n=n) for n in sizes),
         *(Case("pile2d", "", n, {"n": n}, Settings(), FALLING, "") for n in sizes),
         _case("pyramid", 1275, 0, 500, SINKS, "friction 0.6", rows=50, friction=0.6),
         _case("pyramid", 1275, 0, 500, SINKS, "friction 0", rows=50, friction=0.0),
@@ -65,7 +66,6 @@ def cases(sizes: tuple[int, ...] = SIZES) -> list[Case]:
         _case("static_world", 1000, 10, 600, ESCAPED, n=1000),
         _case("fastgas", 1000, 10, 600, ESCAPED, "continuous", "continuous", n=1000),
         _case("fastgas", 1000, 10, 600, ESCAPED, "discrete", n=1000),
-        _case("freefall", sizes[-1], 10, 300, n=sizes[-1]),
+        _case("freefall", large, 10, 300, n=large),
         *(Case("player_query", "", n, {"n": n}, Settings(), {}, "") for n in sizes),
     ]
-    return found

@@ -34,9 +34,9 @@ MOST_BODY_STEPS = 10_000_000  # of a window: of more bodies fewer steps are time
 REHEARSAL_SEED, REHEARSAL_STEPS = 1000, 30  # of the untimed run before the first repeat, which compiles the kernels
 
 
-def axes(quick: bool = False, long: bool = False) -> list[Axis]:
+def axes(quick: bool = False) -> list[Axis]:
     """An axis for each scene, with its cases."""
-    found = suite.cases(suite.QUICK if quick else suite.LONG if long else suite.SIZES)
+    found = suite.cases(suite.QUICK, suite.QUICK[-1]) if quick else suite.cases()
     peers = _peers()
     measured = partial(measure, peers=peers)
     return [

@@ -6,6 +6,7 @@ import math
 import textwrap
 from collections.abc import Iterator, Mapping
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,9 +27,8 @@ ROUNDING, MOST = 1e-9, 10.0  # smaller errors are shown as rounding, larger ones
 Found = dict[float, tuple[float | None, str]]  # by value: the error, if it has one, and how it broke, else ""
 
 
-def axes(quick: bool = False, long: bool = False) -> list[Axis]:
+def axes(quick: bool = False) -> list[Axis]:
     """Each quantity with all its methods."""
-    del long
     searches = [(each, partial(search, each, each.quick if quick else each.values)) for each in QUANTITIES]
     return [Axis(each.name, "", tuple(each.methods), facts=found) for each, found in searches]
 
@@ -108,6 +108,13 @@ def _table(quantity: Quantity, line: Line) -> TextTable:
     headings = ("method", "1 % at", "10 % at", "breaks at", "worst", "how")
     body = [(", ".join(names), *cells) for cells, names in rows.items()]
     return TextTable(f"{quantity.title}{unit}. Error: {quantity.norm}", headings, body)
+
+
+def draw_chart(result: Result, folder: Path) -> list[Path]:
+    """A panel for each quantity."""
+    from .chart import draw  # matplotlib is needed for pictures alone
+
+    return [draw(result, folder)]
 
 
 def number(value: float) -> str:

@@ -238,9 +238,9 @@ def test_quality_sees_how_bodies_are_turned_and_gaps_of_hinges():
 @pytest.fixture
 def tiny(monkeypatch):
     """Two scenes of a few bodies."""
-    some = [case for case in cases((30,)) if case.scene in ("gas2d", "player_query")]
+    some = [case for case in cases((30,), 30) if case.scene in ("gas2d", "player_query")]
     monkeypatch.setattr(timing, "SMALL", 10)
-    monkeypatch.setattr(suite, "cases", lambda sizes: some)
+    monkeypatch.setattr(suite, "cases", lambda *sizes: some)
     return some
 
 
