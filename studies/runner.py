@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import statistics
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,11 +15,26 @@ from carom.lab import testing as kit
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.jobs import Jobs
 from carom.lab.measure.machine import machine
-from carom.lab.measure.timing import Spread, faults_in_results, no_garbage_collection, timed
+from carom.lab.measure.timing import faults_in_results, no_garbage_collection, timed
 from carom.lab.reporting.progress import NO_PROGRESS, Progress
 
 WARM_UP_STEPS = 2
 ATTEMPTS = 3  # to time steps in which no kernel is compiled or loaded
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Repeated measurements: the median, the least and the largest, and all values."""
+
+    median: float
+    low: float
+    high: float
+    values: tuple[float, ...]
+
+    @classmethod
+    def of(cls, values: Sequence[float]) -> Spread:
+        """From at least one value."""
+        return cls(statistics.median(values), min(values), max(values), tuple(values))
 
 
 @dataclass

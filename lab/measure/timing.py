@@ -1,19 +1,16 @@
-"""The clock of all benchmarks, and summary statistics of repeated measurements."""
+"""The clock of all measurements of time."""
 
 from __future__ import annotations
 
 import gc
-import statistics
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 from ...framework import PhysicsWarning
 from ...framework.compilation import log
-from ..plain import JsonRecord
 
 FINE = 1e-6  # s: a coarser clock cannot time a block of steps
 
@@ -47,21 +44,6 @@ def timed(work: Callable[[], Any]) -> tuple[float, bool, Any]:
     result = work()
     seconds = now() - started
     return seconds, log.waited == waited, result
-
-
-@dataclass(frozen=True)
-class Spread(JsonRecord):
-    """Repeated measurements: the median, the least and the largest, and all values."""
-
-    median: float
-    low: float
-    high: float
-    values: tuple[float, ...]
-
-    @classmethod
-    def of(cls, values: Sequence[float]) -> Spread:
-        """From at least one value."""
-        return cls(statistics.median(values), min(values), max(values), tuple(values))
 
 
 @contextmanager
