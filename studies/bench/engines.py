@@ -13,8 +13,9 @@ import numpy as np
 from carom.framework import World
 from carom.lab.cli.usage_errors import Problem
 from carom.plugins.joints import Wheel
+from carom.plugins.terrain import ChainSegmentCollider
 
-from .plain import Body, Floats, NotPlainError, Shape, bodies_of, joints_of
+from .plain import Body, Floats, NotPlainError, bodies_of, ends_of, ghosts_of, joints_of, outline_of
 
 CAROM, PYMUNK, BOX2D = "carom", "pymunk", "Box2D"
 MODULES = {PYMUNK: "pymunk", BOX2D: "pyb2d3"}
@@ -22,7 +23,7 @@ SUBSTEPS = 4  # of Box2D: what its manual recommends
 HASHED = 5000  # moving shapes from which pymunk's spatial hash is faster than its tree of boxes
 CELL, CELLS = 2.0, 2  # of that hash: over the largest body's size; for each body
 ARM = 10.0  # m above a wheel where its spring ends
-FILTER_BITS = {PYMUNK: 2**32 - 1, BOX2D: 2**64 - 1}
+ALL_LAYERS = 2**32 - 1  # that pymunk has
 
 
 class State(NamedTuple):
@@ -87,67 +88,58 @@ class Pymunk(Engine):
         self.space: Any = self.pymunk.Space()
         self.space.gravity = tuple(map(float, world.gravity))
         self.advance = partial(self.space.step, world.settings.dt)
-        largest = max((body.shape.restitution for body in bodies if body.shape), default=0.0)
-        if any(body.kind == "dynamic" and body.shape and body.shape.restitution != largest for body in bodies):
+        shaped = [body for body in bodies if body.collider]
+        largest = max((body.collider.restitution for body in shaped), default=0.0)
+        moving = [body for body in shaped if body.kind == "dynamic"]
+        if any(body.collider.restitution != largest for body in moving):
             raise NotPlainError("restitutions that differ")
-        self.moving, self.of_entity = [], {}
-        for body in bodies:
-            made = self._made(body)
-            self.of_entity[body.entity] = made
-            if body.shape:
-                shape = self._shape(made, body, body.shape)
-                shape.elasticity, shape.friction = math.sqrt(largest), math.sqrt(body.shape.friction)
-                bits = (body.shape.layer & FILTER_BITS[PYMUNK], body.shape.mask & FILTER_BITS[PYMUNK])
-                shape.filter = self.pymunk.ShapeFilter(body.shape.group, *bits)
-                self.space.add(shape)
+        self.of_entity = {body.entity: self._made(body) for body in bodies}
+        self.moving = [self.of_entity[body.entity] for body in bodies if body.kind != "static"]
+        for body in shaped:
+            shape, of = self._shape(body), body.collider
+            shape.elasticity, shape.friction = math.sqrt(largest), math.sqrt(body.friction)
+            shape.filter = self.pymunk.ShapeFilter(of.group, of.layer & ALL_LAYERS, of.mask & ALL_LAYERS)
+            self.space.add(shape)
         for joint in joints_of(world):
             self._join(joint)
-        moving = [body.shape for body in bodies if body.shape and body.kind == "dynamic"]
         if len(moving) >= HASHED:
-            size = 2.0 * max(shape.rounding + np.abs(shape.corners).max() for shape in moving)
+            outlines = (outline_of(body.collider) for body in moving)
+            size = 2.0 * max(rounding + np.abs(corners).max() for corners, rounding in outlines)
             self.space.use_spatial_hash(CELL * size, CELLS * len(bodies))
 
     def _made(self, body: Body) -> Any:
-        if body.kind == "static":
-            return self.space.static_body
-        fixed = {"body_type": self.pymunk.Body.KINEMATIC}
-        made = self.pymunk.Body(**({"mass": body.mass, "moment": body.moment} if body.kind == "dynamic" else fixed))
+        inertia = (body.mass, body.moment) if body.kind == "dynamic" else (0.0, 0.0)
+        made = self.pymunk.Body(*inertia, body_type=getattr(self.pymunk.Body, body.kind.upper()))
         made.position, made.angle = body.position, body.angle
         made.velocity, made.angular_velocity = body.velocity, body.spin
         self.space.add(made)
-        self.moving.append(made)
         return made
 
-    def _shape(self, made: Any, body: Body, shape: Shape) -> Any:
-        corners, ghosts = shape.corners, shape.ghosts
-        if body.kind == "static":
-            corners, ghosts = in_world(body, corners), None if ghosts is None else in_world(body, ghosts)
+    def _shape(self, body: Body) -> Any:
+        made, (corners, rounding) = self.of_entity[body.entity], outline_of(body.collider)
         points = list(map(tuple, corners.tolist()))
         if len(points) == 1:
-            return self.pymunk.Circle(made, shape.rounding, points[0])
+            return self.pymunk.Circle(made, rounding, points[0])
         if len(points) > 2:
-            return self.pymunk.Poly(made, points, radius=shape.rounding)
-        segment = self.pymunk.Segment(made, *points, shape.rounding)
-        if ghosts is not None:
-            segment.set_neighbors(*map(tuple, ghosts.tolist()))
+            return self.pymunk.Poly(made, points, radius=rounding)
+        segment = self.pymunk.Segment(made, *points, rounding)
+        if isinstance(body.collider, ChainSegmentCollider):
+            segment.set_neighbors(*(tuple(at.tolist()) for at in ghosts_of(body.collider)))
         return segment
 
     def _join(self, joint: Any) -> None:
         a, b = (self.of_entity.get(body, self.space.static_body) for body in (joint.a, joint.b))
-        pymunk, anchor = self.pymunk, np.asarray(joint.anchor)
-        low, high = joint.lower, joint.upper
-        low, high = -math.inf if low is None else low, math.inf if high is None else high
+        pymunk, anchor, (low, high) = self.pymunk, np.asarray(joint.anchor), ends_of(joint)
         if isinstance(joint, Wheel):
             along = np.asarray(joint.direction) / np.linalg.norm(joint.direction)
-            ends = (a.world_to_local(tuple(anchor + at * along)) for at in (low, high, ARM))
-            first, last, top = ends
+            first, last, top = (a.world_to_local(tuple(anchor + at * along)) for at in (low, high, ARM))
             on_b, mass = b.world_to_local(tuple(anchor)), 1.0 / (1.0 / a.mass + 1.0 / b.mass)
             omega = 2.0 * math.pi * (joint.frequency or 0.0)
             spring = ARM - joint.rest, mass * omega**2, 2.0 * joint.damping_ratio * mass * omega
             made = [pymunk.GrooveJoint(a, b, first, last, on_b), pymunk.DampedSpring(a, b, top, on_b, *spring)]
         else:
             made, free = [pymunk.PivotJoint(a, b, tuple(anchor.tolist()))], b.angle - a.angle
-            if joint.lower is not None or joint.upper is not None:
+            if math.isfinite(low) or math.isfinite(high):
                 made.append(pymunk.RotaryLimitJoint(a, b, free + low, free + high))
         if joint.motor_speed is not None:
             made.append(pymunk.SimpleMotor(a, b, -joint.motor_speed))
@@ -186,8 +178,8 @@ class Box2D(Engine):
         rotation = self.b2.Rot()
         rotation.c, rotation.s = math.cos(body.angle), math.sin(body.angle)  # its make_rot is right to 0.002 only
         made = create(position=body.position, rotation=rotation, **motion)
-        if body.shape:
-            self._add(made, body.shape)
+        if body.collider:
+            self._add(made, body)
         if body.kind == "dynamic":
             data = self.b2.MassData()
             data.mass, data.center = body.mass, (0.0, 0.0)
@@ -195,28 +187,28 @@ class Box2D(Engine):
             made.mass_data = data
         return made
 
-    def _add(self, made: Any, shape: Shape) -> None:
-        b2, points = self.b2, list(map(tuple, shape.corners.tolist()))
-        layer, mask = (number & FILTER_BITS[BOX2D] for number in (shape.layer, shape.mask))
-        bits = b2.make_filter(category_bits=layer, mask_bits=mask, group_index=-abs(shape.group))
-        material = b2.surface_material(friction=shape.friction, restitution=shape.restitution)
-        if shape.ghosts is not None:  # solid on its left: from right to left
-            before, after = map(tuple, shape.ghosts.tolist())
-            made.create_chain(b2.chain_def([after, points[1], points[0], before], material=material, filter=bits))
+    def _add(self, made: Any, body: Body) -> None:
+        b2, of, (corners, rounding) = self.b2, body.collider, outline_of(body.collider)
+        bits = b2.make_filter(category_bits=of.layer, mask_bits=of.mask % 2**64, group_index=-abs(of.group))
+        material, points = b2.surface_material(friction=body.friction, restitution=of.restitution), corners.tolist()
+        if isinstance(of, ChainSegmentCollider):  # there it is solid on the left
+            before, after = (at.tolist() for at in ghosts_of(of))
+            made.create_chain(b2.chain_def([after, *points[::-1], before], material=material, filter=bits))
             return
+        points = list(map(tuple, points))
         if len(points) == 1:
-            outline = b2.circle(points[0], shape.rounding)
+            outline = b2.circle(points[0], rounding)
         elif len(points) == 2:
-            outline = b2.capsule(*points, shape.rounding)
+            outline = b2.capsule(*points, rounding)
         else:
-            outline = b2.polygon(points, radius=shape.rounding)
+            outline = b2.polygon(points, radius=rounding)
         made.create_shape(b2.shape_def(material=material, filter=bits), outline)
 
     def _join(self, joint: Any) -> None:
         a, b = (self.of_entity.get(body, self.ground) for body in (joint.a, joint.b))
         anchor, on_a = tuple(map(float, joint.anchor)), np.asarray(joint.anchor, float)
-        limited = joint.lower is not None or joint.upper is not None
-        low, high = -math.inf if joint.lower is None else joint.lower, math.inf if joint.upper is None else joint.upper
+        low, high = ends_of(joint)
+        limited = math.isfinite(low) or math.isfinite(high)
         how: dict[str, Any] = {"collide_connected": joint.collide_connected, "enable_limit": limited}
         if joint.motor_speed is not None:
             torque = math.inf if joint.max_torque is None else joint.max_torque
@@ -237,12 +229,6 @@ class Box2D(Engine):
         moving, angle = self.moving, np.arctan2(sine, cosine)
         found = moving.get_positions(), moving.get_linear_velocities(), angle, moving.get_angular_velocities()
         return State(*(of.astype(float) for of in found))
-
-
-def in_world(body: Body, points: Floats) -> Floats:
-    """Points (m, 2) of a body where it is."""
-    cosine, sine = math.cos(body.angle), math.sin(body.angle)
-    return points @ np.array([(cosine, sine), (-sine, cosine)]) + body.position
 
 
 PEERS: Mapping[str, Callable[[World], Engine]] = {PYMUNK: Pymunk, BOX2D: Box2D}

@@ -31,23 +31,9 @@ class NotPlainError(ValueError):
     """A world has something that another engine has not."""
 
 
-class Shape(NamedTuple):
-    """``corners (m, 2)`` about the body's position and along its axes: one of a disc, two of a capsule or a segment;
-    ``rounding``: how far it goes beyond these; ``ghosts (2, 2)``: the neighbours of a segment of a chain, which is
-    solid on its right."""
-
-    corners: Floats
-    rounding: float
-    restitution: float
-    friction: float
-    layer: int
-    mask: int
-    group: int
-    ghosts: Floats | None
-
-
 class Body(NamedTuple):
-    """``kind``: dynamic, kinematic or static; ``moment``: infinite for what does not turn."""
+    """``kind``: dynamic, kinematic or static; ``moment``: infinite for what does not turn; ``collider``: the component,
+    or None; ``friction``: of the collider, the partner's where it has none of its own."""
 
     entity: int
     kind: str
@@ -57,25 +43,32 @@ class Body(NamedTuple):
     spin: float
     mass: float
     moment: float
-    shape: Shape | None
+    collider: Any
+    friction: float
 
 
-def _box(box: Any) -> tuple[Floats, float]:
-    return CORNERS * box.half_extents, 0.0
-
-
-def _capsule(capsule: Any) -> tuple[Floats, float]:
-    return np.array([(0.0, -capsule.half_height), (0.0, capsule.half_height)]), capsule.radius
-
-
-OUTLINES: Mapping[type, Callable[[Any], tuple[Floats, float]]] = {
+OUTLINES: Mapping[type, Callable[[Any], tuple[Any, float]]] = {
     SphereCollider: lambda ball: (np.zeros((1, 2)), ball.radius),
-    AABBCollider: _box,
-    BoxCollider: _box,
-    CapsuleCollider: _capsule,
+    AABBCollider: lambda box: (CORNERS * box.half_extents, 0.0),
+    BoxCollider: lambda box: (CORNERS * box.half_extents, 0.0),
+    CapsuleCollider: lambda capsule: (capsule.half_height * np.array([(0.0, -1.0), (0.0, 1.0)]), capsule.radius),
     ConvexPolygonCollider: lambda polygon: (np.array(polygon.vertices), polygon.corner_radius),
     ChainSegmentCollider: lambda segment: (np.array([segment.start, segment.end]), 0.0),
 }
+
+
+def outline_of(collider: Any) -> tuple[Floats, float]:
+    """(m, 2) corners about the body's position and along its axes, one of a disc, two of a capsule or a segment; and
+    how far the shape goes beyond these."""
+    corners, rounding = OUTLINES[type(collider)](collider)
+    return corners + collider.offset, rounding
+
+
+def ghosts_of(segment: ChainSegmentCollider) -> tuple[Floats, Floats]:
+    """The corners before and after a segment of a chain, which is solid on its right; where it ends it goes straight
+    on."""
+    start, end, before, after = (np.asarray(at) for at in (segment.start, segment.end, segment.before, segment.after))
+    return before if (before != start).any() else 2 * start - end, after if (after != end).any() else 2 * end - start
 
 
 def bodies_of(world: World) -> list[Body]:
@@ -88,15 +81,11 @@ def bodies_of(world: World) -> list[Body]:
         for entity in getattr(world.bodies, kind).entity.tolist()
     }
     bodies = [_body(world, entity, kinds[entity]) for entity in sorted(kinds)]
-    given = {body.shape.friction for body in bodies if body.shape and not math.isnan(body.shape.friction)}
-    if len(given) > 1 and any(body.shape and math.isnan(body.shape.friction) for body in bodies):
+    given = {body.friction for body in bodies if body.collider and not math.isnan(body.friction)}
+    if len(given) > 1 and any(math.isnan(body.friction) for body in bodies):
         raise NotPlainError("friction that is the partner's, of several")
-    (partner,) = given if len(given) == 1 else (0.0,)
-    return [
-        body._replace(shape=body.shape._replace(friction=partner))
-        if body.shape and math.isnan(body.shape.friction) else body
-        for body in bodies
-    ]  # fmt: skip
+    partner = max(given, default=0.0)
+    return [body._replace(friction=partner) if math.isnan(body.friction) else body for body in bodies]
 
 
 def _body(world: World, entity: int, kind: str) -> Body:
@@ -115,26 +104,12 @@ def _body(world: World, entity: int, kind: str) -> Body:
         velocity, mass = tuple(motion.linear_velocity.tolist()), motion.mass if kind == "dynamic" else math.inf
     if turning is not None:
         spin, moment = turning.angular_velocity, turning.moments if kind == "dynamic" else math.inf
-    at, shape = tuple(place.position.tolist()), _shape(colliders[0]) if colliders else None
-    return Body(entity, kind, at, velocity, float(place.rotation), spin, mass, moment, shape)
-
-
-def _shape(collider: Any) -> Shape:
-    if type(collider) not in OUTLINES:
+    collider = colliders[0] if colliders else None
+    if collider is not None and type(collider) not in OUTLINES:
         raise NotPlainError(f"a {type(collider).__name__}")
-    corners, rounding = OUTLINES[type(collider)](collider)
-    ghosts = None
-    if isinstance(collider, ChainSegmentCollider):
-        way = collider.end - collider.start  # where the chain ends it goes straight on
-        before, after = collider.before, collider.after
-        ends = (before, collider.start) if (before != collider.start).any() else (collider.start - way, collider.start)
-        beyond = after if (after != collider.end).any() else collider.end + way
-        ghosts = np.array([ends[0], beyond])
-    return Shape(
-        corners + collider.offset, rounding, collider.restitution,
-        math.nan if collider.friction is None else collider.friction,
-        collider.layer, collider.mask, collider.group, ghosts,
-    )  # fmt: skip
+    friction = 0.0 if collider is None else math.nan if collider.friction is None else collider.friction
+    at = tuple(place.position.tolist())
+    return Body(entity, kind, at, velocity, float(place.rotation), spin, mass, moment, collider, friction)
 
 
 def joints_of(world: World) -> list[Any]:
@@ -145,6 +120,11 @@ def joints_of(world: World) -> list[Any]:
             raise NotPlainError(f"a {type(joint).__name__}")
         _refuse_others(joint, KNOWN | OF_WHEELS if isinstance(joint, Wheel) else KNOWN)
     return joints
+
+
+def ends_of(joint: Any) -> tuple[float, float]:
+    """The limits of a joint, infinite where it has none."""
+    return -math.inf if joint.lower is None else joint.lower, math.inf if joint.upper is None else joint.upper
 
 
 def _refuse_others(component: Any, known: set[str]) -> None:

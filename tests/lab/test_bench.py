@@ -134,7 +134,7 @@ def test_layers_masks_and_groups_are_those_of_carom(name, mask, group, apart):
 def test_hinges_have_the_limits_and_motors_of_carom(name):
     """A motor of 2 rad/s turns a bar against the world for .25 s; another one falls to the limit at -.4 rad."""
     with plane((0.0, -9.81), Rotation(), Joints()) as world:
-        for x, joint in ((0.0, {"motor_speed": 2.0}), (5.0, {"limits": (-0.4, 0.4)})):
+        for x, joint in ((0.0, {"motor_speed": 2.0}), (5.0, {"lower": -0.4})):
             bar = world.create_entity(Transform((x + 0.5, 0.0), 0.2), RigidBody(), BoxCollider((0.5, 0.1)), Spin())
             world.create_entity(Hinge(None, bar, (x, 0.0), **joint))
         own, peer = Carom(world), PEERS[name](world)
