@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -70,25 +71,24 @@ QUERIES: dict[str, tuple[Ask, Ask]] = {
 }  # fmt: skip
 
 
-def time_queries(world: World, n: int, repeat: int, peer: bool) -> dict[str, dict[str, tuple[list[float], float]]]:
-    """By query and engine, the seconds of 1,000 in each round, and the number that they find, the mean of the rounds.
+def time_queries(world: World, n: int, repeat: int, peer: bool) -> Iterator[tuple[str, str, list[float], float]]:
+    """Of each query and engine: both names, the seconds of 1,000 in each round, and what they find, the rounds' mean.
 
     Each round follows a step of both, as in a game: the time includes what carom builds for the first query after a
     step; pymunk has built its tree in the step. Box2D calls Python for each hit, so its queries are not timed.
     """
-    engines: dict[str, Any] = {CAROM: Carom(world), **({PYMUNK: Pymunk(world)} if peer else {})}
-    subjects, found = {CAROM: world, PYMUNK: engines.get(PYMUNK)}, {}
+    engines: list[tuple[str, Any, Any]] = [(CAROM, Carom(world), world)]
+    if peer:
+        engines.append((PYMUNK, other := Pymunk(world), other))
     for query, works in QUERIES.items():
-        seconds: dict[str, list[float]] = {name: [] for name in engines}
-        answers = dict.fromkeys(engines, 0.0)
+        seconds, answers = defaultdict(list), defaultdict(float)
         for number in range(ROUNDS + 1):  # the first round compiles and is not counted
             at = player_query.places(n, player_query.QUERIES, repeat * (ROUNDS + 1) + number)
-            for engine in engines.values():
+            for _, engine, _ in engines:
                 engine.step(1)
-            for name, work in list(zip(engines, works, strict=False))[:: 1 if number % 2 else -1]:
-                spent, _, answer = timed(partial(work, subjects[name], at, gas.side(n, 2)))
+            for (name, _, subject), work in list(zip(engines, works, strict=False))[:: 1 if number % 2 else -1]:
+                spent, _, answer = timed(partial(work, subject, at, gas.side(n, 2)))
                 if number:
                     seconds[name].append(spent)
                     answers[name] += answer / ROUNDS
-        found[query] = {name: (seconds[name], answers[name]) for name in engines}
-    return found
+        yield from ((query, name, seconds[name], answers[name]) for name, *_ in engines)

@@ -78,12 +78,11 @@ def measure(case: Case, repeat: int, peers: list[str]) -> dict[str, float]:
             Carom(rehearsal).step(REHEARSAL_STEPS)
     with case.build(seed=repeat) as world, one_core():
         if not case.windows:
-            timed_queries = time_queries(world, case.size, repeat, PYMUNK in peers)
             return {
                 f"{query}/{name}/{figure}": value
-                for query, by_engine in timed_queries.items() for name, (seconds, answer) in by_engine.items()
+                for query, name, seconds, answer in time_queries(world, case.size, repeat, PYMUNK in peers)
                 for figure, value in {**_times(seconds), "answer": answer}.items()
-            }  # fmt: skip
+            }
         return _windows(case, repeat, {CAROM: Carom(world), **{name: PEERS[name](world) for name in peers}})
 
 
@@ -124,34 +123,32 @@ def _times(seconds: list[float]) -> dict[str, float]:
 
 
 def report(result: Result) -> tuple[list[TextTable], list[str]]:
-    """Times and ratios; the quality of the states, and the answers of queries."""
+    """Times and ratios; the quality of the states, and the answers of queries; with a column for each engine there."""
+    samples = [sample for line in result.lines for sample in line.samples]
+    rows = [(one, window) for one in samples for window in dict.fromkeys(name.split("/")[0] for name in one.figures)]
+    engines = [name for name in (CAROM, *PEERS) if any(f"{window}/{name}/ms" in one.figures for one, window in rows)]
     times, quality = [], []
-    for sample in (sample for line in result.lines for sample in line.samples):
-        for window in dict.fromkeys(name.partition("/")[0] for name in sample.figures):
-            label, there = f"{sample.value} {window}".strip(), []
-            cells, beside = [], []
-            for name in (CAROM, *PEERS):
-                ms, p10 = (sample.figures.get(f"{window}/{name}/{figure}") for figure in ("ms", "p10"))
-                if ms is None or p10 is None:
-                    cells.append(NOTHING)
-                    beside.append(NOTHING)
-                    continue
-                there.append(name)
-                cells.append(f"{compact(ms.median)}, {compact(p10.median)}")
-                of = ratios(ms, sample.figures[f"{window}/{CAROM}/ms"])
-                beside.append(f"{compact(of.median)} ({span(of)})")
-            times.append((label, *cells, *beside[1:]))
-            if sample.value.size >= SMALL:
-                quality.append((label, *_quality(sample, window, there)))
-    engines = [CAROM, *PEERS]
+    for sample, window in rows:
+        of = {name: sample.figures.get(f"{window}/{name}/ms") for name in engines}
+        cells = [
+            NOTHING if ms is None else
+            f"{compact(ms.median)}, {compact(sample.figures[f'{window}/{name}/p10'].median)}"
+            for name, ms in of.items()
+        ]  # fmt: skip
+        own = sample.figures[f"{window}/{CAROM}/ms"]
+        beside = [None if ms is None else ratios(ms, own) for ms in list(of.values())[1:]]
+        cells += [NOTHING if one is None else f"{compact(one.median)} ({span(one)})" for one in beside]
+        label = f"{sample.value} {window}".strip()
+        times.append((label, *cells))
+        if sample.value.size >= SMALL:
+            quality.append((label, *_quality(sample, window, [name for name in engines if of[name] is not None])))
     title = f"ms per step, of player_query per 1,000 queries: median, tenth percentile; medians of {result.repeats}"
-    heads = ("scene", *engines, *(f"{name} / {CAROM}" for name in PEERS))
-    also = "what is left of the energy; overlaps of the pairs that do; what else there is to see"
-    tables = [
+    heads = ("scene", *engines, *(f"{name} / {CAROM}" for name in engines[1:]))
+    also = f"{' / '.join(engines)}: energy that is left; overlaps of the pairs that do; what else there is to see"
+    return [
         TextTable(title, heads, times),
-        TextTable(f"{' / '.join(engines)}: {also}", ("scene", "energy", "mean, mm", "deepest, mm", "also"), quality),
-    ]
-    return tables, [machine_line(result.machine)]
+        TextTable(also, ("scene", "energy", "mean, mm", "deepest, mm", "also"), quality),
+    ], [machine_line(result.machine)]
 
 
 def _quality(sample: Sample, window: str, engines: list[str]) -> tuple[str, str, str, str]:
