@@ -115,6 +115,7 @@ def test_friction_means_the_same(name, floor):
         peer.step(90)
         assert peer.state().position[0, 0] == pytest.approx(9 / (2 * 0.6 * 9.81), rel=0.05)  # a step is 0.05 m
         assert np.abs(peer.state().velocity).max() < 1e-5
+        assert not getattr(peer.space, "sleeping_enabled", False)
 
 
 @both
@@ -211,13 +212,16 @@ def test_overlaps_escapes_and_energies_are_those_of_the_state():
 
 def test_quality_sees_how_bodies_are_turned_and_gaps_of_hinges():
     """Two boxes of side 2 side by side, .1 apart; one turns by 45 degrees, with its corner then in the other, and its
-    hinge, .05 beside it at the height of its middle, goes with it."""
+    hinge, .05 beside it at the height of its middle, goes with it. Two that are joined may be in each other."""
 
     def build(settings):
         world = World(Physics(dimensions=2), Rotation(), Joints(), settings=settings)
-        for x in (0.0, 2.1):
-            last = world.create_entity(Transform((x, 0)), RigidBody(mass=3.0), Spin(), BoxCollider((1, 1)))
-        world.create_entity(Hinge(None, last, (1.05, 0.0)))
+        _, turning, *pair = [
+            world.create_entity(Transform((x, 0)), RigidBody(mass=3.0), Spin(), BoxCollider((1, 1)))
+            for x in (0.0, 2.1, 9.0, 10.5)
+        ]
+        world.create_entity(Hinge(None, turning, (1.05, 0.0)))
+        world.create_entity(Hinge(*pair, (9.75, 0.0)))
         return world
 
     quality = Quality(build)
