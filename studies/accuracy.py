@@ -58,7 +58,7 @@ KNOWN = {
 def axes(quick: bool = False) -> list[Axis]:
     """The scenes."""
     del quick
-    return [Axis(scene, "", (scene,), facts=_facts) for scene in KNOWN]
+    return [Axis(scene, "", (scene,), facts=_facts, cost=10.0) for scene in KNOWN]
 
 
 def _facts(scene: str) -> dict[str, SceneTrade]:

@@ -79,6 +79,7 @@ class Axis:
     values: of the quantity; each repeat begins with another one, so that none is always measured after the same one
     measure: (value, repeat) -> figures by name, which may differ between repeats, such as times; None: there are none
     facts: value -> what is the same in every repeat; found on all cores
+    cost: s, about, of the facts of a value
     """
 
     name: str
@@ -86,6 +87,7 @@ class Axis:
     values: tuple[Any, ...]
     measure: Callable[[Any, int], Mapping[str, float]] | None = None
     facts: Callable[[Any], dict[Any, Any]] | None = None
+    cost: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,10 @@ class Fact:
     axis: Axis
     value: Any
     key: str = ""  # it is not kept
-    cost: float = 2.0  # s, about
+
+    @property
+    def cost(self) -> float:
+        return self.axis.cost
 
     @faults_in_results()
     def find(self) -> dict[Any, Any]:

@@ -154,14 +154,14 @@ def test_startup_times_processes_with_caches_of_their_own(studies, monkeypatch):
     assert "jump shipped 3 4.50 3.00 .. 6.00 0.250 0.125 2.00 130" in re.sub(" +", " ", done.stdout)
 
 
-def test_a_process_is_timed_and_one_that_fails_is_no_measurement(tmp_path):
+def test_a_process_is_timed_and_one_that_fails_is_no_measurement():
     found = startup._start("jump", os.environ["CAROM_CACHE_DIR"], "")
     assert 0 < found["imports"] < found["seconds"]
     assert 0 < found["worst"] < found["seconds"]
     assert found["compiled"] >= 0
     assert 50 < found["peak"] < 5000
     with pytest.raises(Problem, match="nothing"):
-        startup._start("nothing", str(tmp_path), "")
+        startup._run("-c", "import nothing")
 
 
 # -- accuracy ------------------------------------------------------------------------------------
