@@ -75,7 +75,7 @@ STUDIES = {
     ),
     "startup": Study(
         "The time to the first step of a new process, by scene.", startup.axes, startup.report, 3,
-        usual=(startup.COMMANDS_AXIS, "asteroids"),
+        usual=("asteroids",),
     ),
 }  # fmt: skip
 

@@ -18,13 +18,6 @@ from carom.lab.reporting.text import TextTable, compact, span
 from .runner import Axis, Result
 
 STEPS = 600  # after the first
-COMMANDS = {
-    "python -c pass": ("-c", "pass"),
-    "import carom.framework": ("-c", "import carom.framework"),
-    "carom --help": ("-m", "carom", "--help"),
-    "carom scenes": ("-m", "carom", "scenes"),
-}
-COMMANDS_AXIS = "commands"
 EMPTY, KEPT, SHIPPED = "none", "kept on disk", "shipped"  # kernels that are compiled already
 PROGRAM = f"""
 import json, resource, sys, time
@@ -51,18 +44,9 @@ print(json.dumps(found))
 
 
 def axes(quick: bool = False) -> list[Axis]:
-    """Commands that need no kernel, and each scene of the library."""
+    """Each scene of the library."""
     del quick
-    each = [Axis(name, "", (name,), _starts) for name in scenes.names()]
-    return [Axis(COMMANDS_AXIS, "", tuple(COMMANDS), _command), *each]
-
-
-def _command(name: str, repeat: int) -> dict[str, float]:
-    """Processor seconds that it takes in a process of its own."""
-    before = os.times()
-    _run(*COMMANDS[name])
-    after = os.times()
-    return {"seconds": sum(after[2:4]) - sum(before[2:4])}
+    return [Axis(name, "", (name,), _starts) for name in scenes.names()]
 
 
 def _starts(scene: str, repeat: int) -> dict[str, float]:
@@ -102,30 +86,21 @@ def _run(*words: str, **environment: str) -> str:
 
 
 def report(result: Result) -> tuple[list[TextTable], list[str]]:
-    """The times of commands that need no kernel, and those of scenes."""
-    commands, starts = [], []
-    for line in result.lines:
-        for sample in line.samples:
-            if line.axis == COMMANDS_AXIS:
-                seconds = sample.figures["seconds"]
-                commands.append((sample.value, compact(seconds.median), span(seconds)))
-                continue
-            for kernels in (EMPTY, KEPT, SHIPPED):
-                compiled, seconds, imports, first, worst, peak = (
-                    sample.figures[f"{kernels} {name}"]
-                    for name in ("compiled", "seconds", "imports", "first", "worst", "peak")
-                )
-                starts.append((
-                    sample.value, kernels, f"{compiled.median:.0f}", compact(seconds.median), span(seconds),
-                    compact(imports.median), compact(first.median), compact(1e3 * worst.median), f"{peak.median:.0f}",
-                ))  # fmt: skip
+    """Three rows for each scene."""
+    rows = []
+    for sample in (sample for line in result.lines for sample in line.samples):
+        for kernels in (EMPTY, KEPT, SHIPPED):
+            compiled, seconds, imports, first, worst, peak = (
+                sample.figures[f"{kernels} {name}"]
+                for name in ("compiled", "seconds", "imports", "first", "worst", "peak")
+            )
+            rows.append((
+                sample.value, kernels, f"{compiled.median:.0f}", compact(seconds.median), span(seconds),
+                compact(imports.median), compact(first.median), compact(1e3 * worst.median), f"{peak.median:.0f}",
+            ))  # fmt: skip
     columns = (
         "scene", "kernels", "compiled", "first step after s", "from .. to", "imports CPU s", "first step CPU s",
         f"worst of {STEPS} ms", "peak MB",
     )  # fmt: skip
     title = "from starting a process to the end of its first step, and the longest step after it, medians of "
-    tables = (
-        TextTable("commands that need no kernel", ("command", "CPU s", "from .. to"), commands),
-        TextTable(f"{title}{result.repeats}", columns, starts),
-    )
-    return [table for table in tables if table.rows], []
+    return [TextTable(f"{title}{result.repeats}", columns, rows)], []
