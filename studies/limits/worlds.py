@@ -24,7 +24,7 @@ SWINGS, FEWEST_STEPS, MOST_STEPS = 10, 100, 1000
 BLOWN_UP = 1e6  # times the energy at the start
 SHORT_SWING, TEN_SWINGS = 0.1, 628  # z of the spring in the long run; steps of ten oscillations, for the mean energy
 SHOTS, RADIUS, WALL = 200, 0.25, 0.1  # start phases of a step; m
-REST_STEPS, LAST_STEPS, CROWD_STEPS = 600, 60, 60  # ten seconds, of which the last one is measured; a second
+REST_STEPS, LAST_STEPS = 600, 60  # ten seconds, of which the last one is measured
 
 Method = Mapping[str, Any]  # settings that differ from the default; "ccd": of the bodies
 
@@ -69,14 +69,14 @@ def new_world(method: Method, gravity: float = 0.0, **settings: Any) -> World:
 # -- free flight ------------------------------------------------------------------------------------------------------
 
 
-class PullOrDrag(ForceSystem):
-    """A spring to the origin, in N/m, and a force opposite to the velocity, in N s/m."""
+class Pull(ForceSystem):
+    """A spring to the origin, in N/m."""
 
-    def __init__(self, stiffness: float = 0.0, drag: float = 0.0) -> None:
-        self.stiffness, self.drag = stiffness, drag
+    def __init__(self, stiffness: float) -> None:
+        self.stiffness = stiffness
 
     def add_forces(self, bodies: Any, time: float) -> None:
-        bodies.force[:] -= self.stiffness * bodies.position + self.drag * bodies.linear_velocity
+        bodies.force[:] -= self.stiffness * bodies.position
 
 
 def swing(method: Method, dt: float) -> float:
@@ -98,7 +98,7 @@ def _swung(method: Method, dt: float, frequency: float, x: float, v: float, step
     states, highest = np.empty((steps, 2)), BLOWN_UP * ((frequency * x) ** 2 + v * v)
     with closing(new_world(method, dt=dt)) as world:
         world.create_entity(Transform((x, 0)), RigidBody(linear_velocity=(v, 0)))
-        world.add_system(PullOrDrag(frequency**2))
+        world.add_system(Pull(frequency**2))
         for n in range(steps):
             world.step()
             states[n] = world.bodies.position[0, 0], world.bodies.linear_velocity[0, 0]
@@ -107,27 +107,13 @@ def _swung(method: Method, dt: float, frequency: float, x: float, v: float, step
     return states
 
 
-def drag(method: Method, ratio: float) -> float:
-    """A body slowed by a drag force, against exp(-c t), a thousand steps."""
-    worst = 0.0
-    with closing(new_world(method, dt=1.0)) as world:
-        world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(SPEED, 0)))
-        world.add_system(PullOrDrag(drag=ratio))
-        for n in range(1, MOST_STEPS + 1):
-            world.step()
-            worst = max(worst, abs(float(world.bodies.linear_velocity[0, 0]) / SPEED - math.exp(-ratio * n)))
-            if not worst < BLOWN_UP:
-                raise BrokenError("speed grows")
-    return worst
-
-
 def duration(method: Method, steps: float) -> float:
     """Drift of the mean energy of a spring of z = 0.1, from the first ten oscillations to the last."""
     window = min(TEN_SWINGS, round(steps) // 2)
     means = []
     with closing(new_world(method, dt=1.0)) as world:
         world.create_entity(Transform((1, 0)), RigidBody())
-        world.add_system(PullOrDrag(SHORT_SWING**2))
+        world.add_system(Pull(SHORT_SWING**2))
         x, v = world.bodies.position, world.bodies.linear_velocity
         for skipped in (0, round(steps) - 2 * window):
             kit.run(world, skipped)
@@ -213,17 +199,6 @@ def _tower(method: Method, mass: list[float]) -> tuple[float, float]:
     return deepest, lowest
 
 
-def crowd(method: Method, count: float) -> float:
-    """Balls at one point: the deepest overlap left after a second, in diameters."""
-    n = round(count)
-    with closing(new_world(method)) as world:
-        world.create_entities(n, Transform.many(np.zeros((n, 2))), RigidBody.many(), SphereCollider.many(radius=0.5))
-        kit.run(world, CROWD_STEPS)
-        if not np.isfinite(world.bodies.position).all():
-            raise BrokenError("not finite")
-        return float(np.asarray(world.contacts.depth).max(initial=0.0))
-
-
 def decades(first: int, last: int, per_decade: int = 1) -> tuple[float, ...]:
     """10^first ... 10^last, with ``per_decade`` values per decade."""
     return tuple(float(10.0 ** (first + k / per_decade)) for k in range((last - first) * per_decade + 1))
@@ -233,7 +208,6 @@ BY_MODE: dict[str, Method] = {mode: {"collision": mode} for mode in COLLISION_MO
 FLIGHTS = {**{name: {"integrator": name} for name in STANDARD_INTEGRATORS}, "event_driven": BY_MODE["event_driven"]}
 STABLE = {name: method for name, method in FLIGHTS.items() if name != "explicit_euler"}  # its long runs diverge
 FINE_SOLVER = {"discrete with 32 substeps": {"substeps": 32}}
-NEAR_TWO = (*decades(-2, 0, 4), 1.25, 1.5, 1.75, 1.99, 2.5, 3.0)
 STEPS = decades(-9, -4) + decades(-3, 1, 2)
 
 QUANTITIES = (
@@ -243,11 +217,8 @@ QUANTITIES = (
     ),
     Quantity(
         "stiffness", "stiffness x dt", "z = w dt", "energy of a spring over 1,000 steps, of that at the start",
-        NEAR_TWO, FLIGHTS, stiffness, fine=1.01, quick=(0.01, 0.1, 1.0, 1.99, 3.0),
-    ),
-    Quantity(
-        "drag", "drag x dt", "c dt", "speed of a body that a force brakes, of that at the start", NEAR_TWO, FLIGHTS,
-        drag, fine=1.01, quick=(0.01, 0.1, 1.0, 1.99, 3.0),
+        (*decades(-2, 0, 4), 1.25, 1.5, 1.75, 1.99, 2.5, 3.0), FLIGHTS, stiffness, fine=1.01,
+        quick=(0.01, 0.1, 1.0, 1.99, 3.0),
     ),
     Quantity(
         "duration", "duration, of a spring", "steps", "drift of the mean energy of a spring of z = 0.1", decades(3, 5),
@@ -271,10 +242,5 @@ QUANTITIES = (
         "stack", "height of a tower", "boxes", "sinking of the top after 10 s, of a box",
         (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0), {**BY_MODE, **FINE_SOLVER}, tower, whole=True,
         quick=(1.0, 10.0, 40.0),
-    ),
-    Quantity(
-        "crowd", "bodies at one point", "bodies", "deepest overlap left after a second, of a diameter",
-        (2.0, 5.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 2000.0, 5000.0), BY_MODE, crowd, fine=None, whole=True,
-        quick=(2.0, 10.0, 5000.0),
     ),
 )  # fmt: skip
