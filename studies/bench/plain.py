@@ -75,6 +75,8 @@ def bodies_of(world: World) -> list[Body]:
     """All bodies of a world in a plane, ascending by entity; NotPlainError for what cannot be translated."""
     if world.dimensions != 2:
         raise NotPlainError(f"a world of {world.dimensions} dimensions, not 2")
+    if (world.settings.restitution_mixing, world.settings.friction_mixing) != ("max", "geometric_mean"):
+        raise NotPlainError("rules of mixing that are not the default ones")
     kinds = {
         entity: kind
         for kind in ("dynamic", "kinematic", "static")

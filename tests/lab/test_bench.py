@@ -175,8 +175,10 @@ def test_what_does_not_translate_is_refused(words, parts):
             bodies_of(world)
 
 
-def test_space_and_other_joints_are_refused():
+def test_space_other_rules_and_other_joints_are_refused():
     with World(Physics(dimensions=3)) as world, pytest.raises(NotPlainError, match="3 dimensions"):
+        bodies_of(world)
+    with plane(restitution_mixing="min") as world, pytest.raises(NotPlainError, match="rules of mixing"):
         bodies_of(world)
     with plane((0, 0), Rotation(), Joints()) as world:
         body = world.create_entity(Transform((0, 0)), RigidBody(), Spin(inertia=1.0))
