@@ -1,7 +1,7 @@
 """What a plugin's functions are checked for when they are registered, before anything compiles.
 
 They are run as plain Python on a few inputs: what is refused could not work in any scene. A message names plugin,
-shape, function, the input and the cure. ``carom plugins check`` checks the laws that they have to obey, on many inputs.
+shape, function, the input and the cure. ``carom plugins check`` tries the same laws on many inputs.
 """
 
 from __future__ import annotations
@@ -10,8 +10,9 @@ import collections
 import inspect
 import math
 import numbers
-from collections.abc import Iterable, Iterator
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from ..data.component import Component
 from ..errors import PluginError
 from ..jit.records.schema import Column, Schema
 from ..schedule.stages import answers
+from .laws import Contacts, Law, Trial, mixing_laws, pair_laws, plain, shape_laws, sweep_laws
 from .registry import Convex, Shape
 
 SHAPE_FUNCTIONS = {
@@ -28,11 +30,20 @@ SHAPE_FUNCTIONS = {
     "turned": ("shape", "axes"),
     "second_moments": ("shape", "dimensions"),
 }
-POSES = ((1.0, 0.0, 0.0), (0.3, -0.2, 0.1), (0.0, 0.0, 0.0), (-2.0, 3.0, 1.0))  # of b as seen from a
-VALUES = ((0.0, 0.0), (0.25, 1.0), (1.0, 0.5), (3.0, 0.0))  # of both bodies, for a mixing rule
+POSES = np.array(((1.0, 0.0, 0.0), (0.3, -0.2, 0.1), (0.0, 0.0, 0.0), (-2.0, 3.0, 1.0)))  # of b as seen from a
+STEPS = np.array(((0.1, 0.2, 0.0), (-0.3, 0.1, 0.2), (0.0, 0.5, -0.1), (0.04, -0.06, -0.02)))
+VALUES = np.array(((0.0, 0.0), (0.25, 1.0), (1.0, 0.5), (3.0, 0.0)))  # of both bodies, for a mixing rule
 # What functions of pairs with Convex get besides, by how many of the two it is.
 HELPERS = {0: (), 1: ("support", "rounding"), 2: ("a_support", "b_support", "a_rounding", "b_rounding")}
-UNIT = 1e-9  # how far from 1 a normal's length may be
+
+
+def require(where: Sequence[Any], laws: Iterable[Law]) -> None:
+    """PluginError for the first law that one of a few inputs breaks; it begins with ``where`` of that input."""
+    with np.errstate(all="ignore"):
+        for law in laws:
+            if law.most is None and law.is_broken:
+                row = int(np.argmax(law.broken))
+                raise PluginError(f"{where[row]} {law.said(row)}: {law.cure}")
 
 
 # -- shapes ---------------------------------------------------------------------------------------
@@ -53,158 +64,191 @@ def check_shape(plugin: Any, component: Any, cost: float) -> None:
     for name, arguments in SHAPE_FUNCTIONS.items():
         function = inspect.getattr_static(component, name, None)
         function = getattr(function, "__func__", function)
-        if function is None:
-            if name == "bounds":
-                raise PluginError(
-                    f"{where} has no bounds: write bounds(shape, dimensions) that returns the half extents of the box "
-                    f"around it, a tuple of {allowed[0]} numbers"
-                )
-            continue
-        if not inspect.isfunction(function):
+        if function is None and name == "bounds":
+            raise PluginError(
+                f"{where} has no bounds: write bounds(shape, dimensions) that returns the half extents of the box "
+                f"around it, a tuple of {allowed[0]} numbers"
+            )
+        if function is not None and not inspect.isfunction(function):
             raise PluginError(f"{where}: {name} must be a function, got {function!r}")
-        _check_arity(f"{where}: {name}", function, arguments)
+        if function is not None:
+            _check_arity(f"{where}: {name}", function, arguments)
     for dimensions in allowed:
-        _check_extents(where, component, parameters_of(component, dimensions), dimensions)
+        sample = parameters_of(component, dimensions)
+        _check_moments(where, component, sample, dimensions)
+        half = _bounds(where, component, sample, dimensions)
+        support = _support(where, component, [sample] * len(POSES))
+        look, other = (np.delete(poses[:, :dimensions], 2, axis=0) for poses in (POSES, STEPS))
+        laws = shape_laws(np.array([half] * len(look)), support, look, other)
+        require([f"{where}: for {shown(sample)} in {dimensions}D"] * len(look), laws)
 
 
-def _check_extents(where: str, component: Any, sample: Any, dimensions: int) -> None:
-    """Bounds, support and rounding of a sample."""
-    half = _call(f"{where}: bounds(shape, {dimensions})", component.bounds, (sample, dimensions), sample)
-    said = f"{where}: bounds(shape, {dimensions}) for {shown(sample)} returned {plain(half)!r}"
-    if not _is_vector(half, dimensions):
-        raise PluginError(f"{said}: return half extents of the box around it, a tuple of {dimensions} numbers")
-    if any(math.isnan(x) or x < 0 for x in half):
-        raise PluginError(f"{said}: half extents are not negative")
-    if hasattr(component, "second_moments"):
-        _check_moments(f"{where}: second_moments(shape, {dimensions})", component, sample, dimensions)
+def _bounds(where: str, component: Any, sample: Any, dimensions: int) -> tuple[float, ...]:
+    what = "half extents of the box around it"
+    return _vector_of(f"{where}: bounds", component.bounds, (sample, dimensions), dimensions, what)
+
+
+def _support(where: str, component: Any, samples: list[Any]) -> Any:
+    """Support and rounding of each sample in a direction per row; None if the class has no support."""
     if not hasattr(component, "support"):
-        return
+        return None
     rounding = getattr(component, "rounding", lambda shape: 0.0)
-    beyond = _call(f"{where}: rounding(shape)", rounding, (sample,), sample)
-    if not _is_number(beyond) or not (math.isfinite(beyond) and beyond >= 0):
-        raise PluginError(f"{where}: rounding(shape) for {shown(sample)} returned {beyond!r}: return a number from 0")
-    for direction in (pose[:dimensions] for pose in POSES if any(pose)):
-        point = _call(f"{where}: support(shape, direction)", component.support, (sample, direction), sample)
-        said = f"{where}: support(shape, {direction}) for {shown(sample)} returned {plain(point)!r}"
-        if not _is_vector(point, dimensions):
-            raise PluginError(f"{said}: return a point, a tuple of {dimensions} numbers")
-        if not all(map(math.isfinite, point)):
-            raise PluginError(f"{said}: the shape's farthest point in a direction must be finite")
+
+    def support(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        points, beyond = [], []
+        for sample, direction in zip(samples, directions, strict=False):
+            given = (sample, tuple(direction))
+            points.append(_vector_of(f"{where}: support", component.support, given, len(direction), "a point"))
+            beyond.append(_call(f"{where}: rounding", rounding, (sample,)))
+            if not _is_number(beyond[-1]):
+                raise PluginError(f"{where}: rounding for {shown(sample)} returned {beyond[-1]!r}: return a number")
+        return np.array(points, float), np.array(beyond, float)
+
+    return support
 
 
 def _check_moments(where: str, component: Any, sample: Any, dimensions: int) -> None:
     """Measure, centre and second moments of a sample: squares have no mean below zero."""
-    found = _call(where, component.second_moments, (sample, dimensions), sample)
-    count = 1 + dimensions + dimensions * (dimensions + 1) // 2
-    if not _is_vector(found, count) or not all(map(math.isfinite, found)):
-        names = f"measure, centre, means of {'xx, xy, yy' if dimensions == 2 else 'xx, yy, zz, xy, xz, yz'}"
-        raise PluginError(f"{where} for {shown(sample)} returned {plain(found)!r}: return {count} numbers, {names}")
+    if not hasattr(component, "second_moments"):
+        return
+    what = f"measure, centre, means of {'xx, xy, yy' if dimensions == 2 else 'xx, yy, zz, xy, xz, yz'}"
+    where, count = f"{where}: second_moments", 1 + dimensions + dimensions * (dimensions + 1) // 2
+    found = _vector_of(where, component.second_moments, (sample, dimensions), count, what)
     squares = (found[3], found[5]) if dimensions == 2 else found[4:7]
-    if found[0] < 0 or min(squares) < 0:
-        raise PluginError(f"{where} for {shown(sample)} returned {plain(found)!r}: squares are not negative")
+    if not all(map(math.isfinite, found)) or found[0] < 0 or min(squares) < 0:
+        raise PluginError(
+            f"{where} for {shown(sample)} returned {plain(found)!r}: numbers are finite, measure and squares not "
+            f"negative"
+        )
+
+
+def _vector_of(where: str, function: Any, arguments: tuple[Any, ...], count: int, what: str) -> tuple[float, ...]:
+    """What a function of a shape returns, if it is a tuple of so many numbers."""
+    found = _call(where, function, arguments)
+    if not _is_vector(found, count):
+        given = ", ".join((shown(arguments[0]), *(repr(plain(each)) for each in arguments[1:])))
+        raise PluginError(f"{where}({given}) returned {plain(found)!r}: return {what}, a tuple of {count} numbers")
+    return found
 
 
 # -- pairs ----------------------------------------------------------------------------------------
 
 
-def check_pair(plugin: Any, first: Any, second: Any, function: Any) -> None:
-    """PluginError unless the function can be that of the two shapes; also tries it."""
-    name = getattr(function, "__name__", repr(function))
-    where = f"plugin {plugin.name}: pair {name} of {_name(first)} and {_name(second)}"
-    for shape in (first, second):
-        if shape is not Convex and not (isinstance(shape, type) and issubclass(shape, Component)):
-            raise PluginError(f"{where}: a pair is of two collider classes, or one and Convex, got {shape!r}")
+def contacts_of(where: str, function: Any, *helpers: Any) -> Any:
+    """(a, b, d) -> Contacts of a pair function as plain Python, for lists of n parameter tuples and d (n, d);
+    PluginError if it returns what is no contact."""
+
+    def contact(*pose: Any) -> tuple[Any, ...]:
+        at, n = _Pose(where, *pose), len(pose[2])
+        result = _call(at, function, (*pose, *helpers))
+        if not (isinstance(result, tuple) and len(result) == 4):
+            raise PluginError(f"{at} it returned {plain(result)!r}: return (hit, depth, normal, point)")
+        if not isinstance(result[0], (bool, np.bool_)) or not _is_number(result[1]):
+            cure = "hit, the first value, must be True or False, depth, the second, a number"
+            raise PluginError(f"{at} it returned {plain(result)!r}: {cure}")
+        if not (_is_vector(result[2], n) and _is_vector(result[3], n)):
+            flat = "; a shape of 2D worlds only has dimensions = (2,)" if n == 3 else ""
+            cure = f"normal and point must be tuples of {n} numbers{flat}"
+            raise PluginError(f"{at} it returned {plain(result)!r}: {cure}")
+        return result
+
+    def contacts(a: list[Any], b: list[Any], d: np.ndarray) -> Contacts:
+        hit, *rest = zip(*map(contact, a, b, map(tuple, d)), strict=True)
+        return Contacts(np.array(hit, bool), *(np.array(values, float) for values in rest))
+
+    return contacts
+
+
+def _sweeps_of(where: str, function: Any) -> Any:
+    """The same of a sweep, which returns (hit, time)."""
+
+    def sweep(*pose: Any) -> tuple[Any, ...]:
+        at = _Pose(where, *pose)
+        result = _call(at, function, pose)
+        fits = isinstance(result, tuple) and len(result) == 2 and isinstance(result[0], (bool, np.bool_))
+        if not fits or not _is_number(result[1]):
+            raise PluginError(f"{at} it returned {plain(result)!r}: return (hit, time)")
+        return result
+
+    def sweeps(a: list[Any], b: list[Any], d: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        hit, time = zip(*map(sweep, a, b, map(tuple, d), map(tuple, v)), strict=True)
+        return np.array(hit, bool), np.array(time, float)
+
+    return sweeps
+
+
+class _Pose(NamedTuple):
+    """The input of a pair's function, as messages show it."""
+
+    where: str
+    a: Any
+    b: Any
+    d: Any
+    v: Any = ()
+
+    def __str__(self) -> str:
+        way = f", v = {plain(self.v)}" if self.v else ""
+        return f"{self.where}: for a = {shown(self.a)}, b = {shown(self.b)}, d = {plain(self.d)}{way}"
+
+
+def _trials(where: str, first: Any, second: Any, function: Any, sweep: Any = None) -> Iterator[Trial]:
+    """Four poses of two samples, in every dimension both can be in; none of Convex."""
+    for dimensions in () if Convex in (first, second) else sorted({*_dimensions(first)} & {*_dimensions(second)}):
+        a, b = ([parameters_of(each, dimensions)] * len(POSES) for each in (first, second))
+        d, steps = POSES[:, :dimensions], STEPS[:, :dimensions]
+        given = ((first, a), (second, b))
+        one, two = (np.array([_bounds(where, shape, each[0], dimensions)] * len(d), float) for shape, each in given)
+        supports: Any = tuple(_support(where, *each) for each in given)
+        calls = contacts_of(where, function), _sweeps_of(where, sweep)
+        supports = None if None in supports else supports
+        yield Trial(*calls, a, b, d, (one, two), steps, -2.0 * d, supports, first is second)
+
+
+def _check_function(where: str, function: Any, first: Any, second: Any, arguments: tuple[str, ...]) -> str:
+    """What messages about it begin with; PluginError unless it is a function of these arguments and the helpers'."""
+    where = f"{where} {getattr(function, '__name__', repr(function))} of {_name(first)} and {_name(second)}"
     if not inspect.isfunction(plain_function(function)):
         raise PluginError(f"{where}: register a plain function; carom compiles it itself")
     convex = (first is Convex) + (second is Convex)
-    _check_arity(where, plain_function(function), ("a", "b", "d", *HELPERS[convex]))
-    depths = [_check_contact(where, function, *sample) for sample in _samples(first, second)]
-    if max(depths, default=-math.inf) >= 0 and -math.inf in depths:
-        raise PluginError(
-            f"{where}: apart, its depth is minus infinity; return minus the gap, or less than it: times of impact and "
-            f"casts are found from it"
-        )
+    _check_arity(where, plain_function(function), (*arguments, *HELPERS[convex]))
+    return where
 
 
-def _check_contact(where: str, function: Any, a: Any, b: Any, d: tuple[Any, ...]) -> float:
-    """Call a pair function and return the depth; PluginError if the result is no contact."""
-    at = f"a = {shown(a)}, b = {shown(b)}, d = {plain(d)}"
-    result = _call(f"{where}: {at}", function, (a, b, d), a)
-    said = f"{where}: for {at} it returned {plain(result)!r}"
-    if not (isinstance(result, tuple) and len(result) == 4):
-        raise PluginError(f"{said}: return (hit, depth, normal, point)")
-    hit, depth, normal, point = result
-    if not isinstance(hit, (bool, np.bool_)):
-        raise PluginError(f"{said}: hit, the first value, must be True or False")
-    if not _is_number(depth):
-        raise PluginError(f"{said}: depth, the second value, must be a number")
-    for what, vector in (("normal", normal), ("point", point)):
-        if not _is_vector(vector, len(d)):
-            flat = "; a shape of 2D worlds only has dimensions = (2,)" if len(d) == 3 else ""
-            raise PluginError(f"{said}: {what} must be a tuple of {len(d)} numbers{flat}")
-    fault = contact_fault(hit, depth, normal, point)
-    if fault:
-        centres = " (the centres coincide: choose any normal then)" if not any(d) else ""
-        raise PluginError(f"{said}: {fault}{centres}")
-    return float(depth)
-
-
-def contact_fault(hit: bool, depth: float, normal: Iterable[float], point: Iterable[float]) -> str:
-    """What is wrong with a contact, and the cure; "" if nothing is."""
-    if not hit and depth == -math.inf:  # far apart, and the function did not care how far
-        return ""
-    if not all(map(math.isfinite, (depth, *normal, *point))):
-        return "every value must be finite"
-    if bool(hit) != (depth >= 0):
-        return "depth is how far they overlap, so hit must be depth >= 0; apart, depth is minus the gap"
-    length = math.hypot(*normal)
-    if abs(length - 1.0) > UNIT:
-        return f"the normal's length is {length:.6g}, it must be 1: divide it by its length"
-    return ""
+def check_pair(plugin: Any, first: Any, second: Any, function: Any) -> None:
+    """PluginError unless the function can be that of the two shapes; also tries it."""
+    for shape in (first, second):
+        if shape is not Convex and not (isinstance(shape, type) and issubclass(shape, Component)):
+            raise PluginError(
+                f"plugin {plugin.name}: pair of {_name(first)} and {_name(second)}: a pair is of two collider classes, "
+                f"or one and Convex, got {shape!r}"
+            )
+    where = _check_function(f"plugin {plugin.name}: pair", function, first, second, ("a", "b", "d"))
+    for trial in _trials(where, first, second, function):
+        require(list(map(partial(_Pose, where), trial.a, trial.b, map(tuple, trial.d))), pair_laws(trial))
 
 
 def check_sweep(plugin: Any, first: Any, second: Any, function: Any) -> None:
-    name = getattr(function, "__name__", repr(function))
-    where = f"plugin {plugin.name}: sweep {name} of {_name(first)} and {_name(second)}"
+    where = f"plugin {plugin.name}: sweep"
     if (first, second) not in plugin.pairs:
         raise PluginError(f"{where}: register the pair itself first, with @plugin.pair in the same order")
-    if not inspect.isfunction(function):
-        raise PluginError(f"{where}: register a plain function; carom compiles it itself")
-    convex = (first is Convex) + (second is Convex)
-    _check_arity(where, function, ("a", "b", "d", "v", *HELPERS[convex]))
-    for a, b, d in _samples(first, second):
-        v = tuple(-2.0 * x for x in d)
-        at = f"a = {shown(a)}, b = {shown(b)}, d = {plain(d)}, v = {plain(v)}"
-        result = _call(f"{where}: {at}", function, (a, b, d, v), a)
-        said = f"{where}: for {at} it returned {plain(result)!r}"
-        if not (isinstance(result, tuple) and len(result) == 2 and isinstance(result[0], (bool, np.bool_))):
-            raise PluginError(f"{said}: return (hit, time), whether they touch on that way and after which part of it")
-        if not _is_number(result[1]) or (result[0] and not 0 <= result[1] <= 1):
-            raise PluginError(f"{said}: the time of a hit is the part of v after which they touch, from 0 to 1")
+    where = _check_function(where, function, first, second, ("a", "b", "d", "v"))
+    for trial in _trials(where, first, second, plugin.pairs[first, second].function, function):
+        require(
+            list(map(partial(_Pose, where), trial.a, trial.b, map(tuple, trial.d), map(tuple, trial.ways))),
+            sweep_laws(trial),
+        )
 
 
 def check_corner(plugin: Any, first: Any, second: Any, corner: Any) -> None:
     """PluginError unless it is None or can tell corners."""
     if corner is None:
         return
-    name = getattr(corner, "__name__", repr(corner))
-    where = f"plugin {plugin.name}: corner {name} of {_name(first)} and {_name(second)}"
-    if not inspect.isfunction(plain_function(corner)):
-        raise PluginError(f"{where}: corner= takes a function of (a, b, d, slop)")
-    convex = (first is Convex) + (second is Convex)
-    _check_arity(where, plain_function(corner), ("a", "b", "d", "slop", *HELPERS[convex]))
-    for a, b, d in _samples(first, second):
-        result = _call(where, corner, (a, b, d, np.float64(0.01)), a)
-        if not isinstance(result, (bool, np.bool_)):
-            raise PluginError(f"{where}: for d = {plain(d)} it returned {plain(result)!r}: return True or False")
-
-
-def _samples(first: Any, second: Any) -> Iterator[tuple[Any, Any, Any]]:
-    """(a, b, d) of two samples in some poses, in every dimension both can be in; none of Convex."""
-    for dimensions in () if Convex in (first, second) else sorted({*_dimensions(first)} & {*_dimensions(second)}):
-        a, b = (parameters_of(each, dimensions) for each in (first, second))
-        for pose in POSES:
-            yield a, b, tuple(np.float64(x) for x in pose[:dimensions])
+    where = _check_function(f"plugin {plugin.name}: corner", corner, first, second, ("a", "b", "d", "slop"))
+    for trial in _trials(where, first, second, None):
+        for a, b, d in zip(trial.a, trial.b, map(tuple, trial.d), strict=True):
+            result = _call(where, corner, (a, b, d, np.float64(0.01)))
+            if not isinstance(result, (bool, np.bool_)):
+                raise PluginError(f"{where}: for d = {plain(d)} it returned {plain(result)!r}: return True or False")
 
 
 # -- other things ---------------------------------------------------------------------------------
@@ -240,17 +284,17 @@ def check_mixing_rule(plugin: Any, name: str, function: Any) -> None:
     if not inspect.isfunction(function):
         raise PluginError(f"{where}: register a plain function of two numbers, got {function!r}")
     _check_arity(where, function, ("x", "y"))
-    check_mixed(where, function, VALUES)
+    require([f"{where}:"] * len(VALUES), mixing_laws(*mixed(where, function, VALUES)))
 
 
-def check_mixed(where: str, function: Any, values: Iterable[Any]) -> None:
-    """PluginError unless the rule makes one number of each two, from 0, whichever comes first."""
-    for x, y in values:
-        there, back = _call(where, function, (x, y), None), _call(where, function, (y, x), None)
-        if not _is_number(there) or not (math.isfinite(there) and there >= 0):
-            raise PluginError(f"{where}: for {x} and {y} it returned {there!r}: return a number from 0")
-        if there != back:
-            raise PluginError(f"{where}: for {x} and {y} it returned {there!r}, for {y} and {x} {back!r}: both are one")
+def mixed(where: str, function: Any, values: np.ndarray) -> tuple[np.ndarray, ...]:
+    """x, y and what the rule makes of them in this and in the other order, for ``values`` (n, 2)."""
+    found = []
+    for x, y in values.tolist():
+        found.append((x, y, _call(where, function, (x, y)), _call(where, function, (y, x))))
+        if not all(map(_is_number, found[-1])):
+            raise PluginError(f"{where}: for {x} and {y} it returned {found[-1][2]!r}: return a number from 0")
+    return tuple(np.array(found, float).T)
 
 
 def check_filter(plugin: Any, function: Any) -> None:
@@ -331,15 +375,15 @@ def parameters_of(component: Any, dimensions: int) -> Any:
     return collections.namedtuple(component.__name__, values)(**values)
 
 
-def _call(where: str, function: Any, arguments: tuple[Any, ...], sample: Any) -> Any:
+def _call(where: Any, function: Any, arguments: tuple[Any, ...]) -> Any:
     try:
         with np.errstate(all="ignore"):
             return function(*arguments)
     except ZeroDivisionError as error:
         raise PluginError(f"{where}: it divides by zero; handle that case first") from error
     except AttributeError as error:
-        fields = f" (it has {', '.join(sample._fields)})" if sample is not None else ""
-        raise PluginError(f"{where}: {error}{fields}") from error
+        fields = getattr(arguments[0], "_fields", ())
+        raise PluginError(f"{where}: {error}" + (f" (it has {', '.join(fields)})" if fields else "")) from error
     except Exception as error:  # whatever the plugin's function raises, its author has to hear of
         raise PluginError(f"{where}: it raised {type(error).__name__}: {error}") from error
 
@@ -380,10 +424,3 @@ def shown(parameters: Any) -> str:
     """A parameter tuple without numpy's types, without axes."""
     fields = ((name, value) for name, value in zip(parameters._fields, parameters, strict=True) if name != "axes")
     return f"{type(parameters).__name__}({', '.join(f'{name}={plain(value)!r}' for name, value in fields)})"
-
-
-def plain(value: Any) -> Any:
-    """Numbers and tuples without numpy's types."""
-    if isinstance(value, tuple):
-        return tuple(plain(part) for part in value)
-    return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value

@@ -1,10 +1,12 @@
-"""``carom plugins check``: compile a plugin's functions and call them with thousands of random and extreme inputs."""
+"""``carom plugins check``: compile a plugin's functions and try the laws on thousands of random and extreme inputs."""
 
 from __future__ import annotations
 
 import contextlib
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,189 +14,244 @@ import numpy as np
 from ...components import RigidBody, SphereCollider, Transform
 from ...framework import CaromError, Convex, Plugin, PluginError, Settings, World
 from ...framework.jit.lazy import errors
-from ...framework.plugins.checks import check_mixed
+from ...framework.plugins.checks import contacts_of, mixed
+from ...framework.plugins.laws import Law, Trial, mixing_laws, pair_laws, shape_laws, sweep_laws
 from ...framework.plugins.registry import Pair, Registry, Shape
 from ...plugins import Physics
-from ..cli.usage_errors import one_line
-from .joint_checks import check_joint
-from .kernels import RaisedError, SupportCode, compiler_message
-from .pair_checks import TOLERANCE, PairChecks
-from .samples import ORDINARY, Finding, Report, Rows, Subject, directions, poses, row_shown, rows
+from ..cli.usage_errors import Problem, one_line
+from .joint_checks import joint_laws_of
+from .kernels import PairCode, RaisedError, compiler_message, support_of
+from .samples import Numbers, all_examples, poses, rows, simplest
 
 BOXES = 400  # boxes given to a broad phase
 STEPS = 3
+PLAIN = 240  # inputs that are also tried as plain Python, which is slow
 ALIKE = "use what both know: numbers and tuples, math, carom.framework.vectors; no global that changes"
+COMPILES = (
+    "use what numba compiles: numbers and tuples, math, carom.framework.vectors, helpers marked @plugin.kernel; return "
+    "the same types on every way"
+)
+RAISED = "return a result for every input; a miss is (False, -gap, normal, point)"
+# Laws on examples, and the text that shows one of their inputs.
+Tried = tuple[Iterable[Law], Callable[[int], str]]
 
 
-def check_plugin(plugin: Plugin, others: list[Plugin], progress: Callable[[str], None] = lambda what: None) -> Report:
-    """Check all shapes, pairs and other functions of a plugin.
+@dataclass
+class Checked:
+    """A shape, pair or other function, in one dimension; what is wrong, for which input, and the cure."""
+
+    kind: str
+    name: str
+    dimensions: int | None = None
+    inputs: int = 0
+    finding: tuple[str, str, str] | None = None
+    note: str = ""
+
+    @property
+    def place(self) -> str:
+        return f"{self.kind} {self.name}" + (f", {self.dimensions}D" if self.dimensions else "")
+
+    def try_laws(self, tried: Callable[[np.ndarray], Tried]) -> None:
+        """Find a law that examples break, and the simplest input that breaks it."""
+        laws, shown = tried(all_examples())
+        law = self._broken(laws)
+        if law is None:
+            return
+        share = f"{law.broken.sum()} of {self.inputs}"
+        fits = {example.tobytes() for example, fault in zip(all_examples(), _by_example(law), strict=True) if not fault}
+
+        def is_broken(example: np.ndarray) -> bool:
+            return example.tobytes() not in fits and self._broken(tried(example)[0], law.what) is not None
+
+        example = simplest(is_broken)
+        if example is not None:
+            laws, shown = tried(example)
+            law = self._broken(laws, law.what) or law
+        row = int(np.argmax(law.broken))
+        self.finding = f"{law.said(row)} ({share})", shown(row), law.cure
+
+    def _broken(self, laws: Iterable[Law], what: str = "") -> Law | None:
+        """The first law that is broken; the one that says that, if anything breaks it."""
+        with np.errstate(all="ignore"):
+            try:
+                for law in laws:
+                    self.inputs = max(self.inputs, len(law.broken))
+                    if law.what == what:
+                        return law if law.broken.any() else None
+                    if not what and law.is_broken:
+                        return law
+            except RaisedError as error:
+                self.inputs = max(self.inputs, len(error.texts))
+                at = np.arange(len(error.texts)) == error.at
+                law = Law(at, "the compiled function raised {}", RAISED, (error.texts,))
+                return law if what in ("", law.what) else None
+        return None
+
+
+def _by_example(law: Law) -> np.ndarray:
+    return law.broken.reshape(len(all_examples()), -1).any(axis=1)
+
+
+def check_plugin(plugin: Plugin, others: list[Plugin], progress: Callable[[str], None] = lambda what: None) -> Any:
+    """Check all shapes, pairs and other functions of a plugin; a list of :class:`Checked`.
 
     others: plugins whose shapes its pairs need, besides the built-in ones
     progress: called with the name of each check before it runs
     """
-    report = Report(plugin.name)
+    report: list[Checked] = []
     registry = Registry()
     built_in = bool(set(Physics().shapes) & set(plugin.shapes))
     for each in (*([] if built_in else [Physics()]), *others, plugin):
         registry.add(each)
+
+    def check(kind: str, name: str, dimensions: Iterable[int | None], run: Callable[[Checked], None]) -> None:
+        for d in dimensions:
+            report.append(Checked(kind, name, d))
+            progress(report[-1].place)
+            _attempt(report[-1], run)
+
     for component, shape in plugin.shapes.items():
-        for dimensions in _dimensions(component):
-            _attempt(report.subject("shape", component.__name__, dimensions), progress,
-                     lambda subject, s=shape, d=dimensions: _check_shape(subject, s, d))  # fmt: skip
-    for first, second in _pairs(plugin, registry):
-        for dimensions in sorted(set(_dimensions(first)) & set(_dimensions(second))):
-            _attempt(report.subject("pair", f"{first.__name__} and {second.__name__}", dimensions), progress,
-                     lambda subject, a=first, b=second: _check_pair(subject, registry, plugin, a, b))  # fmt: skip
-    for first, second in plugin.pairs:
-        strangers = [c.__name__ for c in (first, second) if c is not Convex and c not in registry.shapes]
+        check("shape", component.__name__, component.dimensions, partial(_check_shape, shape))
+    for pair in _pairs(plugin, registry):
+        common = sorted({*pair.first.dimensions} & {*pair.second.dimensions})
+        check("pair", pair.names, common, partial(_check_pair, registry, plugin, pair))
+    for pair in plugin.pairs.values():
+        strangers = [c.__name__ for c in (pair.first, pair.second) if c is not Convex and c not in registry.shapes]
         if strangers:
-            subject = report.subject("pair", f"{first.__name__} and {second.__name__}")
-            subject.note = f"not checked: no plugin here has the shape {' or '.join(strangers)}"
-    _missing(report, plugin, registry)
+            note = f"not checked: no plugin here has the shape {' or '.join(strangers)}"
+            report.append(Checked("pair", pair.names, note=note))
+    for component in plugin.shapes:  # no error: such shapes may be meant never to meet
+        lacking = [other.__name__ for other in registry.shapes if registry.pair(component, other) is None]
+        if lacking:
+            report.append(Checked("shape", component.__name__, note=f"no pair with {', '.join(lacking)}"))
     for name, rule in plugin.mixing_rules.items():
-        _attempt(report.subject("mixing rule", name), progress, lambda subject, f=rule: _check_mixing(subject, f))
+        check("mixing rule", name, [None], lambda checked, f=rule: checked.try_laws(partial(_mixing_laws, f)))
     for component, joint in plugin.joints.items():
-        for dimensions in _dimensions(component):
-            _attempt(report.subject("joint", component.__name__, dimensions), progress,
-                     lambda subject, j=joint, d=dimensions: check_joint(subject, j, d))  # fmt: skip
+        check("joint", component.__name__, component.dimensions,
+              lambda checked, j=joint: checked.try_laws(partial(joint_laws_of, j, checked.dimensions)))  # fmt: skip
     for name, made in plugin.broad_phases.items():
-        for dimensions in (2, 3):
-            _attempt(report.subject("broad phase", name, dimensions), progress,
-                     lambda subject, m=made: _check_broad_phase(subject, m))  # fmt: skip
-    if not built_in and not report.findings:  # a world would only report the same findings in other words
-        known = {d for component in plugin.shapes for d in _dimensions(component)} or {2, 3}
-        for integrator in plugin.integrators or (None,):
-            for dimensions in sorted(known):
-                what = f"with integrator {integrator}" if integrator else "with it"
-                _attempt(report.subject("world", what, dimensions), progress,
-                         lambda subject, i=integrator: _check_world(subject, plugin, others, i))  # fmt: skip
+        check("broad phase", name, (2, 3), partial(_check_broad_phase, made))
+    if not built_in and not any(each.finding for each in report):  # a world would only tell the same in other words
+        known = {d for component in plugin.shapes for d in component.dimensions} or {2, 3}
+        for integrator in plugin.integrators or ("",):
+            what = f"with integrator {integrator}" if integrator else "with it"
+            check("world", what, sorted(known), partial(_check_world, plugin, others, integrator))
     return report
 
 
-def _attempt(subject: Subject, progress: Callable[[str], None], check: Callable[[Subject], None]) -> None:
+def _attempt(checked: Checked, check: Callable[[Checked], None]) -> None:
     """Run a check; convert any exception of plugin code to a finding."""
-    progress(subject.place)
     try:
-        check(subject)
+        check(checked)
     except errors.NumbaError as error:
-        subject.findings.append(
-            Finding(f"it does not compile: {compiler_message(error)}", "every input",
-                    "use what numba compiles: numbers and tuples, math, carom.framework.vectors, helpers marked "
-                    "@plugin.kernel; return the same types on every way")
-        )  # fmt: skip
+        checked.finding = f"it does not compile: {compiler_message(error)}", "every input", COMPILES
+    except Problem:
+        raise
     except PluginError as error:
-        subject.findings.append(Finding(one_line(error), "the values above", "return what the message asks for"))
+        checked.finding = one_line(error), "the values above", "return what the message asks for"
     except Exception as error:  # plugin code may raise anything; the report shows it
-        subject.findings.append(Finding(f"it raised {one_line(error)}", "see the message", "correct what raises"))
-
-
-def _pairs(plugin: Plugin, registry: Registry) -> list[tuple[type[Any], type[Any]]]:
-    """The registered pairs, and all pairs of its shapes with each other and with all others here, each once."""
-    found: dict[Any, tuple[type[Any], type[Any]]] = {}
-    for first in registry.shapes:
-        for second in registry.shapes:
-            pair = registry.pair(first, second)
-            if pair is not None and (pair.plugin == plugin.name or {first, second} & set(plugin.shapes)):
-                found.setdefault(frozenset((first, second)), (pair.first, pair.second))
-    return list(found.values())
-
-
-def _dimensions(component: Any) -> tuple[int, ...]:
-    return tuple(getattr(component, "dimensions", (2, 3)))
+        checked.finding = f"it raised {one_line(error)}", "see the message", "correct what raises"
 
 
 # -- shapes and pairs -----------------------------------------------------------------------------
 
 
-def _check_pair(subject: Subject, registry: Registry, plugin: Plugin, first: Any, second: Any) -> None:
-    pair = registry.pair(first, second)
-    assert isinstance(pair, Pair)
-    assert subject.dimensions is not None
+def _pairs(plugin: Plugin, registry: Registry) -> list[Pair]:
+    """The registered pairs, and all pairs of its shapes with each other and with all others here, each once."""
+    found: dict[Any, Pair] = {}
+    for first in registry.shapes:
+        for second in registry.shapes:
+            pair = registry.pair(first, second)
+            if pair is not None and (pair.plugin == plugin.name or {first, second} & set(plugin.shapes)):
+                found.setdefault(frozenset((first, second)), pair)
+    return list(found.values())
+
+
+def _check_pair(registry: Registry, plugin: Plugin, pair: Pair, checked: Checked) -> None:
+    dimensions: Any = checked.dimensions
     shapes = registry.shapes[pair.first], registry.shapes[pair.second]
-    by_hand = pair.plugin == plugin.name
+    own = pair.plugin == plugin.name
     if pair.helpers:
-        subject.note = "by its support function" if not by_hand else "as one of the convex"
-    PairChecks(subject, pair, shapes, poses(*shapes, subject.dimensions, 1), by_hand).run()
+        checked.note = "as one of the convex" if own else "by its support function"
+    code = PairCode(pair, *shapes, dimensions)
+
+    def tried(examples: np.ndarray) -> Tried:
+        p = poses(*shapes, dimensions, examples)
+        convex = all(shape.support is not None for shape in shapes)
+        trial = Trial(
+            code, code.sweep if pair.sweep else None, p.a, p.b, p.d, (p.a.half, p.b.half), p.steps, p.ways,
+            (partial(support_of, p.a), partial(support_of, p.b)) if convex else None,
+            pair.first is pair.second, own,
+        )  # fmt: skip
+        return _laws_of_pair(trial, pair), p.shown
+
+    checked.try_laws(tried)
 
 
-def _check_shape(subject: Subject, shape: Shape, dimensions: int) -> None:
-    """Bounds enclose the shape; support is the farthest point; rounding is a radius."""
-    rng = np.random.default_rng((2, dimensions))
-    scale = np.repeat((1.0, 1e-9, 1e9), (ORDINARY, ORDINARY // 10, ORDINARY // 10))
-    made = rows(shape, scale, rng.random(len(scale)) < 0.2, dimensions, rng)
-    subject.inputs = len(scale)
-    cure = "half extents are numbers of at least 0, or inf where the shape has no end"
-    wrong = ~(made.half >= 0).min(axis=1)  # also true for nan
-    subject.found(wrong, "bounds returned {}", lambda i: row_shown(made, i), cure, made.half)
-    said = made.half.copy()
-    for i in range(0, len(said), 100):
-        said[i] = shape.component.bounds(made.at(i), dimensions)  # type: ignore[attr-defined]
-    other = ~np.isclose(said, made.half, rtol=TOLERANCE, atol=0, equal_nan=True).min(axis=1)
-    what = "compiled, bounds are {}, as plain Python {}"
-    subject.found(other, what, lambda i: row_shown(made, i), ALIKE, made.half, said)
-    if shape.support is not None:
-        _check_support(subject, made, rng)
-
-
-def _check_support(subject: Subject, made: Rows, rng: np.random.Generator) -> None:
-    n, dimensions = made.half.shape
-    code = SupportCode(made.shape, dimensions)
-    look, other = directions(n, dimensions, rng), directions(n, dimensions, rng)
-    upright = rng.random(n) < 0.2
-    look[upright] = np.eye(dimensions)[rng.integers(dimensions, size=int(upright.sum()))]
-    try:
-        (point, beyond), (elsewhere, _), (long, _) = (code(made, way) for way in (look, other, 1e6 * look))
-    except RaisedError as error:
-        what, cure = f"support or rounding raised {error}", "support takes any direction, of any length but 0"
-        subject.findings.append(Finding(what, row_shown(made, error.at), cure))
+def _laws_of_pair(trial: Trial, pair: Pair) -> Iterator[Law]:
+    yield from pair_laws(trial)
+    if not trial.own:
         return
+    few = range(min(len(trial.d), PLAIN))
+    a, b = ([rows.at(row) for row in few] for rows in (trial.a, trial.b))
+    there = contacts_of("as plain Python", pair.function, *pair.helpers)(a, b, trial.d[: len(few)])
+    here, differ = trial.contacts(trial.d), np.zeros(len(trial.d), bool)
+    for k, slack in ((1, trial.tolerance), (2, np.full(len(differ), 1e-9)), (3, trial.tolerance)):
+        apart = np.abs(here[k][: len(few)] - there[k]).reshape(len(few), -1).max(axis=1)
+        differ[: len(few)] |= ~(apart <= slack[: len(few)])
+    differ[: len(few)] &= here.hit[: len(few)] | there.hit | np.isfinite(here.depth[: len(few)])
+    what = "compiled it returns ({}, {}, {}, {}), as plain Python ({}, {}, {}, {})"
+    yield Law(differ, what, ALIKE, (*here, *there))
+    if trial.sweep is not None:
+        yield from sweep_laws(trial)
 
-    def found(bad: np.ndarray, what: str, cure: str, *values: np.ndarray) -> None:
-        show = lambda i: f"{row_shown(made, i)}, direction = {tuple(look[i].tolist())}"  # noqa: E731
-        subject.found(bad, what, show, cure, *values)
 
-    finite = np.isfinite(point).all(axis=1) & np.isfinite(beyond) & (beyond >= 0)
-    found(~finite, "support is {}, rounding {}", "both are finite, and rounding is at least 0", point, beyond)
-    slack = TOLERANCE * (np.abs(point).max(axis=1) + beyond)
-    out = (np.abs(point) + beyond[:, None] > made.half + slack[:, None]).any(axis=1)
-    what = "support {} and rounding {:.6g} reach beyond the bounds {}"
-    cure = "make bounds enclose the whole shape (for turned shapes: use shape.axes), or correct support"
-    found(finite & out, what, cure, point, beyond, made.half)
-    here, there, far = ((end * look).sum(axis=1) for end in (point, elsewhere, long))
-    what = "support is {}, but for another direction it is {}, which is farther this way too"
-    cure = "return the point whose product with the direction is largest"
-    found(finite & (there > here + slack), what, cure, point, elsewhere)
-    what = "support is {}, for a direction of another length {}"
-    cure = "the direction has any length: do not use it as a unit vector"
-    found(finite & (np.abs(far - here) > slack), what, cure, point, long)
+def _check_shape(shape: Shape, checked: Checked) -> None:
+    dimensions: Any = checked.dimensions
+
+    def tried(examples: np.ndarray) -> Tried:
+        sizes = np.tile((1.0, 1e-9, 1e9), len(examples))
+        numbers = Numbers(np.repeat(examples, 3, axis=0))
+        made = rows(shape, sizes, dimensions, numbers)
+        support = None if shape.support is None else partial(support_of, made)
+        look, other = numbers.directions(dimensions), numbers.directions(dimensions)
+
+        def laws() -> Iterator[Law]:
+            yield from shape_laws(made.half, support, look, other)
+            few = range(min(len(sizes), PLAIN))
+            component: Any = shape.component
+            there = np.array([component.bounds(made.at(row), dimensions) for row in few], float)
+            alike = np.isclose(there, made.half[: len(few)], rtol=1e-9, atol=0, equal_nan=True).all(axis=1)
+            differ = np.arange(len(sizes)) == (np.argmin(alike) if not alike.all() else -1)
+            yield Law(differ, "compiled, bounds are {}, as plain Python {}", ALIKE, (made.half, there))
+
+        return laws(), made.shown
+
+    checked.try_laws(tried)
 
 
 # -- other things ---------------------------------------------------------------------------------
 
 
-def _check_mixing(subject: Subject, rule: Any) -> None:
-    """As at its registration, with many more values."""
-    rng = np.random.default_rng(3)
-    values = np.concatenate((rng.uniform(0, 1, (1000, 2)), 10.0 ** rng.uniform(-9, 9, (200, 2))))
-    subject.inputs = len(values)
-    check_mixed("it", rule, values.tolist())
+def _mixing_laws(rule: Any, examples: np.ndarray) -> Tried:
+    usual, wide = np.abs(examples[:, :2]), 10.0 ** (9.0 * examples[:, 2:4])
+    values = np.stack((usual, wide), axis=1).reshape(-1, 2)
+    return mixing_laws(*mixed("it", rule, values)), lambda row: "these values"
 
 
-def _check_broad_phase(subject: Subject, make: Any) -> None:
+def _check_broad_phase(make: Any, checked: Checked) -> None:
     """Compare with all pairs, tested one by one."""
-    assert subject.dimensions is not None
-    rng = np.random.default_rng(4)
+    rng, d = np.random.default_rng(4), checked.dimensions or 2
     for count in (0, 1, 2, BOXES):
-        centre = rng.uniform(-10, 10, (count, subject.dimensions)) * rng.choice((0.1, 1.0), (count, 1))
-        half = 10.0 ** rng.uniform(-2, 0.5, (count, subject.dimensions))
+        centre = rng.uniform(-10, 10, (count, d)) * rng.choice((0.1, 1.0), (count, 1))
+        half = 10.0 ** rng.uniform(-2, 0.5, (count, d))
         lower, upper, moving = centre - half, centre + half, (count + 1) // 2
         if count == BOXES:
             lower[7] = np.nan
-        subject.inputs += count
+        checked.inputs += count
         over = ((lower[:, None] <= upper[None]) & (lower[None] <= upper[:, None])).all(axis=2)
         expected = {(int(i), int(j)) for i, j in np.argwhere(np.triu(over, 1)) if i < moving}
-        first, second = make().pairs(lower, upper, moving)
-        made = Counter(zip(*(np.sort((np.asarray(first), np.asarray(second)), axis=0).tolist()), strict=True))
+        made = Counter(zip(*np.sort(make().pairs(lower, upper, moving), axis=0).tolist(), strict=True))
         for what, wrong in (
             ("misses", expected - set(made)),
             ("makes twice", {pair for pair, times in made.items() if times > 1}),
@@ -203,28 +260,25 @@ def _check_broad_phase(subject: Subject, make: Any) -> None:
             if wrong:
                 i, j = min(wrong)
                 boxes = f"{lower[i].tolist()} to {upper[i].tolist()} and {lower[j].tolist()} to {upper[j].tolist()}"
-                subject.findings.append(
-                    Finding(f"it {what} the pair of rows {i} and {j}",
-                            f"{count} boxes, {moving} of them moving; {boxes}",
-                            "return each pair of rows whose boxes overlap once, at least one of both below moving",
-                            f"{len(wrong)} pairs")
-                )  # fmt: skip
+                cure = "return each pair of rows whose boxes overlap once, at least one of both below moving"
+                what = f"it {what} the pair of rows {i} and {j} ({len(wrong)} pairs)"
+                checked.finding = what, f"{count} boxes, {moving} of them moving; {boxes}", cure
+                return
 
 
-def _check_world(subject: Subject, plugin: Plugin, others: list[Plugin], integrator: str | None) -> None:
+def _check_world(plugin: Plugin, others: list[Plugin], integrator: str, checked: Checked) -> None:
     """A world with the plugin takes steps; bodies of all its shapes meet in it if all pairs are handled."""
-    assert subject.dimensions is not None
-    d = subject.dimensions
+    d = checked.dimensions or 2
     settings = Settings(integrator=integrator) if integrator else Settings()
-    shapes: list[Any] = [SphereCollider, *(c for c in plugin.shapes if d in _dimensions(c))]
+    shapes: list[Any] = [SphereCollider, *(c for c in plugin.shapes if d in c.dimensions)]  # type: ignore[attr-defined]
     where = f"bodies with {', '.join(shape.__name__ for shape in shapes)}"
     physics = Physics(d, gravity=(0.0, -9.81, 0.0)[:d])
     with contextlib.closing(World(physics, *others, plugin, settings=settings)) as world:
-        pairs = [(a, b) for a in shapes for b in shapes if world.registry.pair(a, b) is None]
+        strange = any(world.registry.pair(a, b) is None for a in shapes for b in shapes)
         for index, shape in enumerate(shapes):
             for height in (0.0, 1.0):
                 body = RigidBody(kind="dynamic" if height else "static")
-                collider = shape.sample(restitution=0.5, mask=0 if pairs else -1)
+                collider = shape.sample(restitution=0.5, mask=0 if strange else -1)
                 world.create_entity(Transform((3.0 * index, height, 0.0)[:d]), body, collider)
         problems = []
         try:
@@ -233,13 +287,6 @@ def _check_world(subject: Subject, plugin: Plugin, others: list[Plugin], integra
         except CaromError as error:
             problems.append(f"a step failed: {one_line(error)}")
         problems += [fault for fault in world.faults if "no room" not in fault]  # shapes without end overlap all others
-    subject.inputs = STEPS
-    subject.findings += [Finding(problem, where, "see the message") for problem in problems]
-
-
-def _missing(report: Report, plugin: Plugin, registry: Registry) -> None:
-    """Note pairs of its shapes that have no handler: no error, because such shapes may be meant never to meet."""
-    for component in plugin.shapes:
-        lacking = [other.__name__ for other in registry.shapes if registry.pair(component, other) is None]
-        if lacking:
-            report.subject("shape", component.__name__).note = f"no pair with {', '.join(lacking)}"
+    checked.inputs = STEPS
+    if problems:
+        checked.finding = "; ".join(problems), where, "see the message"

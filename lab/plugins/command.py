@@ -20,8 +20,7 @@ from ..cli.options import traceback_option
 from ..cli.usage_errors import Problem, did_you_mean, one_line
 from ..reporting.progress import Progress
 from ..reporting.text import TextTable, counted
-from .check import check_plugin
-from .samples import Report, Subject
+from .check import Checked, check_plugin
 
 FOUND = 1  # exit code of a check with findings
 
@@ -62,8 +61,7 @@ def check_command(target: str) -> int:
         for plugin in found:
             with stdout_kept_clean():
                 report = check_plugin(plugin, needed_by(plugin), lambda what, p=plugin: status.say(f"{p.name}: {what}"))
-            findings += report.findings
-            _print(report, console)
+            findings += _print(plugin, report, console)
     return FOUND if findings else 0
 
 
@@ -72,29 +70,27 @@ def _adds(plugin: Plugin) -> str:
     return "; ".join(f"{kind} {', '.join(names)}" for kind, names in adds.items()) or "nothing"
 
 
-def _print(report: Report, console: Console) -> None:
+def _print(plugin: Plugin, report: list[Checked], console: Console) -> int:
+    """Print the table and the findings; how many there are."""
     rows = [
-        (f"{subject.kind} {subject.name}", f"{subject.dimensions}D" if subject.dimensions else "",
-         f"{subject.inputs:,}" if subject.inputs else "", _result(subject))
-        for subject in report.subjects
+        (f"{checked.kind} {checked.name}", f"{checked.dimensions}D" if checked.dimensions else "",
+         f"{checked.inputs:,}" if checked.inputs else "", _result(checked))
+        for checked in report
     ]  # fmt: skip
-    TextTable(f"plugin {report.plugin}", ("checked", "", "inputs", "result"), rows, left=(3,)).show()
-    number = 0
-    for subject in report.subjects:
-        for finding in subject.findings:
-            number += 1
-            share = f" ({finding.share})" if finding.share else ""
-            title = f"{number}. {subject.place}{share}: {finding.what}"
-            for line in (title, f"   for {finding.example}", f"   cure: {finding.cure}"):
-                console.print(line, markup=False, highlight=False, soft_wrap=True)
-    said = counted(report.findings, "finding") if report.findings else "nothing found"
-    console.print(f"plugin {report.plugin}: {said}", markup=False, highlight=False)
+    TextTable(f"plugin {plugin.name}", ("checked", "", "inputs", "result"), rows, left=(3,)).show()
+    lines, found = [], [checked for checked in report if checked.finding]
+    for number, checked in enumerate(found, 1):
+        what, example, cure = checked.finding or ()
+        lines += [f"{number}. {checked.place}: {what}", f"   for {example}", f"   cure: {cure}"]
+    lines.append(f"plugin {plugin.name}: {counted(len(found), 'finding') if found else 'nothing found'}")
+    for line in lines:
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
+    return len(found)
 
 
-def _result(subject: Subject) -> str:
-    found = subject.findings
-    result = counted(len(found), "finding") if found else "ok" if subject.inputs else ""
-    return "; ".join(part for part in (result, subject.note) if part)
+def _result(checked: Checked) -> str:
+    result = "1 finding" if checked.finding else "ok" if checked.inputs else ""
+    return "; ".join(part for part in (result, checked.note) if part)
 
 
 def plugin_named(name: str) -> Plugin:

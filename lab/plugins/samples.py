@@ -1,11 +1,23 @@
-"""Random shapes and poses for ``carom plugins check``: ordinary and extreme parameters that the columns accept."""
+"""What ``carom plugins check`` tries: numbers that hypothesis draws, and the shapes and poses that come of them.
+
+Each example gives one pose of each of KINDS. 0 is the simplest number; of nothing but zeros come a shape's own samples,
+upright and with one centre.
+"""
 
 from __future__ import annotations
 
 import collections
 import contextlib
+import importlib.metadata
+import itertools
+import math
+import os
+import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from pathlib import Path
+from random import Random
 from typing import Any
 
 import numpy as np
@@ -13,23 +25,90 @@ import numpy as np
 from ...components import Collider
 from ...framework.data.arrays.column import ArrayColumn, hold_arrays
 from ...framework.data.columns import REQUIRED, Column
+from ...framework.jit.cache import cache_folder
 from ...framework.jit.records.record import Record
-from ...framework.plugins.checks import plain, shown
+from ...framework.plugins.checks import shown
+from ...framework.plugins.laws import plain, size_of
 from ...framework.plugins.registry import Shape
 from ...systems.shapes.linking.linked_shape import half_extents_of
 from ...systems.shapes.linking.parameters import bind, make_parameter_record
 from ...systems.shapes.rotation import axes_of
+from ..cli.usage_errors import Problem
 
-ORDINARY = 10_000  # poses of a pair
-EXTREME = 300  # poses of each other kind below
-VARIANTS = 8  # stretched variants of an array
+MISSING = "hypothesis is missing; it comes with the extra: pip install 'carom[check]'"
+EXAMPLES = 400
+WIDTH = 56  # numbers of an example; what needs more gets the first ones again
+UPRIGHT = np.array((1.0, 0.0, 0.0, 0.0))  # the quaternion
+NEAR = 4  # places of the second shape, of an example
 # Kinds of poses: (name, size of a, size of b, distance in units of their sizes), in metres; the first come first.
 KINDS = (
-    ("ordinary", 1.0, 1.0, "near"), ("along the axes", 1.0, 1.0, "axes"),
+    *[("ordinary", 1.0, 1.0, "near")] * NEAR, ("along the axes", 1.0, 1.0, "axes"),
     ("coincident centres", 1.0, 1.0, "coincident"), ("centres 1e-9 apart", 1.0, 1.0, "close"),
     ("far apart", 1.0, 1.0, "far"), ("of size 1e-9", 1e-9, 1e-9, "near"), ("of size 1e9", 1e9, 1e9, "near"),
     ("first 1e12 larger", 1e6, 1e-6, "near"), ("second 1e12 larger", 1e-6, 1e6, "near"),
 )  # fmt: skip
+
+
+def simplest(is_wanted: Callable[[np.ndarray], Any]) -> np.ndarray | None:
+    """The simplest example (1, WIDTH) that is wanted, of EXAMPLES that are the same in every process; None if none is.
+
+    Two bytes a number: hypothesis draws an example of bytes in a tenth of the time of one of floats.
+    """
+    hypothesis = importlib.import_module("hypothesis")
+    hypothesis.configuration.set_hypothesis_home_dir(_folder())  # and no folder where one stands
+    settings = hypothesis.settings(max_examples=EXAMPLES, derandomize=True, database=None, deadline=None)
+    examples = hypothesis.strategies.binary(min_size=2 * WIDTH, max_size=2 * WIDTH).map(_numbers_in)
+    try:
+        return hypothesis.find(examples, is_wanted, settings=settings, random=Random(0))
+    except hypothesis.errors.NoSuchExample:
+        return None
+
+
+def _numbers_in(drawn: bytes) -> np.ndarray:
+    """(1, WIDTH), from -1 to 1."""
+    numbers = np.frombuffer(drawn, ">u2").astype(int)
+    return np.where(numbers & 1, -1.0, 1.0)[None] * (numbers >> 1) / 2**15
+
+
+@lru_cache(maxsize=1)
+def all_examples() -> np.ndarray:
+    """(EXAMPLES, WIDTH); kept in the cache folder, since to draw them takes as long as to check a small plugin."""
+    try:
+        version = importlib.metadata.version("hypothesis")
+    except ImportError as error:
+        raise Problem(MISSING) from error
+    file = _folder() / f"examples-{version}-{EXAMPLES}x{WIDTH}.npy"
+    with contextlib.suppress(OSError, ValueError, EOFError):
+        return np.load(file)
+    found: list[np.ndarray] = []
+    simplest(found.append)
+    with contextlib.suppress(OSError):
+        file.parent.mkdir(exist_ok=True)
+        np.save(unfinished := file.with_name(f"{os.getpid()}-{file.name}"), np.concatenate(found))
+        unfinished.replace(file)
+    return np.concatenate(found)
+
+
+def _folder() -> Path:
+    return (cache_folder() or Path(tempfile.gettempdir())) / "hypothesis"
+
+
+class Numbers:
+    """Gives out the columns of examples (n, WIDTH), one after the other."""
+
+    def __init__(self, examples: np.ndarray) -> None:
+        self._columns = itertools.cycle(examples.T)
+
+    def __call__(self, *shape: int) -> np.ndarray:
+        """(n, *shape)"""
+        found = [next(self._columns) for _ in range(math.prod(shape))]
+        return np.stack(found, axis=-1).reshape(-1, *shape)
+
+    def directions(self, dimensions: int) -> np.ndarray:
+        """(n, dimensions) of length 1."""
+        vectors = self(dimensions)
+        vectors[~vectors.any(axis=1), 0] = 1.0
+        return vectors / np.sqrt((vectors * vectors).sum(axis=1, keepdims=True))
 
 
 @dataclass(eq=False)
@@ -67,218 +146,123 @@ class Rows:
             values["axes"] = tuple(tuple(axis) for axis in self.axes[row].T)
         return collections.namedtuple(self.shape.component.__name__, values)(**values)
 
-    def take(self, rows: np.ndarray) -> Rows:
-        return Rows(self.shape, {n: array[rows] for n, array in self.arrays.items()}, self.axes[rows], self.half[rows])
+    def shown(self, row: int) -> str:
+        """The parameters of one row, as text."""
+        parameters = self.at(row)
+        turned = self.shape.rotates and (self.axes[row] != np.eye(len(self.axes[row]))).any()
+        axes = f", axes={plain(parameters.axes)!r}" if turned else ""
+        return shown(parameters)[:-1].removesuffix(", ") + axes + ")"
 
-    def size(self) -> np.ndarray:
-        """(n,) the largest finite half extent; 0 if all are infinite."""
-        return np.where(np.isfinite(self.half), self.half, 0.0).max(axis=1)
+
+def rows(shape: Shape, scale: np.ndarray, dimensions: int, numbers: Numbers) -> Rows:
+    """Colliders of that shape with lengths around ``scale`` (n,), a quarter of them upright."""
+    component: Any = shape.component
+    sample, common = component.sample(), scale * 10.0 ** numbers()
+    own_sample = component.sample.__func__ is not Collider.sample.__func__  # its numbers depend on each other
+    with contextlib.ExitStack() as made:
+        for column in component.columns.values():  # the rows hold the arrays as soon as they are there
+            if isinstance(column, ArrayColumn):
+                made.enter_context(column.pool.kept())
+        arrays = {}
+        for name in shape.columns:
+            column, value = component.columns[name], getattr(sample, name)
+            if isinstance(column, ArrayColumn):
+                arrays[name] = _array_numbers(column, value, common, numbers())
+            else:
+                arrays[name] = _values(column, value, common, own_sample, dimensions, numbers)
+        axes = np.eye(dimensions) * np.ones((len(scale), 1, 1))
+        if shape.rotates:
+            rotation = np.pi * numbers() if dimensions == 2 else numbers(4) + UPRIGHT
+            turned = np.abs(numbers()) > 0.25
+            axes[turned] = axes_of(rotation[turned], dimensions)
+        return Rows(shape, arrays, axes, half_extents_of(shape, arrays, axes))
+
+
+def _values(
+    column: Column, value: Any, common: np.ndarray, own_sample: bool, dimensions: int, numbers: Numbers
+) -> np.ndarray:
+    """Of a field; those that the constructor requires to be positive are lengths, and so are vectors."""
+    shape = (len(common), *column.item_shape(dimensions))
+    found = np.empty(shape, column.dtype)
+    found[...] = column.checked(value)
+    drawn, low = numbers(*shape[1:]), column.minimum or 0.0
+    is_length = column.dtype is float and (column.default is REQUIRED or column.item == "vector")
+    if is_length:
+        found *= common.reshape(-1, *[1] * (len(shape) - 1))
+    if is_length and not own_sample:
+        found = low + np.abs(found) * 10.0 ** (0.5 * drawn)
+        other = numbers(*shape[1:])
+        if column.item == "vector" and column.minimum is None and not column.positive:
+            found[other < 0] *= -1.0
+        if not column.positive:  # zero is allowed: a point, a plate
+            found[np.abs(other) > 0.97] = low
+    elif column.choices and not own_sample:
+        found[...] = len(column.choices) * np.abs(drawn)
+    elif column.dtype is bool and not own_sample:
+        found = drawn < 0
+    elif column.dtype is float and not own_sample and (column.positive or column.minimum is not None):
+        found = np.where(drawn > 0, low + drawn, found)
+    if type(column) is not Column:  # it has its own rules, and the sample's value keeps them
+        for row, wanted in enumerate(found.tolist()):
+            try:
+                found[row] = column.checked(tuple(wanted) if isinstance(wanted, list) else wanted)
+            except ValueError:
+                found[row] = column.checked(value)
+    return found
+
+
+def _array_numbers(column: ArrayColumn, value: Any, common: np.ndarray, drawn: np.ndarray) -> np.ndarray:
+    """The sample's array, scaled and stretched, where the field's own check accepts that."""
+
+    @cache
+    def number(size: float, stretch: float) -> int:
+        factors = 10.0 ** (size + stretch * np.linspace(-0.5, 0.5, column.width))
+        try:
+            return column.checked(np.asarray(value) * factors)
+        except ValueError:
+            return column.checked(value)
+
+    sizes, stretches = np.round(3.0 * np.log10(common)) / 3.0, np.round(2.0 * drawn) / 2.0
+    return np.array([number(*each) for each in zip(sizes.tolist(), stretches.tolist(), strict=True)], np.int64)
 
 
 @dataclass
 class Poses:
-    """n pairs: a, b, d (n, dimensions) from a's centre to b's, and the kind of each."""
+    """n pairs: a, b, d (n, dimensions) from a's centre to b's, and the kind of each; steps and ways of a trial."""
 
     a: Rows
     b: Rows
     d: np.ndarray
     kind: np.ndarray  # (n,) index into KINDS
+    steps: np.ndarray
+    ways: np.ndarray
 
-    def take(self, rows: np.ndarray) -> Poses:
-        return Poses(self.a.take(rows), self.b.take(rows), self.d[rows], self.kind[rows])
-
-    def scale(self) -> np.ndarray:
-        """(n,) the length that tolerances are relative to: distance plus both sizes."""
-        return np.sqrt((self.d * self.d).sum(axis=1)) + self.a.size() + self.b.size()
-
-
-def poses(first: Shape, second: Shape, dimensions: int, seed: int) -> Poses:
-    """Pairs of the two shapes, the same in every run."""
-    rng = np.random.default_rng((seed, dimensions))
-    counts = [ORDINARY] + [EXTREME] * (len(KINDS) - 1)
-    kind = np.repeat(np.arange(len(KINDS)), counts)
-    upright = rng.random(len(kind)) < np.where(kind == 0, 0.1, 0.5)
-    a = rows(first, np.array([k[1] for k in KINDS])[kind], upright, dimensions, rng)
-    b = rows(second, np.array([k[2] for k in KINDS])[kind], upright, dimensions, rng)
-    return Poses(a, b, _apart(a, b, kind, rng), kind)
+    def shown(self, row: int) -> str:
+        """The input of a pair function, as text."""
+        a, b, d = self.a.shown(row), self.b.shown(row), plain(self.d[row])
+        return f"{KINDS[self.kind[row]][0]}: a = {a}, b = {b}, d = {d}"
 
 
-def rows(shape: Shape, scale: np.ndarray, upright: np.ndarray, dimensions: int, rng: np.random.Generator) -> Rows:
-    """Colliders of that shape with lengths around ``scale`` (n,); ``upright`` ones are not rotated."""
-    pools = [column.pool for column in shape.component.columns.values() if isinstance(column, ArrayColumn)]
-    with contextlib.ExitStack() as made:
-        for pool in pools:  # the rows hold the arrays as soon as they are there
-            made.enter_context(pool.kept())
-        return _rows(shape, scale, upright, dimensions, rng)
-
-
-def _rows(shape: Shape, scale: np.ndarray, upright: np.ndarray, dimensions: int, rng: np.random.Generator) -> Rows:
-    count = len(scale)
-    own_sample = shape.component.sample.__func__ is not Collider.sample.__func__  # type: ignore[attr-defined]
-    sample = shape.component.sample()  # type: ignore[attr-defined]
-    common = scale * 10.0 ** rng.uniform(-1, 1, count)
-    arrays = {}
-    for name in shape.columns:
-        column, value = shape.component.columns[name], getattr(sample, name)
-        if isinstance(column, ArrayColumn):
-            arrays[name] = _array_numbers(column, value, common, rng)
-        else:
-            arrays[name] = _numbers(column, value, common, own_sample, dimensions, rng)
-            if type(column) is not Column:  # it has its own rules
-                _keep_rules(column, value, arrays[name])
-    axes = np.eye(dimensions) * np.ones((count, 1, 1))  # rotation matrices; their columns are the bodies' axes
-    if shape.rotates:
-        angles = rng.uniform(-np.pi, np.pi, count) if dimensions == 2 else rng.normal(size=(count, 4))
-        axes = axes_of(angles, dimensions)
-    axes[upright] = np.eye(dimensions)
-    return Rows(shape, arrays, axes, half_extents_of(shape, arrays, axes))
-
-
-def _numbers(
-    column: Column, value: Any, common: np.ndarray, own_sample: bool, dimensions: int, rng: np.random.Generator
-) -> np.ndarray:
-    """Values of a field; those that the constructor requires to be positive are lengths, and so are vectors."""
-    count = len(common)
-    shape = (count, *column.item_shape(dimensions))
-    stored = np.asarray(column.checked(value))
-    result = np.empty(shape, column.dtype)
-    result[...] = stored
-    if column.dtype is not float:
-        if column.choices and not own_sample:
-            result[...] = rng.integers(len(column.choices), size=shape)
-        elif column.dtype is bool and not own_sample:
-            result[...] = rng.random(shape) < 0.5
-        return result
-    if column.default is REQUIRED or column.item == "vector":
-        factor = common.reshape((count,) + (1,) * (len(shape) - 1))
-        if own_sample:  # its numbers depend on each other
-            return result * factor
-        signs = -1.0 if column.minimum is None and not column.positive and column.item == "vector" else 0.0
-        low = max(column.minimum or 0.0, 0.0)
-        result = low + factor * np.abs(result) * 10.0 ** rng.uniform(-0.5, 0.5, shape)
-        if signs:
-            result *= rng.choice((-1.0, 1.0), shape)
-        if not column.positive:  # zero is allowed: a point, a plate
-            result[rng.random(shape) < 0.03] = low
-    elif not own_sample and (column.positive or column.minimum is not None):
-        other = rng.random(count) < 0.5
-        result[other] = (column.minimum or 0.0) + 1.0 - rng.random(int(other.sum()))
-    return result
-
-
-def _keep_rules(column: Column, value: Any, array: np.ndarray) -> None:
-    """Store each row as the column would; use the sample's value for rows that it rejects."""
-    for row, wanted in enumerate(array.tolist()):
-        try:
-            array[row] = column.checked(tuple(wanted) if isinstance(wanted, list) else wanted)
-        except ValueError:
-            array[row] = column.checked(value)
-
-
-def _array_numbers(column: ArrayColumn, value: Any, common: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The sample's array and stretched variants of it, as far as the field's own check accepts them."""
-    factors = np.exp(np.linspace(np.log(common.min()), np.log(common.max()), VARIANTS))
-    known = [column.checked(value)]
-    scaled = []
-    for factor in factors:
-        for stretch in (np.ones(column.width), 10.0 ** rng.uniform(-0.5, 0.5, column.width)):
-            try:
-                scaled.append((factor, column.checked(np.asarray(value) * factor * stretch)))
-            except ValueError:
-                continue
-    if not scaled:
-        return np.full(len(common), known[0], np.int64)
-    sizes, numbers = np.log([size for size, _ in scaled]), np.array([number for _, number in scaled])
-    wanted = np.log(common) + rng.uniform(-0.5, 0.5, len(common))
-    order = np.argsort(np.abs(sizes[None, :] - wanted[:, None]), axis=1, kind="stable")
-    return numbers[order[np.arange(len(common)), rng.integers(0, min(2, len(scaled)), len(common))]].astype(np.int64)
-
-
-def directions(count: int, dimensions: int, rng: np.random.Generator) -> np.ndarray:
-    """(count, d) uniformly distributed unit vectors."""
-    vectors = rng.normal(size=(count, dimensions))
-    return vectors / np.sqrt((vectors * vectors).sum(axis=1, keepdims=True))
-
-
-def _apart(a: Rows, b: Rows, kind: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The position of b relative to a: mostly so near that their boxes touch or nearly do."""
-    count, dimensions = len(kind), a.half.shape[1]
-    sizes = a.size() + b.size()
-    reach = sum(np.where(np.isfinite(each.half), each.half, sizes[:, None]) for each in (a, b))
-    d = reach * rng.uniform(-1.3, 1.3, (count, dimensions))
-    how = np.array([k[3] for k in KINDS])[kind]
-    axis = np.eye(dimensions)[rng.integers(dimensions, size=count)] * rng.choice((-1.0, 1.0), (count, 1))
-    d = np.where((how == "axes")[:, None], reach * axis * rng.choice((0.5, 1.0, 1.5), (count, 1)), d)
-    d[how == "coincident"] = 0.0
-    anywhere = directions(count, dimensions, rng)
-    d = np.where((how == "close")[:, None], 1e-9 * sizes[:, None] * anywhere, d)
-    return np.where((how == "far")[:, None], 10.0 ** rng.uniform(2, 9, (count, 1)) * sizes[:, None] * anywhere, d)
-
-
-# -- what is found ---------------------------------------------------------------------------------------
-
-
-@dataclass
-class Finding:
-    """One defect: what, an example input, and the cure; ``share``: fraction of the inputs it occurs for."""
-
-    what: str
-    example: str
-    cure: str
-    share: str = ""
-
-
-@dataclass
-class Subject:
-    """A checked shape, pair or other function, in one dimension, with its findings."""
-
-    kind: str
-    name: str
-    dimensions: int | None = None
-    inputs: int = 0
-    findings: list[Finding] = field(default_factory=list)
-    note: str = ""
-
-    @property
-    def place(self) -> str:
-        return f"{self.kind} {self.name}" + (f", {self.dimensions}D" if self.dimensions else "")
-
-    def found(
-        self, bad: np.ndarray, what: str, example: Callable[[int], str], cure: str, *values: np.ndarray
-    ) -> None:
-        """Record a finding where ``bad`` (n,) is true; ``what`` is formatted with the values of the first such row."""
-        at = np.flatnonzero(bad)
-        if len(at):
-            first = int(at[0])
-            of_row = (tuple(value[first].tolist()) if value.ndim > 1 else value[first].item() for value in values)
-            self.findings.append(Finding(what.format(*of_row), example(first), cure, f"{len(at)} of {len(bad)}"))
-
-
-@dataclass
-class Report:
-    """The findings for one plugin."""
-
-    plugin: str
-    subjects: list[Subject] = field(default_factory=list)
-
-    @property
-    def findings(self) -> int:
-        return sum(len(subject.findings) for subject in self.subjects)
-
-    def subject(self, kind: str, name: str, dimensions: int | None = None) -> Subject:
-        made = Subject(kind, name, dimensions)
-        self.subjects.append(made)
-        return made
-
-
-def pose_shown(poses: Poses, at: int) -> str:
-    """The input of a pair function, as text."""
-    d = tuple(poses.d[at].tolist())
-    return f"{KINDS[poses.kind[at]][0]}: a = {row_shown(poses.a, at)}, b = {row_shown(poses.b, at)}, d = {d}"
-
-
-def row_shown(rows: Rows, at: int) -> str:
-    parameters = rows.at(at)
-    turned = rows.shape.rotates and (rows.axes[at] != np.eye(len(rows.axes[at]))).any()
-    axes = f", axes={plain(parameters.axes)!r}" if turned else ""
-    return shown(parameters)[:-1].removesuffix(", ") + axes + ")"
+def poses(first: Shape, second: Shape, dimensions: int, examples: np.ndarray) -> Poses:
+    """Pairs of the two shapes, of each example (n, WIDTH) one of each kind: mostly so near that their boxes touch or
+    nearly do."""
+    kind = np.tile(np.arange(len(KINDS)), len(examples))
+    numbers = Numbers(np.repeat(examples, len(KINDS), axis=0))
+    size_a, size_b, how = (np.array([each[k] for each in KINDS])[kind] for k in (1, 2, 3))
+    a, b = rows(first, size_a, dimensions, numbers), rows(second, size_b, dimensions, numbers)
+    sizes = (size_of(a.half) + size_of(b.half))[:, None]
+    reach = sum(np.where(np.isfinite(each.half), each.half, sizes) for each in (a, b))
+    near = numbers(NEAR, dimensions)[np.arange(len(kind)), kind % NEAR]
+    axis, distance, anywhere = numbers()[:, None], numbers()[:, None], numbers.directions(dimensions)
+    along = np.sign(axis) * np.eye(dimensions)[(dimensions * np.abs(axis[:, 0])).astype(int)]
+    at = {
+        "near": 1.3 * reach * near,
+        "axes": reach * along * np.floor(1.0 + 3.0 * np.abs(distance)) / 2.0,
+        "coincident": 0.0 * reach,
+        "close": 1e-9 * sizes * anywhere,
+        "far": 10.0 ** (2.0 + 7.0 * np.abs(distance)) * sizes * anywhere,
+    }
+    d = np.select([(how == name)[:, None] for name in at], list(at.values()))
+    steps = numbers.directions(dimensions) * 10.0 ** (-6.0 * np.abs(numbers()[:, None]))
+    ways = (numbers(dimensions) * sizes - d) * (1.75 + 1.25 * numbers()[:, None])
+    return Poses(a, b, d, kind, steps, ways)

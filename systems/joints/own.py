@@ -17,17 +17,23 @@ from ...framework.data.arrays.column import ArrayColumn
 from ...framework.data.columns import REQUIRED
 from ...framework.data.component import Component
 from ...framework.errors import PluginError
+from ...framework.plugins.laws import Law
 
 # What functions do not see of a joint.
 HIDDEN = ("a", "b", "collide_connected", "breaking_force", "breaking_torque", "attached", "changed")
 ARGUMENTS = ("joint", "a", "b")
 ROW_FIELDS = "(value, along_a, turn_a, along_b, turn_b)"
-
-# (position, axes) of two bodies to try functions with.
-SAMPLE_PLACES: Any = (
-    ((0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))),
-    ((1.0, 0.5, -0.25), ((0.8, 0.6, 0.0), (-0.6, 0.8, 0.0), (0.0, 0.0, 1.0))),
+CHANGE = (
+    "along_a . v_a + turn_a . w_a + along_b . v_b + turn_b . w_b is the change of the value per second; a push at an "
+    "arm turns by moment(arm, push)"
 )
+STEP = 1e-6  # m and rad
+RATE = 1e-3  # of the vectors: by so much the change of the value may differ
+
+# Positions and rotation matrices of two bodies to try functions with, and how they move.
+SAMPLE_PLACES = np.array(((0.0, 0.0, 0.0), (1.0, 0.5, -0.25)))
+MATRICES = np.array((np.eye(3), ((0.8, -0.6, 0.0), (0.6, 0.8, 0.0), (0.0, 0.0, 1.0))))
+WAYS = np.array((((0.5, -0.2, 0.1), (0.3, 0.7, -0.4)), ((0.8, 0.0, -0.3), (-0.6, 0.0, 0.2))))
 
 
 @dataclass(frozen=True)
@@ -93,6 +99,38 @@ def rows_of(component: Any, joint: Any, a: Placed, b: Placed) -> tuple[Any, ...]
     return (made,) if _is_single(made) else made
 
 
+def numbers_at(component: Any, joint: Any, places: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """(n, rows, 1 + 4 d) values and vectors where the bodies are at ``places`` (n, 2, d), m, with rotation matrices
+    ``axes`` (n, 2, d, d); NaN for values that are not told."""
+    found = []
+    for at, matrices in zip(places, axes, strict=True):
+        bodies = (Placed(tuple(p), tuple(map(tuple, matrix.T))) for p, matrix in zip(at, matrices, strict=True))
+        with np.errstate(all="ignore"):
+            rows = rows_of(component, joint, *bodies)
+        found.append([(np.nan if row[0] is None else row[0], *np.ravel(row[1:])) for row in rows])
+    return np.array(found, float)
+
+
+def change_law(component: Any, joint: Any, places: np.ndarray, axes: np.ndarray, ways: np.ndarray) -> Law:
+    """The vectors of each row are the change of its value, for bodies that move by ``ways`` (n, 2, 2, d) m and rad."""
+    turns = ways[:, 1]
+    if places.shape[-1] == 3:
+        turned = np.cross(turns[..., None, :], axes.swapaxes(-1, -2)).swapaxes(-1, -2)
+    else:
+        turned = turns[..., :1, None] * np.stack((-axes[..., 1, :], axes[..., 0, :]), axis=-2)
+    behind, ahead = (
+        numbers_at(component, joint, places + step * ways[:, 0], axes + step * turned)[..., 0] for step in (-STEP, STEP)
+    )
+    vectors = numbers_at(component, joint, places, axes)[..., 1:]
+    said = (vectors * ways.swapaxes(1, 2).reshape(len(ways), 1, -1)).sum(axis=-1)
+    true = (ahead - behind) / (2 * STEP)
+    wrong = np.abs(said - true) > RATE * (1.0 + np.abs(vectors).sum(axis=-1))
+    row = wrong.argmax(axis=1)
+    true, said = (np.take_along_axis(each, row[:, None], axis=1)[:, 0] for each in (true, said))
+    what = "row {}: its value changes by {:.6g}, by its vectors {:.6g}"
+    return Law(wrong.any(axis=1), what, CHANGE, (row, true, said))
+
+
 def _is_single(made: Any) -> bool:
     """Whether that is one row, and no tuple of rows."""
     return not (isinstance(made, tuple) and made and isinstance(made[0], tuple))
@@ -132,11 +170,14 @@ def _try(where: str, component: Any, dimensions: int) -> tuple[bool, tuple[bool,
     """Whether the function returns one row, and for each whether it tells its value."""
     if dimensions not in component.dimensions:
         return True, ()
-    a, b = SAMPLE_PLACES
-    a, b = (Placed(p[:dimensions], tuple(axis[:dimensions] for axis in axes[:dimensions])) for p, axes in (a, b))
+    d, sample = dimensions, sample_of(component, dimensions)
+    a, b = (
+        Placed(tuple(place), tuple(map(tuple, axes)))
+        for place, axes in zip(SAMPLE_PLACES[:, :d].tolist(), MATRICES[:, :d, :d].swapaxes(1, 2).tolist(), strict=True)
+    )
     said = f"{where}: constraint, tried in {dimensions}D,"
     try:
-        made = component.constraint(custom_parameters(sample_of(component, dimensions), dimensions), a, b)
+        made = component.constraint(custom_parameters(sample, dimensions), a, b)
     except Exception as error:  # whatever it raises, its author has to hear of
         raise PluginError(f"{said} raised {type(error).__name__}: {error}") from error
     rows = (made,) if _is_single(made) else made
@@ -149,6 +190,9 @@ def _try(where: str, component: Any, dimensions: int) -> tuple[bool, tuple[bool,
                 raise PluginError(f"{said} returned {vector!r} as {name}: return a tuple of {dimensions} numbers{flat}")
         if row[0] is not None and not _is_finite(row[0]):
             raise PluginError(f"{said} returned {row[0]!r} as value: return a number, or None for the sum of changes")
+    law = change_law(component, sample, SAMPLE_PLACES[None, :, :d], MATRICES[None, :, :d, :d], WAYS[None, :, :, :d])
+    if law.is_broken:
+        raise PluginError(f"{said}: {law.said(0)}: {law.cure}")
     return _is_single(made), tuple(row[0] is not None for row in rows)
 
 

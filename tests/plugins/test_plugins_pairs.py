@@ -12,6 +12,7 @@ from carom.components.colliders import Collider
 from carom.framework import Plugin, Settings, StepError, System, UnhandledPairError, World, column
 from carom.framework.vectors import divided, length, scale
 from carom.plugins import Physics
+from carom.plugins.standard_sweeps import ball
 from carom.systems import Integrator
 
 pytestmark = pytest.mark.plain
@@ -171,7 +172,7 @@ def test_a_sweep_that_fails_names_itself():
 
     @plugin.sweep(fragile, fragile)
     def late(a, b, d, v):
-        return (True, 2.0) if 5.0 < max(a.reach, b.reach) < 6.0 else (False, 0.0)
+        return (True, 2.0) if 5.0 < max(a.reach, b.reach) < 6.0 else ball(d, v, a.reach + b.reach)
 
     world = World(Physics(), plugin, settings=Settings(collision="continuous"))
     first = world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(2000, 0)), fragile(1.0))

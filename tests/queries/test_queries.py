@@ -15,6 +15,7 @@ from carom.components.colliders import Collider
 from carom.framework import Phase, Plugin, PluginError, System, World, column
 from carom.framework.vectors import divided, length, replace, scale
 from carom.plugins import Physics, capsule
+from carom.plugins.standard_sweeps import ball as ball_sweep
 from carom.systems.queries import batch
 
 
@@ -338,7 +339,7 @@ def test_queries_grow_with_the_world():
             assert world.neighbours(1000.0).counts.tolist() == [k] * (k + 1)
 
 
-RAISES, NOT_FINITE, LATE_SWEEP = 1.0, 2.0, 3.0
+RAISES, NOT_FINITE, LATE_SWEEP, NO_SWEEP = 1.0, 2.0, 3.0, 4.0
 
 
 def fragile_plugin():
@@ -363,6 +364,8 @@ def fragile_plugin():
 
     @plugin.sweep(SphereCollider, FragileCollider)
     def sphere_fragile_sweep(a, b, d, v):
+        if b.fault < LATE_SWEEP:
+            return ball_sweep(d, v, a.radius + 1.0)
         return b.fault == LATE_SWEEP, 7.0
 
     return plugin, FragileCollider
@@ -405,4 +408,4 @@ def test_errors_in_functions_of_plugins_name_plugin_pair_and_entity(fault, name,
 
 
 def test_a_sweep_may_say_that_there_is_no_touch():
-    assert QUERIES["cast"](fragile_world(0.0)[0]) == []
+    assert QUERIES["cast"](fragile_world(NO_SWEEP)[0]) == []

@@ -149,7 +149,7 @@ EXTREMES = {  # radius, half height, direction, half extents, offset; depth
 
 
 @both_dimensions
-@pytest.mark.parametrize("size", [1.0, 1e-150, 1e150])
+@pytest.mark.parametrize("size", [1.0, 1e-150, 1e143])
 @pytest.mark.parametrize("name", EXTREMES)
 def test_extremes(d, name, size):
     radius, half_height, direction, box, offset, depth = EXTREMES[name]

@@ -10,8 +10,9 @@ import pytest
 from worlds import registry
 
 from carom.components import AABBCollider, SphereCollider
+from carom.framework.plugins.laws import size_of
 from carom.lab.plugins.kernels import PairCode
-from carom.lab.plugins.samples import Poses, Rows, poses
+from carom.lab.plugins.samples import WIDTH, Poses, Rows, poses
 from carom.plugins import capsule, convex_hull, convex_polygon, half_space, one_way_segment
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_hull import FIRST, ConvexHullCollider
@@ -81,9 +82,14 @@ def test_depth_and_normal_of(first, second, d):
     pair = REGISTRY.pair(first, second)
     assert pair is not None
     first, second = pair.first, pair.second
-    cases = poses(REGISTRY.shapes[first], REGISTRY.shapes[second], d, seed=5)
+    examples = np.random.default_rng(5).uniform(-1, 1, (1000, WIDTH))
+    cases = poses(REGISTRY.shapes[first], REGISTRY.shapes[second], d, examples)
     found = PairCode(pair, REGISTRY.shapes[first], REGISTRY.shapes[second], d)(cases.a, cases.b, cases.d)
-    allowed = ROUNDING * cases.scale()
+    scale = np.linalg.norm(cases.d, axis=1) + size_of(cases.a.half) + size_of(cases.b.half)
+    allowed = ROUNDING * scale
+    if first is second is CapsuleCollider:  # far from the centres rounding turns the normal of segments that are close
+        apart = np.abs(cases.a.arrays["radius"] + cases.b.arrays["radius"] - found.depth)
+        allowed = allowed + np.finfo(float).eps * scale**2 / apart
     np.testing.assert_allclose(np.linalg.norm(found.normal, axis=1), 1.0, rtol=0, atol=1e-12)
     assert (found.hit == (found.depth >= 0.0)).all()
     if HalfSpaceCollider in (first, second):  # only its own direction counts
