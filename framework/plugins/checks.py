@@ -10,9 +10,9 @@ import collections
 import inspect
 import math
 import numbers
-from collections.abc import Iterable, Iterator, Sequence
-from functools import partial
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Iterator
+from itertools import repeat
+from typing import Any
 
 import numpy as np
 
@@ -20,15 +20,16 @@ from ..data.component import Component
 from ..errors import PluginError
 from ..jit.records.schema import Column, Schema
 from ..schedule.stages import answers
-from .laws import Contacts, Law, Trial, mixing_laws, pair_laws, plain, shape_laws, sweep_laws
+from .laws import Contacts, Law, Support, Trial, mixing_laws, pair_laws, plain, shape_laws, sweep_laws
 from .registry import Convex, Shape
 
+# Functions of a shape: their arguments, and what they return.
 SHAPE_FUNCTIONS = {
-    "bounds": ("shape", "dimensions"),
-    "support": ("shape", "direction"),
-    "rounding": ("shape",),
-    "turned": ("shape", "axes"),
-    "second_moments": ("shape", "dimensions"),
+    "bounds": (("shape", "dimensions"), "half extents of the box around it"),
+    "support": (("shape", "direction"), "a point"),
+    "rounding": (("shape",), "how far it reaches beyond its core"),
+    "turned": (("shape", "axes"), ""),
+    "second_moments": (("shape", "dimensions"), "measure, centre, means of xx, xy, yy (in 3D xx, yy, zz, xy, xz, yz)"),
 }
 POSES = np.array(((1.0, 0.0, 0.0), (0.3, -0.2, 0.1), (0.0, 0.0, 0.0), (-2.0, 3.0, 1.0)))  # of b as seen from a
 STEPS = np.array(((0.1, 0.2, 0.0), (-0.3, 0.1, 0.2), (0.0, 0.5, -0.1), (0.04, -0.06, -0.02)))
@@ -37,13 +38,63 @@ VALUES = np.array(((0.0, 0.0), (0.25, 1.0), (1.0, 0.5), (3.0, 0.0)))  # of both 
 HELPERS = {0: (), 1: ("support", "rounding"), 2: ("a_support", "b_support", "a_rounding", "b_rounding")}
 
 
-def require(where: Sequence[Any], laws: Iterable[Law]) -> None:
+class PlainFunction:
+    """A plugin's function, called as plain Python for many inputs; PluginError if it takes other arguments, raises, or
+    returns something else.
+
+    names
+        of its arguments
+    returns, form
+        what it returns, in words; for each part of it bool, float, or how many numbers a tuple has
+    """
+
+    def __init__(self, where: str, function: Any, names: tuple[str, ...], returns: str, *form: Any) -> None:
+        self.where, self.function, self.names = where, plain_function(function), names
+        self.returns, self.form = returns, form
+        if not inspect.isfunction(self.function):
+            raise PluginError(f"{where}: register a plain function; carom compiles it itself; got {function!r}")
+        _check_arity(where, self.function, names)
+
+    def __call__(self, *columns: Any) -> tuple[np.ndarray, ...]:
+        """An array for each part of what it returns, for inputs that stand one after the other in the columns."""
+        results = []
+        for row in zip(*columns, strict=False):
+            given = tuple(tuple(value) if isinstance(value, np.ndarray) else value for value in row)
+            found = self._called(given)
+            parts = found if len(self.form) > 1 else (found,)
+            if not (isinstance(parts, tuple) and len(parts) == len(self.form) and all(map(_fits, parts, self.form))):
+                forms = ", ".join({bool: "True or False", float: "a number"}.get(kind) or f"a tuple of {kind} numbers"
+                                  for kind in self.form)  # fmt: skip
+                cure = f"return {self.returns}: {forms}"
+                raise PluginError(f"{self.at(*given)} it returned {plain(found)!r}: {cure}")
+            results.append(parts)
+        kinds = (bool if kind is bool else float for kind in self.form)
+        return tuple(map(np.array, zip(*results, strict=True), kinds))
+
+    def at(self, *given: Any) -> str:
+        """Which function, and the input."""
+        return f"{self.where}: for {', '.join(f'{n} = {shown(v)}' for n, v in zip(self.names, given, strict=False))}"
+
+    def _called(self, given: tuple[Any, ...]) -> Any:
+        try:
+            with np.errstate(all="ignore"):
+                return self.function(*given)
+        except ZeroDivisionError as error:
+            raise PluginError(f"{self.at(*given)} it divides by zero; handle that case first") from error
+        except AttributeError as error:
+            fields = ", ".join(getattr(given[0], "_fields", ()))
+            raise PluginError(f"{self.at(*given)} {error}{f' (it has {fields})' if fields else ''}") from error
+        except Exception as error:  # whatever the plugin's function raises, its author has to hear of
+            raise PluginError(f"{self.at(*given)} it raised {type(error).__name__}: {error}") from error
+
+
+def require(where: Callable[[int], str], laws: Iterable[Law]) -> None:
     """PluginError for the first law that one of a few inputs breaks; it begins with ``where`` of that input."""
     with np.errstate(all="ignore"):
         for law in laws:
             if law.most is None and law.is_broken:
                 row = int(np.argmax(law.broken))
-                raise PluginError(f"{where[row]} {law.said(row)}: {law.cure}")
+                raise PluginError(f"{where(row)} {law.said(row)}: {law.cure}")
 
 
 # -- shapes ---------------------------------------------------------------------------------------
@@ -51,7 +102,7 @@ def require(where: Sequence[Any], laws: Iterable[Law]) -> None:
 
 def check_shape(plugin: Any, component: Any, cost: float) -> None:
     """PluginError unless the class can be a shape; also tries its functions."""
-    where = f"plugin {plugin.name}: shape {getattr(component, '__name__', component)!s}"
+    where = f"plugin {plugin.name}: shape {_name(component)}"
     if not (isinstance(component, type) and issubclass(component, Component)) or component._abstract:
         raise PluginError(f"{where}: a shape is a class derived from Collider, got {component!r}")
     if getattr(component, "stack", None) is None:
@@ -61,194 +112,99 @@ def check_shape(plugin: Any, component: Any, cost: float) -> None:
     allowed = getattr(component, "dimensions", (2, 3))
     if not isinstance(allowed, tuple) or not allowed or not set(allowed) <= {2, 3}:
         raise PluginError(f"{where}: dimensions must be (2,), (3,) or (2, 3), got {allowed!r}")
-    for name, arguments in SHAPE_FUNCTIONS.items():
-        function = inspect.getattr_static(component, name, None)
-        function = getattr(function, "__func__", function)
-        if function is None and name == "bounds":
-            raise PluginError(
-                f"{where} has no bounds: write bounds(shape, dimensions) that returns the half extents of the box "
-                f"around it, a tuple of {allowed[0]} numbers"
-            )
-        if function is not None and not inspect.isfunction(function):
-            raise PluginError(f"{where}: {name} must be a function, got {function!r}")
-        if function is not None:
-            _check_arity(f"{where}: {name}", function, arguments)
     for dimensions in allowed:
-        sample = parameters_of(component, dimensions)
-        _check_moments(where, component, sample, dimensions)
-        half = _bounds(where, component, sample, dimensions)
-        support = _support(where, component, [sample] * len(POSES))
         look, other = (np.delete(poses[:, :dimensions], 2, axis=0) for poses in (POSES, STEPS))
-        laws = shape_laws(np.array([half] * len(look)), support, look, other)
-        require([f"{where}: for {shown(sample)} in {dimensions}D"] * len(look), laws)
+        samples = [parameters_of(component, dimensions)] * len(look)
+        _shape_function(where, component, "turned", dimensions)
+        moments = _shape_function(where, component, "second_moments", dimensions)
+        if moments is not None:
+            (found,) = moments(samples[:1], [dimensions])[0]
+            squares = found[[3, 5] if dimensions == 2 else [4, 5, 6]]
+            if not np.isfinite(found).all() or found[0] < 0 or squares.min() < 0:
+                cure = "numbers are finite, measure and squares not negative"
+                raise PluginError(f"{moments.at(samples[0], dimensions)} it returned {plain(found)!r}: {cure}")
+        half, support = _extents(where, component, samples, dimensions)
+        said = f"{where}: for {shown(samples[0])} in {dimensions}D"
+        require(lambda row, said=said: said, shape_laws(half, support, look, other))
 
 
-def _bounds(where: str, component: Any, sample: Any, dimensions: int) -> tuple[float, ...]:
-    what = "half extents of the box around it"
-    return _vector_of(f"{where}: bounds", component.bounds, (sample, dimensions), dimensions, what)
-
-
-def _support(where: str, component: Any, samples: list[Any]) -> Any:
-    """Support and rounding of each sample in a direction per row; None if the class has no support."""
-    if not hasattr(component, "support"):
-        return None
-    rounding = getattr(component, "rounding", lambda shape: 0.0)
-
-    def support(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        points, beyond = [], []
-        for sample, direction in zip(samples, directions, strict=False):
-            given = (sample, tuple(direction))
-            points.append(_vector_of(f"{where}: support", component.support, given, len(direction), "a point"))
-            beyond.append(_call(f"{where}: rounding", rounding, (sample,)))
-            if not _is_number(beyond[-1]):
-                raise PluginError(f"{where}: rounding for {shown(sample)} returned {beyond[-1]!r}: return a number")
-        return np.array(points, float), np.array(beyond, float)
-
-    return support
-
-
-def _check_moments(where: str, component: Any, sample: Any, dimensions: int) -> None:
-    """Measure, centre and second moments of a sample: squares have no mean below zero."""
-    if not hasattr(component, "second_moments"):
-        return
-    what = f"measure, centre, means of {'xx, xy, yy' if dimensions == 2 else 'xx, yy, zz, xy, xz, yz'}"
-    where, count = f"{where}: second_moments", 1 + dimensions + dimensions * (dimensions + 1) // 2
-    found = _vector_of(where, component.second_moments, (sample, dimensions), count, what)
-    squares = (found[3], found[5]) if dimensions == 2 else found[4:7]
-    if not all(map(math.isfinite, found)) or found[0] < 0 or min(squares) < 0:
+def _shape_function(where: str, component: Any, name: str, dimensions: int) -> PlainFunction | None:
+    function = inspect.getattr_static(component, name, None)
+    function = getattr(function, "__func__", function)
+    if function is None and name == "bounds":
         raise PluginError(
-            f"{where} for {shown(sample)} returned {plain(found)!r}: numbers are finite, measure and squares not "
-            f"negative"
+            f"{where} has no bounds: write bounds(shape, dimensions) that returns the half extents of the box around "
+            f"it, a tuple of {dimensions} numbers"
         )
+    moments = 1 + dimensions + dimensions * (dimensions + 1) // 2
+    form = {"rounding": float, "second_moments": moments}.get(name, dimensions)
+    return None if function is None else PlainFunction(f"{where}: {name}", function, *SHAPE_FUNCTIONS[name], form)
 
 
-def _vector_of(where: str, function: Any, arguments: tuple[Any, ...], count: int, what: str) -> tuple[float, ...]:
-    """What a function of a shape returns, if it is a tuple of so many numbers."""
-    found = _call(where, function, arguments)
-    if not _is_vector(found, count):
-        given = ", ".join((shown(arguments[0]), *(repr(plain(each)) for each in arguments[1:])))
-        raise PluginError(f"{where}({given}) returned {plain(found)!r}: return {what}, a tuple of {count} numbers")
-    return found
+def _extents(where: str, component: Any, samples: list[Any], dimensions: int) -> tuple[np.ndarray, Support | None]:
+    """Half extents of n samples, and what gives their support and rounding, None without these."""
+    bounds, support, rounding = (
+        _shape_function(where, component, name, dimensions) for name in ("bounds", "support", "rounding")
+    )
+
+    def supported(direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        beyond = np.zeros(len(samples)) if rounding is None else rounding(samples)[0]
+        return support(samples, direction)[0], beyond  # type: ignore[misc]
+
+    return bounds(samples, repeat(dimensions))[0], None if support is None else supported  # type: ignore[misc]
 
 
 # -- pairs ----------------------------------------------------------------------------------------
-
-
-def contacts_of(where: str, function: Any, *helpers: Any) -> Any:
-    """(a, b, d) -> Contacts of a pair function as plain Python, for lists of n parameter tuples and d (n, d);
-    PluginError if it returns what is no contact."""
-
-    def contact(*pose: Any) -> tuple[Any, ...]:
-        at, n = _Pose(where, *pose), len(pose[2])
-        result = _call(at, function, (*pose, *helpers))
-        if not (isinstance(result, tuple) and len(result) == 4):
-            raise PluginError(f"{at} it returned {plain(result)!r}: return (hit, depth, normal, point)")
-        if not isinstance(result[0], (bool, np.bool_)) or not _is_number(result[1]):
-            cure = "hit, the first value, must be True or False, depth, the second, a number"
-            raise PluginError(f"{at} it returned {plain(result)!r}: {cure}")
-        if not (_is_vector(result[2], n) and _is_vector(result[3], n)):
-            flat = "; a shape of 2D worlds only has dimensions = (2,)" if n == 3 else ""
-            cure = f"normal and point must be tuples of {n} numbers{flat}"
-            raise PluginError(f"{at} it returned {plain(result)!r}: {cure}")
-        return result
-
-    def contacts(a: list[Any], b: list[Any], d: np.ndarray) -> Contacts:
-        hit, *rest = zip(*map(contact, a, b, map(tuple, d)), strict=True)
-        return Contacts(np.array(hit, bool), *(np.array(values, float) for values in rest))
-
-    return contacts
-
-
-def _sweeps_of(where: str, function: Any) -> Any:
-    """The same of a sweep, which returns (hit, time)."""
-
-    def sweep(*pose: Any) -> tuple[Any, ...]:
-        at = _Pose(where, *pose)
-        result = _call(at, function, pose)
-        fits = isinstance(result, tuple) and len(result) == 2 and isinstance(result[0], (bool, np.bool_))
-        if not fits or not _is_number(result[1]):
-            raise PluginError(f"{at} it returned {plain(result)!r}: return (hit, time)")
-        return result
-
-    def sweeps(a: list[Any], b: list[Any], d: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        hit, time = zip(*map(sweep, a, b, map(tuple, d), map(tuple, v)), strict=True)
-        return np.array(hit, bool), np.array(time, float)
-
-    return sweeps
-
-
-class _Pose(NamedTuple):
-    """The input of a pair's function, as messages show it."""
-
-    where: str
-    a: Any
-    b: Any
-    d: Any
-    v: Any = ()
-
-    def __str__(self) -> str:
-        way = f", v = {plain(self.v)}" if self.v else ""
-        return f"{self.where}: for a = {shown(self.a)}, b = {shown(self.b)}, d = {plain(self.d)}{way}"
-
-
-def _trials(where: str, first: Any, second: Any, function: Any, sweep: Any = None) -> Iterator[Trial]:
-    """Four poses of two samples, in every dimension both can be in; none of Convex."""
-    for dimensions in () if Convex in (first, second) else sorted({*_dimensions(first)} & {*_dimensions(second)}):
-        a, b = ([parameters_of(each, dimensions)] * len(POSES) for each in (first, second))
-        d, steps = POSES[:, :dimensions], STEPS[:, :dimensions]
-        given = ((first, a), (second, b))
-        one, two = (np.array([_bounds(where, shape, each[0], dimensions)] * len(d), float) for shape, each in given)
-        supports: Any = tuple(_support(where, *each) for each in given)
-        calls = contacts_of(where, function), _sweeps_of(where, sweep)
-        supports = None if None in supports else supports
-        yield Trial(*calls, a, b, d, (one, two), steps, -2.0 * d, supports, first is second)
-
-
-def _check_function(where: str, function: Any, first: Any, second: Any, arguments: tuple[str, ...]) -> str:
-    """What messages about it begin with; PluginError unless it is a function of these arguments and the helpers'."""
-    where = f"{where} {getattr(function, '__name__', repr(function))} of {_name(first)} and {_name(second)}"
-    if not inspect.isfunction(plain_function(function)):
-        raise PluginError(f"{where}: register a plain function; carom compiles it itself")
-    convex = (first is Convex) + (second is Convex)
-    _check_arity(where, plain_function(function), (*arguments, *HELPERS[convex]))
-    return where
 
 
 def check_pair(plugin: Any, first: Any, second: Any, function: Any) -> None:
     """PluginError unless the function can be that of the two shapes; also tries it."""
     for shape in (first, second):
         if shape is not Convex and not (isinstance(shape, type) and issubclass(shape, Component)):
-            raise PluginError(
-                f"plugin {plugin.name}: pair of {_name(first)} and {_name(second)}: a pair is of two collider classes, "
-                f"or one and Convex, got {shape!r}"
-            )
-    where = _check_function(f"plugin {plugin.name}: pair", function, first, second, ("a", "b", "d"))
-    for trial in _trials(where, first, second, function):
-        require(list(map(partial(_Pose, where), trial.a, trial.b, map(tuple, trial.d))), pair_laws(trial))
+            where = f"plugin {plugin.name}: pair of {_name(first)} and {_name(second)}"
+            raise PluginError(f"{where}: a pair is of two collider classes, or one and Convex, got {shape!r}")
+    for trial, called in _trials(plugin, "pair", first, second, function):
+        require(lambda row, t=trial, at=called.at: at(t.a[row], t.b[row], t.d[row]), pair_laws(trial))
 
 
 def check_sweep(plugin: Any, first: Any, second: Any, function: Any) -> None:
-    where = f"plugin {plugin.name}: sweep"
     if (first, second) not in plugin.pairs:
+        where = f"plugin {plugin.name}: sweep of {_name(first)} and {_name(second)}"
         raise PluginError(f"{where}: register the pair itself first, with @plugin.pair in the same order")
-    where = _check_function(where, function, first, second, ("a", "b", "d", "v"))
-    for trial in _trials(where, first, second, plugin.pairs[first, second].function, function):
-        require(
-            list(map(partial(_Pose, where), trial.a, trial.b, map(tuple, trial.d), map(tuple, trial.ways))),
-            sweep_laws(trial),
-        )
+    pairs = _trials(plugin, "pair", first, second, plugin.pairs[first, second].function)
+    sweeps = _trials(plugin, "sweep", first, second, function)
+    for (trial, called), (pair, _) in zip(sweeps, pairs, strict=True):
+        trial.call, trial.sweep = pair.call, called  # type: ignore[assignment]
+        require(lambda row, t=trial, at=called.at: at(t.a[row], t.b[row], t.d[row], t.ways[row]), sweep_laws(trial))
 
 
 def check_corner(plugin: Any, first: Any, second: Any, corner: Any) -> None:
     """PluginError unless it is None or can tell corners."""
-    if corner is None:
-        return
-    where = _check_function(f"plugin {plugin.name}: corner", corner, first, second, ("a", "b", "d", "slop"))
-    for trial in _trials(where, first, second, None):
-        for a, b, d in zip(trial.a, trial.b, map(tuple, trial.d), strict=True):
-            result = _call(where, corner, (a, b, d, np.float64(0.01)))
-            if not isinstance(result, (bool, np.bool_)):
-                raise PluginError(f"{where}: for d = {plain(d)} it returned {plain(result)!r}: return True or False")
+    if corner is not None:
+        for trial, called in _trials(plugin, "corner", first, second, corner):
+            called(trial.a, trial.b, trial.d, repeat(np.float64(0.01)))
+
+
+def _trials(plugin: Any, kind: str, first: Any, second: Any, function: Any) -> Iterator[tuple[Trial, PlainFunction]]:
+    """Four poses of two samples, in every dimension both can be in, and the function of that kind; none of Convex."""
+    where = f"plugin {plugin.name}: {kind} {_name(function)} of {_name(first)} and {_name(second)}"
+    helpers = HELPERS[(first is Convex) + (second is Convex)]
+    for d in (2,) if helpers else sorted({*_dimensions(first)} & {*_dimensions(second)}):
+        names, returns, *form = {
+            "pair": (("a", "b", "d"), "(hit, depth, normal, point)", bool, float, d, d),
+            "sweep": (("a", "b", "d", "v"), "(hit, time)", bool, float),
+            "corner": (("a", "b", "d", "slop"), "whether only corners touch", bool),
+        }[kind]
+        called = PlainFunction(where, function, (*names, *helpers), returns, *form)
+        if helpers:
+            return
+        a, b = ([parameters_of(each, d)] * len(POSES) for each in (first, second))
+        (one, core_a), (two, core_b) = (_extents(where, *each, d) for each in ((first, a), (second, b)))
+        yield Trial(
+            lambda a, b, d, called=called: Contacts(*called(a, b, d)), None, a, b, POSES[:, :d], (one, two),
+            STEPS[:, :d], -2.0 * POSES[:, :d], None if core_a is None or core_b is None else (core_a, core_b),
+            first is second,
+        ), called  # fmt: skip
 
 
 # -- other things ---------------------------------------------------------------------------------
@@ -281,20 +237,13 @@ def check_broad_phase(plugin: Any, name: str, broad_phase: Any) -> None:
 def check_mixing_rule(plugin: Any, name: str, function: Any) -> None:
     where = f"plugin {plugin.name}: mixing rule {name!r}"
     check_name(where, name)
-    if not inspect.isfunction(function):
-        raise PluginError(f"{where}: register a plain function of two numbers, got {function!r}")
-    _check_arity(where, function, ("x", "y"))
-    require([f"{where}:"] * len(VALUES), mixing_laws(*mixed(where, function, VALUES)))
+    require(lambda row: f"{where}:", mixing_laws(*mixed(where, function, VALUES)))
 
 
 def mixed(where: str, function: Any, values: np.ndarray) -> tuple[np.ndarray, ...]:
     """x, y and what the rule makes of them in this and in the other order, for ``values`` (n, 2)."""
-    found = []
-    for x, y in values.tolist():
-        found.append((x, y, _call(where, function, (x, y)), _call(where, function, (y, x))))
-        if not all(map(_is_number, found[-1])):
-            raise PluginError(f"{where}: for {x} and {y} it returned {found[-1][2]!r}: return a number from 0")
-    return tuple(np.array(found, float).T)
+    called, (x, y) = PlainFunction(where, function, ("x", "y"), "a number from 0", float), values.T
+    return x, y, *called(x.tolist(), y.tolist()), *called(y.tolist(), x.tolist())
 
 
 def check_filter(plugin: Any, function: Any) -> None:
@@ -375,19 +324,6 @@ def parameters_of(component: Any, dimensions: int) -> Any:
     return collections.namedtuple(component.__name__, values)(**values)
 
 
-def _call(where: Any, function: Any, arguments: tuple[Any, ...]) -> Any:
-    try:
-        with np.errstate(all="ignore"):
-            return function(*arguments)
-    except ZeroDivisionError as error:
-        raise PluginError(f"{where}: it divides by zero; handle that case first") from error
-    except AttributeError as error:
-        fields = getattr(arguments[0], "_fields", ())
-        raise PluginError(f"{where}: {error}" + (f" (it has {', '.join(fields)})" if fields else "")) from error
-    except Exception as error:  # whatever the plugin's function raises, its author has to hear of
-        raise PluginError(f"{where}: it raised {type(error).__name__}: {error}") from error
-
-
 def _check_arity(where: str, function: Any, names: tuple[str, ...]) -> None:
     parameters = inspect.signature(function).parameters.values()
     plain_ones = [p for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
@@ -408,19 +344,21 @@ def _dimensions(component: Any) -> tuple[int, ...]:
     return tuple(getattr(component, "dimensions", (2, 3)))
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, numbers.Real) and not isinstance(value, (bool, np.bool_))
-
-
-def _is_vector(value: Any, dimensions: int) -> bool:
-    return isinstance(value, tuple) and len(value) == dimensions and all(map(_is_number, value))
+def _fits(value: Any, kind: Any) -> bool:
+    """Whether a part of a result is True or False, a number, or a tuple of so many numbers, as ``kind`` says."""
+    if isinstance(kind, int):
+        return isinstance(value, tuple) and len(value) == kind and all(_fits(each, float) for each in value)
+    truth = isinstance(value, (bool, np.bool_))
+    return truth if kind is bool else isinstance(value, numbers.Real) and not truth
 
 
 def _name(shape: Any) -> str:
     return getattr(shape, "__name__", repr(shape))
 
 
-def shown(parameters: Any) -> str:
-    """A parameter tuple without numpy's types, without axes."""
-    fields = ((name, value) for name, value in zip(parameters._fields, parameters, strict=True) if name != "axes")
-    return f"{type(parameters).__name__}({', '.join(f'{name}={plain(value)!r}' for name, value in fields)})"
+def shown(value: Any) -> str:
+    """A number, a tuple, or a parameter tuple without axes, all without numpy's types."""
+    if not hasattr(value, "_fields"):
+        return repr(plain(value))
+    fields = (f"{name}={plain(each)!r}" for name, each in zip(value._fields, value, strict=True) if name != "axes")
+    return f"{type(value).__name__}({', '.join(fields)})"

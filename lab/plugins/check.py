@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,8 @@ import numpy as np
 from ...components import RigidBody, SphereCollider, Transform
 from ...framework import CaromError, Convex, Plugin, PluginError, Settings, World
 from ...framework.jit.lazy import errors
-from ...framework.plugins.checks import contacts_of, mixed
-from ...framework.plugins.laws import Law, Trial, mixing_laws, pair_laws, shape_laws, sweep_laws
+from ...framework.plugins.checks import HELPERS, PlainFunction, mixed
+from ...framework.plugins.laws import Contacts, Law, Trial, mixing_laws, pair_laws, shape_laws, sweep_laws
 from ...framework.plugins.registry import Pair, Registry, Shape
 from ...plugins import Physics
 from ..cli.usage_errors import Problem, one_line
@@ -57,8 +58,8 @@ class Checked:
         law = self._broken(laws)
         if law is None:
             return
-        share = f"{law.broken.sum()} of {self.inputs}"
-        fits = {example.tobytes() for example, fault in zip(all_examples(), _by_example(law), strict=True) if not fault}
+        share, faults = f"{law.broken.sum()} of {self.inputs}", law.broken.reshape(len(all_examples()), -1).any(axis=1)
+        fits = {example.tobytes() for example in all_examples()[~faults]}  # need not be tried again
 
         def is_broken(example: np.ndarray) -> bool:
             return example.tobytes() not in fits and self._broken(tried(example)[0], law.what) is not None
@@ -86,10 +87,6 @@ class Checked:
                 law = Law(at, "the compiled function raised {}", RAISED, (error.texts,))
                 return law if what in ("", law.what) else None
         return None
-
-
-def _by_example(law: Law) -> np.ndarray:
-    return law.broken.reshape(len(all_examples()), -1).any(axis=1)
 
 
 def check_plugin(plugin: Plugin, others: list[Plugin], progress: Callable[[str], None] = lambda what: None) -> Any:
@@ -192,9 +189,11 @@ def _laws_of_pair(trial: Trial, pair: Pair) -> Iterator[Law]:
     yield from pair_laws(trial)
     if not trial.own:
         return
-    few = range(min(len(trial.d), PLAIN))
+    few, d = range(min(len(trial.d), PLAIN)), trial.d.shape[1]  # calls in Python are slow
+    names = ("a", "b", "d", *HELPERS[len(pair.helpers) // 2])
+    called = PlainFunction("as plain Python", pair.function, names, "(hit, depth, normal, point)", bool, float, d, d)
     a, b = ([rows.at(row) for row in few] for rows in (trial.a, trial.b))
-    there = contacts_of("as plain Python", pair.function, *pair.helpers)(a, b, trial.d[: len(few)])
+    there = Contacts(*called(a, b, trial.d[: len(few)], *map(repeat, pair.helpers)))
     here, differ = trial.contacts(trial.d), np.zeros(len(trial.d), bool)
     for k, slack in ((1, trial.tolerance), (2, np.full(len(differ), 1e-9)), (3, trial.tolerance)):
         apart = np.abs(here[k][: len(few)] - there[k]).reshape(len(few), -1).max(axis=1)
@@ -252,18 +251,15 @@ def _check_broad_phase(make: Any, checked: Checked) -> None:
         over = ((lower[:, None] <= upper[None]) & (lower[None] <= upper[:, None])).all(axis=2)
         expected = {(int(i), int(j)) for i, j in np.argwhere(np.triu(over, 1)) if i < moving}
         made = Counter(zip(*np.sort(make().pairs(lower, upper, moving), axis=0).tolist(), strict=True))
-        for what, wrong in (
-            ("misses", expected - set(made)),
-            ("makes twice", {pair for pair, times in made.items() if times > 1}),
-            ("makes of bodies at rest, or of one body,", {p for p in made if p[0] >= moving or p[0] == p[1]}),
-        ):
-            if wrong:
-                i, j = min(wrong)
-                boxes = f"{lower[i].tolist()} to {upper[i].tolist()} and {lower[j].tolist()} to {upper[j].tolist()}"
-                cure = "return each pair of rows whose boxes overlap once, at least one of both below moving"
-                what = f"it {what} the pair of rows {i} and {j} ({len(wrong)} pairs)"
-                checked.finding = what, f"{count} boxes, {moving} of them moving; {boxes}", cure
-                return
+        wrong = [pair for pair in expected if made[pair] != 1]
+        wrong += [(i, j) for (i, j), times in made.items() if times > 1 or i >= moving or i == j]
+        if wrong:
+            i, j = min(wrong)
+            boxes = f"{lower[i].tolist()} to {upper[i].tolist()} and {lower[j].tolist()} to {upper[j].tolist()}"
+            cure = "return each pair of rows whose boxes overlap once, at least one of both below moving"
+            what = f"it makes the pair of rows {i} and {j} {made[i, j]} times ({len(wrong)} pairs)"
+            checked.finding = what, f"{count} boxes, {moving} of them moving; {boxes}", cure
+            return
 
 
 def _check_world(plugin: Plugin, others: list[Plugin], integrator: str, checked: Checked) -> None:

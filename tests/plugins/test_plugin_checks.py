@@ -143,7 +143,7 @@ MISTAKES = {
         shape(support=lambda shape, direction: scale(direction, 0.1)), "for a direction of another length"
     ),
     "rounding is negative": (shape(**ROUND | {"rounding": lambda shape: -1.0}), "return a number from 0"),
-    "rounding is a vector": (shape(**ROUND | {"rounding": lambda shape: (1.0, 1.0)}), "return a number"),
+    "rounding is a vector": (shape(**ROUND | {"rounding": lambda shape: (1.0, 1.0)}), "its core: a number"),
     "moments too few": (shape(second_moments=lambda shape, dimensions: (1.0, 0.0)), "measure, centre, means of xx"),
     "moments negative": (
         shape(second_moments=lambda shape, dimensions: (1.0, 0.0, 0.0, -1.0, 0.0, 1.0)), "squares not negative"
@@ -163,10 +163,10 @@ MISTAKES = {
     "takes any number": (pair(lambda *all: None), r"takes \(\*all\), it must take 3 arguments"),
     "returns a number": (pair(lambda a, b, d: 1.0), r"return \(hit, depth, normal, point\)"),
     "returns three": (pair(lambda a, b, d: (True, 1.0, d)), r"return \(hit, depth, normal, point\)"),
-    "hit is a number": (pair(lambda a, b, d: (1, 1.0, d, d)), "hit, the first value, must be True or False"),
-    "depth is a vector": (pair(lambda a, b, d: (True, d, d, d)), "depth, the second, a number"),
-    "normal is a number": (pair(lambda a, b, d: (True, 1.0, 1.0, d)), "normal and point must be tuples of 2 numbers"),
-    "point is a number": (pair(lambda a, b, d: (True, 1.0, d, 0.0)), "normal and point must be tuples of 2 numbers"),
+    "hit is a number": (pair(lambda a, b, d: (1, 1.0, d, d)), r"point\): True or False, a number, a tuple"),
+    "depth is a vector": (pair(lambda a, b, d: (True, d, d, d)), r"point\): True or False, a number,"),
+    "normal is a number": (pair(lambda a, b, d: (True, 1.0, 1.0, d)), "a tuple of 2 numbers, a tuple of 2 numbers"),
+    "point is a number": (pair(lambda a, b, d: (True, 1.0, d, 0.0)), "a tuple of 2 numbers, a tuple of 2 numbers"),
     "divides by zero": (
         pair(lambda a, b, d: (True, 1.0 / math.hypot(*d), d, d) if not any(d) else disc_disc(a, b, d)),
         "divides by zero",
