@@ -357,8 +357,8 @@ def _name(shape: Any) -> str:
 
 
 def shown(value: Any) -> str:
-    """A number, a tuple, or a parameter tuple without axes, all without numpy's types."""
+    """A number, a tuple, or a parameter tuple, without numpy's types."""
     if not hasattr(value, "_fields"):
         return repr(plain(value))
-    fields = (f"{name}={plain(each)!r}" for name, each in zip(value._fields, value, strict=True) if name != "axes")
+    fields = (f"{name}={plain(each)!r}" for name, each in zip(value._fields, value, strict=True))
     return f"{type(value).__name__}({', '.join(fields)})"

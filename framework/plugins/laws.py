@@ -7,7 +7,7 @@ sizes of both shapes. For the generic pair, which iterates for smooth shapes, th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -44,7 +44,7 @@ class Law(NamedTuple):
     broken: np.ndarray
     what: str
     cure: str
-    values: tuple[np.ndarray, ...] = ()
+    values: Sequence[Any] = ()
     most: float | None = None
 
     @property

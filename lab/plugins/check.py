@@ -20,14 +20,13 @@ from ...framework.plugins.laws import Contacts, Law, Trial, mixing_laws, pair_la
 from ...framework.plugins.registry import Pair, Registry, Shape
 from ...plugins import Physics
 from ..cli.usage_errors import Problem, one_line
-from .joint_checks import joint_laws_of
+from .joint_checks import ALIKE, joint_laws_of
 from .kernels import PairCode, RaisedError, compiler_message, support_of
 from .samples import Numbers, all_examples, poses, rows, simplest
 
 BOXES = 400  # boxes given to a broad phase
 STEPS = 3
 PLAIN = 240  # inputs that are also tried as plain Python, which is slow
-ALIKE = "use what both know: numbers and tuples, math, carom.framework.vectors; no global that changes"
 COMPILES = (
     "use what numba compiles: numbers and tuples, math, carom.framework.vectors, helpers marked @plugin.kernel; return "
     "the same types on every way"
@@ -58,16 +57,17 @@ class Checked:
         law = self._broken(laws)
         if law is None:
             return
+        what = law.what
         share, faults = f"{law.broken.sum()} of {self.inputs}", law.broken.reshape(len(all_examples()), -1).any(axis=1)
         fits = {example.tobytes() for example in all_examples()[~faults]}  # need not be tried again
 
         def is_broken(example: np.ndarray) -> bool:
-            return example.tobytes() not in fits and self._broken(tried(example)[0], law.what) is not None
+            return example.tobytes() not in fits and self._broken(tried(example)[0], what) is not None
 
         example = simplest(is_broken)
         if example is not None:
             laws, shown = tried(example)
-            law = self._broken(laws, law.what) or law
+            law = self._broken(laws, what) or law
         row = int(np.argmax(law.broken))
         self.finding = f"{law.said(row)} ({share})", shown(row), law.cure
 
@@ -107,7 +107,8 @@ def check_plugin(plugin: Plugin, others: list[Plugin], progress: Callable[[str],
             progress(report[-1].place)
             _attempt(report[-1], run)
 
-    for component, shape in plugin.shapes.items():
+    shapes: dict[Any, Shape] = dict(plugin.shapes)
+    for component, shape in shapes.items():
         check("shape", component.__name__, component.dimensions, partial(_check_shape, shape))
     for pair in _pairs(plugin, registry):
         common = sorted({*pair.first.dimensions} & {*pair.second.dimensions})
@@ -123,13 +124,13 @@ def check_plugin(plugin: Plugin, others: list[Plugin], progress: Callable[[str],
             report.append(Checked("shape", component.__name__, note=f"no pair with {', '.join(lacking)}"))
     for name, rule in plugin.mixing_rules.items():
         check("mixing rule", name, [None], lambda checked, f=rule: checked.try_laws(partial(_mixing_laws, f)))
-    for component, joint in plugin.joints.items():
-        check("joint", component.__name__, component.dimensions,
-              lambda checked, j=joint: checked.try_laws(partial(joint_laws_of, j, checked.dimensions)))  # fmt: skip
+    joints: dict[Any, Any] = dict(plugin.joints)
+    for component, joint in joints.items():
+        check("joint", component.__name__, component.dimensions, partial(_check_joint, joint))
     for name, made in plugin.broad_phases.items():
         check("broad phase", name, (2, 3), partial(_check_broad_phase, made))
     if not built_in and not any(each.finding for each in report):  # a world would only tell the same in other words
-        known = {d for component in plugin.shapes for d in component.dimensions} or {2, 3}
+        known = {d for component in shapes for d in component.dimensions} or {2, 3}
         for integrator in plugin.integrators or ("",):
             what = f"with integrator {integrator}" if integrator else "with it"
             check("world", what, sorted(known), partial(_check_world, plugin, others, integrator))
@@ -236,6 +237,10 @@ def _mixing_laws(rule: Any, examples: np.ndarray) -> Tried:
     usual, wide = np.abs(examples[:, :2]), 10.0 ** (9.0 * examples[:, 2:4])
     values = np.stack((usual, wide), axis=1).reshape(-1, 2)
     return mixing_laws(*mixed("it", rule, values)), lambda row: "these values"
+
+
+def _check_joint(joint: Any, checked: Checked) -> None:
+    checked.try_laws(partial(joint_laws_of, joint, checked.dimensions or 2))
 
 
 def _check_broad_phase(make: Any, checked: Checked) -> None:

@@ -80,7 +80,7 @@ def _print(plugin: Plugin, report: list[Checked], console: Console) -> int:
     TextTable(f"plugin {plugin.name}", ("checked", "", "inputs", "result"), rows, left=(3,)).show()
     lines, found = [], [checked for checked in report if checked.finding]
     for number, checked in enumerate(found, 1):
-        what, example, cure = checked.finding or ()
+        what, example, cure = checked.finding or ("", "", "")
         lines += [f"{number}. {checked.place}: {what}", f"   for {example}", f"   cure: {cure}"]
     lines.append(f"plugin {plugin.name}: {counted(len(found), 'finding') if found else 'nothing found'}")
     for line in lines:

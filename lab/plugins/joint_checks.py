@@ -54,7 +54,7 @@ def joint_laws_of(joint: OwnJoint, dimensions: int, examples: np.ndarray) -> Any
     def laws() -> Any:
         there = numbers_at(joint.component, sample, places, axes)
         here = _compiled(joint, sample, places, axes, there.shape)
-        apart = ~np.isclose(here, there, rtol=TOLERANCE, atol=TOLERANCE, equal_nan=True).all(axis=2)
+        apart: Any = ~np.isclose(here, there, rtol=TOLERANCE, atol=TOLERANCE, equal_nan=True).all(axis=2)
         row = apart.argmax(axis=1)
         values = row, here[np.arange(n), row], there[np.arange(n), row]
         yield Law(apart.any(axis=1), "row {}: compiled it returns {}, as plain Python {}", ALIKE, values)
