@@ -17,7 +17,8 @@ BALL = """
 from carom.components import SphereCollider
 from carom.components.colliders import Collider
 from carom.framework import Plugin, column
-from carom.framework.vectors import add, divided, dot, length, negative, scale, sub
+from carom.framework.vectors import add, divided, length, scale
+from carom.plugins.standard_sweeps import ball
 import math
 
 plugin = Plugin("balls", version="1.2")

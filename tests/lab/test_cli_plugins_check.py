@@ -49,6 +49,18 @@ OVERFLOW = """    one = int(1.0 + 0.0 * distance)
     if (one << 62) * 4 == 0:
         return depth >= 0.0, depth, along(d, distance), scale(along(d, distance), a.radius - 0.4 * depth)
 """
+NO_SUPPORT = BALL[BALL.index("    def support") : BALL.index("@plugin.kernel")], "\n"
+SWEEP = """@plugin.sweep(BallCollider, SphereCollider)
+def ball_sphere_sweep(a, b, d, v):
+    hit, time = ball(d, v, a.radius + b.radius)
+    return hit, time if a.radius < 2.0 else 0.9 * time
+
+"""
+SHALLOW = """    if depth > 0.0:
+        middle = 0.5 * (max(-a.radius, distance - b.radius) + min(a.radius, distance + b.radius))
+        return True, 0.3 * depth, along(d, distance), scale(along(d, distance), middle)
+"""
+TWINS = "@plugin.pair(BallCollider, BallCollider)"
 MISTAKES = {  # that four poses of samples do not show: what is said of them, and the simplest input
     "depth of equal sizes only": (
         (SPHERE, SPHERE.replace("b.radius", "a.radius")),
@@ -72,7 +84,7 @@ MISTAKES = {  # that four poses of samples do not show: what is said of them, an
     ),
     "does not compile": (
         (SPHERE, SPHERE + "    depth = max([depth], key=abs)\n"),
-        ("it does not compile", "use what numba compiles", "checked.py, line 35"),
+        ("it does not compile", "use what numba compiles", "checked.py, line 36"),
     ),
     "bounds too small for large ones": (
         ("def bounds(shape, dimensions):\n", "def bounds(shape, dimensions):\n        if 2.0 < shape.radius < 9.0:\n"
@@ -83,13 +95,32 @@ MISTAKES = {  # that four poses of samples do not show: what is said of them, an
         (SPHERE, SPHERE + OVERFLOW),
         ("compiled it returns", "as plain Python", "no global that changes"),
     ),
+    "depth too small, without a support": (
+        (SPHERE, SPHERE + SHALLOW),
+        ("moved apart by that they still overlap, by", "normal points from the first shape to the second"),
+    ),
+    "never touching": (
+        (SPHERE, SPHERE + "    depth = min(depth, -1e-300)\n"),
+        ("they never touch", "to keep two shapes apart use layer and mask", "d = (0.0, 0.0)"),
+    ),
+    "point on one side": (
+        (TWIN, TWIN + "    if depth > 0.0:\n        n = along(d, distance)\n"
+         "        return True, depth, n, scale(n, a.radius + 0.9 * depth)\n"),
+        ("the points of contact seen from both sides are", "in the middle of the overlap"),
+    ),
+    "sweep of large ones": (
+        (TWINS, SWEEP + TWINS), ("at the sweep's time", "they do not touch", "part of v after which"),
+    ),
 }  # fmt: skip
+
+
+WITHOUT_SUPPORT = ("depth too small, without a support", "never touching")
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_mistakes_that_pass_at_registration_are_found(check, mistake):
     change, expected = MISTAKES[mistake]
-    code, said = check(change)
+    code, said = check(change, *([NO_SUPPORT] if mistake in WITHOUT_SUPPORT else []))
     assert code == 1, said
     for words in expected:
         assert words in said
@@ -120,7 +151,7 @@ def missing(name):
 def test_what_registration_refuses_is_one_line(carom, tmp_path):
     (tmp_path / "refused.py").write_text(BALL.replace("def ball_sphere(a, b, d)", "def ball_sphere(a, b)"))
     said = refusal(carom("plugins", "check", "refused.py"))
-    assert "refused.py, line 30: plugin balls: pair ball_sphere of BallCollider and SphereCollider takes (a, b)" in said
+    assert "refused.py, line 31: plugin balls: pair ball_sphere of BallCollider and SphereCollider takes (a, b)" in said
 
 
 def test_a_file_without_a_plugin_is_refused(carom, tmp_path):

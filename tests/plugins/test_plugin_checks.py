@@ -234,12 +234,17 @@ MISTAKES = {
     "integrator of no class": (
         lambda plugin: plugin.integrator("jump")(int), r"'jump': register a class .*int has no advance, order, eval"
     ),
+    "advance of two arguments": (integrator("advance", lambda self, dt: None), "advance .*it must take 3 arguments"),
     "order is a text": (integrator("order", "a"), "order must be a whole number"),
     "evaluations negative": (integrator("evaluations", -1), "evaluations must be a whole number"),
     "path is a text": (integrator("path", "zigzag"), "path must be a whole number"),
     "broad phase of no class": (
         lambda plugin: plugin.broad_phase("all")(int),
         r"broad phase 'all': register a class with pairs\(lower, upper, moving\)",
+    ),
+    "broad phase of two arguments": (
+        lambda plugin: plugin.broad_phase("all")(type("All", (), {"pairs": lambda self, lower: ()})),
+        "it must take 4 arguments",
     ),
     "mixing rule has an order": (
         lambda plugin: plugin.mixing_rule("first")(lambda x, y: x),
@@ -269,7 +274,7 @@ def test_mistakes_are_refused_at_registration(mistake):
 
 
 def test_what_obeys_the_laws_is_registered():
-    plugin, disc = registered(**ROUND)
+    plugin, disc = registered(**ROUND, second_moments=lambda shape, d: (0.0,) * (1 + d + d * (d + 1) // 2))
     plugin.pair(disc, disc)(disc_disc)
     plugin.sweep(disc, disc)(first_touch)
     assert plugin.pairs[disc, disc].sweep is not None
