@@ -12,7 +12,6 @@ import importlib.metadata
 import itertools
 import math
 import os
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, lru_cache
@@ -88,7 +87,7 @@ def all_examples() -> np.ndarray:
 
 
 def _folder() -> Path:
-    return (cache_folder() or Path(tempfile.gettempdir())) / "hypothesis"
+    return Path(cache_folder() or ".") / "hypothesis"
 
 
 class Numbers:
