@@ -1,4 +1,4 @@
-"""Convex hulls from points: refused input, mass, boxes made of points, landing on faces, queries, files."""
+"""Convex hulls from points: refused input, mass, boxes made of points, landing on faces, files."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.spatial
 
-from carom.components import RigidBody, SphereCollider, Transform
+from carom.components import RigidBody, Transform
 from carom.framework import Settings, World
 from carom.plugins import Physics, convex_hull
 from carom.plugins.convex_hull import ConvexHullCollider
@@ -161,26 +161,6 @@ def test_it_comes_to_rest_on_a_face(points, height, mode):
             assert pose(world, entity)[1] == pytest.approx(height, abs=1e-4)
             assert np.abs(world.component_for_entity(entity, Spin).angular_velocity).max() < 1e-9
             assert np.abs(world.component_for_entity(entity, RigidBody).linear_velocity).max() < 1e-9
-
-
-@pytest.mark.plain
-def test_queries_and_casts_meet_it_as_it_is_turned():
-    """|x| + |y| + |z| <= 1, turned by an eighth about z: its rim is a square of edges parallel to x and y."""
-    half = math.sqrt(0.5)
-    with space() as world:
-        gem = ConvexHullCollider(OCTAHEDRON * math.sqrt(2))
-        entity = world.create_entity(Transform((5, 0, 0), (math.cos(math.pi / 8), 0, 0, math.sin(math.pi / 8))), gem)
-        world.step()
-        hit = world.ray_cast((0, 0.1, 0), (1, 0, 0), 20)[0]
-        assert (hit.entity, hit.distance) == (entity, pytest.approx(5 - half, abs=1e-12))
-        assert world.query_point((5 - 0.99 * half, 0.99 * half, 0)) == [entity]
-        assert world.query_point((5 - 0.99 * half, 0.99 * half, 0.1)) == []
-        assert world.query_nearest((5, 0, 3)).distance == pytest.approx(2, abs=1e-12)
-        assert world.shape_cast(SphereCollider(0.25), (5, 0, 9), (0, 0, -9))[0].distance == pytest.approx(
-            7.75, abs=1e-9
-        )
-        way = world.shape_cast(ConvexHullCollider(CUBE * 0.5), (0, 0, 0), (10, 0, 0))[0]
-        assert way.distance == pytest.approx(4.5 - half, abs=1e-9)
 
 
 def test_files_and_prefabs_keep_it_and_another_hull_can_be_assigned(tmp_path):

@@ -1,4 +1,4 @@
-"""Convex polygons: refused input, sliding, queries; their pairs are in test_shipped_pairs and test_convex."""
+"""Convex polygons: refused input, sliding; pairs are in test_shipped_pairs, queries in test_shapes_in_queries."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from worlds import run
 
-from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.components import RigidBody, Transform
 from carom.framework import World
 from carom.plugins import Physics, convex_polygon
 from carom.plugins.convex_polygon import ConvexPolygonCollider
@@ -68,14 +68,8 @@ def test_boxes_and_regular_polygons():
         ConvexPolygonCollider(SQUARE, corner_radius=-1)
 
 
-def make_world(gravity=(0, -10), others=False):
-    """With polygons alone, or always with spheres and boxes: few kinds of worlds, so that they share compiled code."""
-    world = World(Physics(dimensions=2, gravity=gravity), convex_polygon.plugin)
-    if others:
-        world.create_entity(Transform((0, -500)), SphereCollider(1.0))
-        world.create_entity(Transform((0, -600)), AABBCollider(1.0))
-    world.create_entity(Transform((0, -700)), ConvexPolygonCollider.box(1.0))
-    return world
+def make_world(gravity=(0, -10)):
+    return World(Physics(dimensions=2, gravity=gravity), convex_polygon.plugin)
 
 
 def test_it_slides_down_a_slope_as_fast_as_physics_says():
@@ -94,33 +88,6 @@ def test_it_slides_down_a_slope_as_fast_as_physics_says():
     assert -body.linear_velocity @ along == pytest.approx(expected, rel=0.01)
     assert abs(body.linear_velocity @ up) < 1e-6
     assert world.component_for_entity(box, Transform).position @ up == pytest.approx(1.25, abs=1e-3)
-
-
-def test_turning_the_transform_turns_the_polygon():
-    world = make_world(gravity=(0, 0))
-    stick = world.create_entity(Transform((0, 0)), ConvexPolygonCollider.box((2, 0.1)))
-    world.step()
-    assert world.query_sphere((1.5, 0), 0.1) == [stick]
-    assert world.query_sphere((0, 1.5), 0.1) == []
-    world.component_for_entity(stick, Transform).rotation = math.pi / 2
-    world.refresh_queries()
-    assert world.query_sphere((1.5, 0), 0.1) == []
-    assert world.query_sphere((0, 1.5), 0.1) == [stick]
-    assert world.query_aabb((0.05, 1), (1, 1.5)) == [stick]
-
-
-def test_rays_and_moving_shapes_meet_it():
-    world = make_world(gravity=(0, 0), others=True)
-    diamond = world.create_entity(Transform((5, 0), rotation=math.pi / 4), ConvexPolygonCollider.box(1.0))
-    world.step()
-    hit = world.ray_cast((0, 0.5), (1, 0), 20)[0]
-    assert hit.entity == diamond
-    assert hit.distance == pytest.approx(5 - math.sqrt(2) + 0.5, abs=1e-12)
-    np.testing.assert_allclose(hit.normal, (-math.sqrt(0.5), math.sqrt(0.5)), atol=1e-12)
-    hit = world.shape_cast(ConvexPolygonCollider.box(1.0), (0, 0), (10, 0))[0]
-    assert hit.distance == pytest.approx(5 - math.sqrt(2) - 1, abs=1e-12)
-    nearest = world.query_nearest((5, 3))
-    assert nearest.distance == pytest.approx(3 - math.sqrt(2), abs=1e-12)
 
 
 def test_new_corners_count_from_the_next_step_on():

@@ -185,3 +185,9 @@ def test_ties_follow_the_segment(d):
             met = one_pose(0.25, 2.0, (3 * turn, turn, 0), (9, 1, 9), (x, 0, 0), d)
             assert met.depth == pytest.approx(0.25 + 1 + 2 / math.sqrt(10))
             assert met.normal == pytest.approx(np.array([0.0, sign, 0.0])[:d])
+
+
+@pytest.mark.parametrize("arguments", [(-0.1, 1.0), (0.1, -1.0), (math.nan, 1.0), ("x", 1.0)])
+def test_wrong_sizes_are_named(arguments):
+    with pytest.raises(ValueError, match=r"CapsuleCollider\.(radius|half_height)"):
+        CapsuleCollider(*arguments)
