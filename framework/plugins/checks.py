@@ -112,10 +112,11 @@ def check_shape(plugin: Any, component: Any, cost: float) -> None:
     allowed = getattr(component, "dimensions", (2, 3))
     if not isinstance(allowed, tuple) or not allowed or not set(allowed) <= {2, 3}:
         raise PluginError(f"{where}: dimensions must be (2,), (3,) or (2, 3), got {allowed!r}")
+    for name in SHAPE_FUNCTIONS:
+        _shape_function(where, component, name, allowed[0])
     for dimensions in allowed:
         look, other = (np.delete(poses[:, :dimensions], 2, axis=0) for poses in (POSES, STEPS))
         samples = [parameters_of(component, dimensions)] * len(look)
-        _shape_function(where, component, "turned", dimensions)
         moments = _shape_function(where, component, "second_moments", dimensions)
         if moments is not None:
             (found,) = moments(samples[:1], [dimensions])[0]
