@@ -192,7 +192,7 @@ def _try(where: str, component: Any, dimensions: int) -> tuple[bool, tuple[bool,
             raise PluginError(f"{said} returned {row[0]!r} as value: return a number, or None for the sum of changes")
     law = change_law(component, sample, SAMPLE_PLACES[None, :, :d], MATRICES[None, :, :d, :d], WAYS[None, :, :, :d])
     if law.is_broken:
-        raise PluginError(f"{said}: {law.said(0)}: {law.cure}")
+        raise PluginError(f"{said} {law.said(0)}: {law.cure}")
     return _is_single(made), tuple(row[0] is not None for row in rows)
 
 

@@ -39,6 +39,23 @@ def test_what_no_constraint_returns_is_refused_when_it_is_registered(returned, m
         declared(returned)
 
 
+@pytest.mark.plain
+def test_vectors_that_are_not_the_change_of_the_value_are_refused():
+    """The height of an axis of b, which changes as b turns."""
+
+    def height(factor):
+        def row(a, b):
+            axis, nothing = b.axes[0], scale(b.axes[0], 0.0)
+            turn = (axis[0], 0.0) if len(axis) == 2 else (-axis[2], 0.0, axis[0])
+            return axis[1], nothing, nothing, nothing, scale(turn, factor)
+
+        return row
+
+    assert issubclass(declared(height(1.0)), Joint)
+    with pytest.raises(PluginError, match=r"2D, row 0: its value changes by -0.48, by its vectors -0.96: along_a"):
+        declared(height(2.0))
+
+
 def test_what_is_no_joint_is_refused():
     for thing, message in ((Transform, "derive a class from carom.plugins.joints.Joint"), (Distance, "no constraint")):
         with pytest.raises(PluginError, match=message):
