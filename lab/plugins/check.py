@@ -212,7 +212,7 @@ def _check_shape(shape: Shape, checked: Checked) -> None:
             yield from shape_laws(made.half, support, look, other)
             component: Any = shape.component
             there = np.array([component.bounds(made.at(row), dimensions) for row in range(len(sizes[:PLAIN]))], float)
-            alike = np.isclose(there, made.half[:PLAIN], rtol=1e-9, atol=0, equal_nan=True).all(axis=1)
+            alike: Any = np.isclose(there, made.half[:PLAIN], rtol=1e-9, atol=0, equal_nan=True).all(axis=1)
             yield Law(~alike, "compiled, bounds are {}, as plain Python {}", ALIKE, (made.half, there))
 
         return laws(), made.shown

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import helpers_cli_plugins
+import numpy as np
 import pytest
 from helpers_cli_plugins import BALL, OFFERED, refusal, row_of
 
@@ -130,11 +131,16 @@ def test_mistakes_that_pass_at_registration_are_found(check, mistake):
     assert said.splitlines()[-1].startswith("plugin balls: ")
 
 
-def test_the_same_examples_are_drawn_again(check):
-    change, _ = MISTAKES["apart where they touch"]
-    _, said = check(change)
-    all_examples.cache_clear()
-    assert check(change)[1] == said
+def test_the_same_examples_are_drawn_again(monkeypatch, tmp_path):
+    """Where none are kept, and where the file is broken."""
+    expected = all_examples()
+    monkeypatch.setattr("carom.lab.plugins.samples._folder", lambda: tmp_path / "other")
+    for _ in range(2):
+        all_examples.cache_clear()
+        np.testing.assert_array_equal(all_examples(), expected)
+        next((tmp_path / "other").glob("*.npy")).write_bytes(b"half of it")
+    assert np.unique(expected, axis=0).shape == expected.shape
+    assert np.abs(expected).max() < 1.0
 
 
 def test_without_hypothesis_it_is_named(check, carom, monkeypatch, tmp_path):
