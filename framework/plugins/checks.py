@@ -33,7 +33,7 @@ SHAPE_FUNCTIONS = {
 }
 POSES = np.array(((1.0, 0.0, 0.0), (0.3, -0.2, 0.1), (0.0, 0.0, 0.0), (-2.0, 3.0, 1.0)))  # of b as seen from a
 STEPS = np.array(((0.1, 0.2, 0.0), (-0.3, 0.1, 0.2), (0.0, 0.5, -0.1), (0.04, -0.06, -0.02)))
-VALUES = np.array(((0.0, 0.0), (0.25, 1.0), (1.0, 0.5), (3.0, 0.0)))  # of both bodies, for a mixing rule
+VALUES = (0.25, 1.0, 0.0, 1e-9, 0.1, 0.3, 0.45, 0.6, 0.75, 0.9, 3.0, 1e9)  # for a mixing rule, each with each
 # What functions of pairs with Convex get besides, by how many of the two it is.
 HELPERS = {0: (), 1: ("support", "rounding"), 2: ("a_support", "b_support", "a_rounding", "b_rounding")}
 
@@ -238,13 +238,9 @@ def check_broad_phase(plugin: Any, name: str, broad_phase: Any) -> None:
 def check_mixing_rule(plugin: Any, name: str, function: Any) -> None:
     where = f"plugin {plugin.name}: mixing rule {name!r}"
     check_name(where, name)
-    require(lambda row: f"{where}:", mixing_laws(*mixed(where, function, VALUES)))
-
-
-def mixed(where: str, function: Any, values: np.ndarray) -> tuple[np.ndarray, ...]:
-    """x, y and what the rule makes of them in this and in the other order, for ``values`` (n, 2)."""
-    called, (x, y) = PlainFunction(where, function, ("x", "y"), "a number from 0", float), values.T
-    return x, y, *called(x.tolist(), y.tolist()), *called(y.tolist(), x.tolist())
+    called, (x, y) = PlainFunction(where, function, ("x", "y"), "a number from 0", float), np.meshgrid(VALUES, VALUES)
+    x, y = x.ravel().tolist(), y.ravel().tolist()
+    require(lambda row: called.at(x[row], y[row]), mixing_laws(*called(x, y), *called(y, x)))
 
 
 def check_filter(plugin: Any, function: Any) -> None:

@@ -226,11 +226,11 @@ def shape_laws(half: np.ndarray, support: Support | None, look: np.ndarray, othe
     yield Law(np.abs(far - here) > slack, what, cure, (look, point, long))
 
 
-def mixing_laws(x: np.ndarray, y: np.ndarray, there: np.ndarray, back: np.ndarray) -> Iterator[Law]:
-    """Of a rule that makes one number of the two bodies', for x and y and for y and x."""
-    what, wrong = "for {} and {} it returned {}", ~(np.isfinite(there) & (there >= 0))
-    yield Law(wrong, what, "return a number from 0", (x, y, there))
-    yield Law(there != back, what + ", for {} and {} {}", "both are one", (x, y, there, y, x, back))
+def mixing_laws(there: np.ndarray, back: np.ndarray) -> Iterator[Law]:
+    """Of a rule that makes one number of the two bodies': what it returns in this and in the other order."""
+    wrong = ~(np.isfinite(there) & (there >= 0))
+    yield Law(wrong, "it returned {}", "return a number from 0", (there,))
+    yield Law(there != back, "it returned {}, in the other order {}", "both are one", (there, back))
 
 
 def plain(value: Any) -> Any:

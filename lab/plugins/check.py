@@ -15,8 +15,8 @@ import numpy as np
 from ...components import RigidBody, SphereCollider, Transform
 from ...framework import CaromError, Convex, Plugin, PluginError, Settings, World
 from ...framework.jit.lazy import errors
-from ...framework.plugins.checks import HELPERS, PlainFunction, mixed
-from ...framework.plugins.laws import Law, Trial, mixing_laws, pair_laws, shape_laws, sweep_laws
+from ...framework.plugins.checks import HELPERS, PlainFunction
+from ...framework.plugins.laws import Law, Trial, pair_laws, shape_laws, sweep_laws
 from ...framework.plugins.registry import Pair, Registry, Shape
 from ...plugins import Physics
 from ..cli.usage_errors import Problem, one_line
@@ -95,7 +95,7 @@ def check_plugin(plugin: Plugin, others: list[Plugin], progress: Callable[[str],
     for each in (*([] if built_in else [Physics()]), *others, plugin):
         registry.add(each)
 
-    def check(kind: str, name: str, dimensions: Iterable[int | None], run: Callable[[Checked], None]) -> None:
+    def check(kind: str, name: str, dimensions: Iterable[int], run: Callable[[Checked], None]) -> None:
         for d in dimensions:
             report.append(Checked(kind, name, d))
             progress(report[-1].place)
@@ -116,8 +116,6 @@ def check_plugin(plugin: Plugin, others: list[Plugin], progress: Callable[[str],
         lacking = [other.__name__ for other in registry.shapes if registry.pair(component, other) is None]
         if lacking:
             report.append(Checked("shape", component.__name__, note=f"no pair with {', '.join(lacking)}"))
-    for name, rule in plugin.mixing_rules.items():
-        check("mixing rule", name, [None], lambda checked, f=rule: checked.try_laws(partial(_mixing_laws, f)))
     joints: dict[Any, Any] = dict(plugin.joints)
     for component, joint in joints.items():
         check("joint", component.__name__, component.dimensions, partial(_check_joint, joint))
@@ -221,12 +219,6 @@ def _check_shape(shape: Shape, checked: Checked) -> None:
 
 
 # -- other things ---------------------------------------------------------------------------------
-
-
-def _mixing_laws(rule: Any, examples: np.ndarray) -> Tried:
-    usual, wide = np.abs(examples[:, :2]), 10.0 ** (9.0 * examples[:, 2:4])
-    values = np.stack((usual, wide), axis=1).reshape(-1, 2)
-    return mixing_laws(*mixed("it", rule, values)), lambda row: "these values"
 
 
 def _check_joint(joint: Any, checked: Checked) -> None:

@@ -171,14 +171,6 @@ from carom.framework import Plugin
 
 plugin = Plugin("others")
 
-@plugin.mixing_rule("mean")
-def mean(x, y):
-    return 0.5 * (x + y)
-
-@plugin.mixing_rule("odd")
-def odd(x, y):
-    return x if x < 0.4 and y < 0.7 else max(x, y)
-
 @plugin.broad_phase("all")
 class All:
     def pairs(self, lower, upper, moving):
@@ -209,8 +201,6 @@ def test_other_things_are_checked_too(carom, tmp_path):
     (tmp_path / "others.py").write_text(OTHERS)
     result = carom("plugins", "check", "others.py")
     assert result.exit_code == 1
-    assert "ok" in row_of(result.stdout, "mixing rule mean")
-    assert "1 finding" in row_of(result.stdout, "mixing rule odd")
     assert "ok" in row_of(result.stdout, "broad phase all")
     assert "1 finding" in row_of(result.stdout, "broad phase nearly all")
     assert " 0 times" in result.stdout

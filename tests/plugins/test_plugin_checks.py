@@ -248,7 +248,11 @@ MISTAKES = {
     ),
     "mixing rule has an order": (
         lambda plugin: plugin.mixing_rule("first")(lambda x, y: x),
-        "mixing rule 'first': for 0.25 and 1.0 it returned 0.25, for 1.0 and 0.25 1.0",
+        "mixing rule 'first': for x = 1.0, y = 0.25 it returned 1.0, in the other order 0.25: both are one",
+    ),
+    "mixing rule has an order for few": (
+        lambda plugin: plugin.mixing_rule("odd")(lambda x, y: x if x < 0.4 and y < 0.7 else max(x, y)),
+        "in the other order",
     ),
     "mixing rule is negative": (
         lambda plugin: plugin.mixing_rule("minus")(lambda x, y: -1.0), "return a number from 0"
