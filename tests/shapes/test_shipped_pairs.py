@@ -89,7 +89,7 @@ def test_depth_and_normal_of(first, second, d):
     allowed = ROUNDING * scale
     if first is second is CapsuleCollider:  # far from the centres rounding turns the normal of segments that are close
         apart = np.abs(cases.a.arrays["radius"] + cases.b.arrays["radius"] - found.depth)
-        allowed = allowed + np.finfo(float).eps * scale**2 / apart
+        allowed = allowed + np.finfo(float).eps * scale**2 / np.maximum(apart, np.finfo(float).tiny)
     np.testing.assert_allclose(np.linalg.norm(found.normal, axis=1), 1.0, rtol=0, atol=1e-12)
     assert (found.hit == (found.depth >= 0.0)).all()
     if HalfSpaceCollider in (first, second):  # only its own direction counts
