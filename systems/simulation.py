@@ -277,13 +277,13 @@ class Simulation:
         self.program.run_one("box_motions", 0.0)
         state.moved, state.candidates_ready = before
 
-    def opening(self) -> list[Any]:
+    def opening_stages(self) -> list[Any]:
         """The parts of a step before all systems."""
         return [self.program.segment(OPENING[0].name, OPENING[-1].name)]
 
-    def closing(self) -> list[Any]:
+    def closing_stages(self) -> list[Any]:
         """The parts of a step after all systems."""
-        return [self.program.segment(CLOSING[0].name, CLOSING[-1].name), *self.contact_events.closing()]
+        return [self.program.segment(CLOSING[0].name, CLOSING[-1].name), *self.contact_events.closing_stages()]
 
     def abandon_step(self) -> None:
         """The step failed: put everything back to its start."""

@@ -40,7 +40,7 @@ class NoPhysics:
     def _none(self) -> tuple[()]:
         return ()
 
-    opening = closing = planned_kernels = planned_columns = _none
+    opening_stages = closing_stages = planned_kernels = planned_columns = _none
 
     def _nothing(self, *_: Any) -> None:
         return None

@@ -223,13 +223,13 @@ class Pipeline(esper.Processor):
     def _make_parts(self) -> None:
         """The parts of all processors in esper's order, between those that open and close a step."""
         physics, debug = self.physics, self.world.settings.debug
-        parts: list[Any] = [*physics.opening()]
+        parts: list[Any] = [*physics.opening_stages()]
         for processor in self.order.in_esper_order():
             parts += parts_of(processor)
             if debug:
                 name = name_of(processor)
                 parts.append(PythonPart(name, lambda dt, name=name: physics.report_faults(f"after {name}: ")))
-        self.parts = merged([*parts, *physics.closing()])
+        self.parts = merged([*parts, *physics.closing_stages()])
         self._parts_order, self._parts_physics = self.order.version, physics.parts_version
         self._quiet = make_quiet_step(self, physics)
 
@@ -277,7 +277,7 @@ class Pipeline(esper.Processor):
             self.synchronize()
             self.physics.take_deferred()
             self._begin(True)
-            parts = [*self.physics.opening()]
+            parts = [*self.physics.opening_stages()]
             for system in [s for s in self.order.systems if s.phase == phase]:
                 parts += parts_of(system)
             self._run_parts(merged(parts), self.world.settings.dt)

@@ -238,7 +238,7 @@ class ContactEvents(StagedSystem):
         report = Check(state.words, state.word_of("event_count"), PythonPart(self.name, self._report))
         return [PythonPart(self.name, self._take_disabled), self.segment(), report]
 
-    def closing(self) -> list[Any]:
+    def closing_stages(self) -> list[Any]:
         """What follows the last stage of all, so that the step is one call where no code of the game runs in it."""
         state = self._state
         defer = Check(state.words, state.word_of("event_count"), PythonPart(self.name, self._defer))
