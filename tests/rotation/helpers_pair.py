@@ -105,6 +105,11 @@ def rotation(*vector):
     return np.concatenate(([math.cos(angle / 2)], np.sinc(angle / 2 / math.pi) / 2 * np.array(vector)))
 
 
+def product(p, q):
+    """Of quaternions: the rotation q, then p."""
+    return np.array((p[0] * q[0] - p[1:] @ q[1:], *(p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:]))))
+
+
 def matrix(q):
     w, x, y, z = q
     return np.array((

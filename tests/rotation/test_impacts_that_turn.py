@@ -7,52 +7,19 @@ import math
 
 import numpy as np
 import pytest
+from rotation.helpers_turning import G, ball, box, motion, turning_world, wall
+from worlds import MODES, run
 
 from carom.components import RigidBody, SphereCollider, Transform
-from carom.framework import Settings, World
-from carom.plugins import Physics, capsule, convex_hull, convex_polygon
-from carom.plugins.rotation import BoxCollider, Rotation, Spin
-
-MODES = ("discrete", "continuous", "event_driven")
-
-
-def empty(gravity=0.0, **settings):
-    return World(Physics(2, gravity=(0, -gravity)), Rotation(), settings=Settings(**settings))
-
-
-def box(world, place, half, velocity=(0, 0), spin=0.0, rotation=0.0, mass=1.0, **collider):
-    body = RigidBody(mass, velocity)
-    return world.create_entity(Transform(place, rotation), body, Spin(spin), BoxCollider(half, **collider))
-
-
-def ball(world, place, velocity, r=0.1, mass=1.0, spin=0.0, **collider):
-    body = RigidBody(mass, velocity)
-    return world.create_entity(Transform(place), body, Spin(spin), SphereCollider(r, **collider))
-
-
-def floor(world, **collider):
-    return world.create_entity(Transform((0, -1)), RigidBody(kind="static"), BoxCollider((20, 1), **collider))
-
-
-def motion(world, entity):
-    """(velocity, angular velocity)."""
-    w = world.component_for_entity(entity, Spin).angular_velocity
-    return np.array(world.component_for_entity(entity, RigidBody).linear_velocity), w
-
-
-def run(world, steps):
-    for _ in range(steps):
-        world.step()
-
-
-# -- closed forms ---------------------------------------------------------------------------------
+from carom.plugins import capsule, convex_hull, convex_polygon
+from carom.plugins.rotation import BoxCollider, Spin
 
 
 @pytest.mark.parametrize("mode", MODES)
 def test_colliders_beside_their_body_bounce_without_loss(mode):
     """They are struck where they are at the time of the impact, not where the step ends."""
     random = np.random.default_rng(4)
-    with empty(collision=mode) as world:
+    with turning_world(collision=mode) as world:
         for place in itertools.product((0.0, 2.5), (0.0, 2.5)):
             velocity, spin = random.normal(0.0, 2.0, 2) - np.array(place) + 1.25, random.normal(0.0, 3.0)
             box(world, place, (0.2, 0.8), velocity, spin, offset=(0.5, 0.3), restitution=1.0)
@@ -72,9 +39,9 @@ def test_a_rod_that_is_struck_off_centre_turns(mode):
     the centre of percussion, and the rod is thin."""
     long, thick, v = 1.2, 1e-3, 3.0
     for h in (long / 6, 0.35, -0.5):
-        with empty(collision=mode) as world:
+        with turning_world(collision=mode) as world:
             rod = box(world, (0, 0), (long / 2, thick / 2), mass=2.0, restitution=1.0)
-            small = ball(world, (h, 0.131), (0, -v), restitution=1.0)
+            small = ball(world, (h, 0.131), (0, -v), radius=0.1, restitution=1.0)
             run(world, 1)
             while motion(world, small)[0][1] == -v:
                 world.step()
@@ -92,8 +59,8 @@ def test_a_rod_that_is_struck_off_centre_turns(mode):
 def test_a_flat_landing_does_not_turn(mode):
     """To the bit: with e v, and w = 0."""
     for e in (0.25, 0.5, 1.0):
-        with empty(collision=mode) as world:
-            floor(world, restitution=e)
+        with turning_world(collision=mode) as world:
+            wall(world, (0, -1), (20, 1), restitution=e)
             entity = box(world, (1.25, 0.52), (0.5, 0.5), (0, -4.0), restitution=e)
             run(world, 4)
             v, w = motion(world, entity)
@@ -117,13 +84,11 @@ def test_what_lands_flat_in_space_does_not_turn(shape, mode):
     """On the ground, at three bounces, and on its like, which is free: with e v, and w = 0 but for rounding. An
     octahedron lies on three corners, a capsule on its side."""
     turn = (math.sqrt(0.5), 0, 0, math.sqrt(0.5)) if shape == "capsule" else (math.cos(0.3), 0, math.sin(0.3), 0)
-    plugins = Rotation(), capsule.plugin, convex_hull.plugin
     cases = ((0.5, 9.81, False), (1.0, 0.0, False), (0.5, 0.0, True))
     for e, gravity, like in cases[:2] if shape == "octahedron" else cases:  # two of these share a hexagon
-        with World(Physics(3, gravity=(0, -gravity, 0)), *plugins, settings=Settings(collision=mode)) as world:
+        with turning_world(3, gravity, capsule.plugin, convex_hull.plugin, collision=mode) as world:
             if not like:
-                level = BoxCollider((20, 1, 20), restitution=e)
-                world.create_entity(Transform((0, -1, 0)), RigidBody(kind="static"), level)
+                wall(world, (0, -1, 0), (20, 1, 20), restitution=e)
             for k in range(2 if like else 1):
                 body, collider = RigidBody(1.0, (0, (-4.0, 1.0)[k], 0)), LYING[shape].copy()
                 collider.restitution = e
@@ -138,42 +103,25 @@ def test_what_lands_flat_in_space_does_not_turn(shape, mode):
                 assert v[1] == pytest.approx(-2.75 if like else 4.0, rel=1e-12)
 
 
-# -- gases: conservation --------------------------------------------------------------------------
-
-
-def boxes_and_balls(world, seed, n=36, speed=3.0, walls=True, **collider):
-    """Boxes of many sizes and balls on a grid, with any velocities and spins, between four walls or without."""
+def boxes_and_balls(world, seed, n=36, speed=3.0, **collider):
+    """Boxes of many sizes and balls on a grid, with any velocities and spins, between four walls."""
     random = np.random.default_rng(seed)
-    for x, y in ((0, -5.5), (0, 5.5), (-5.5, 0), (5.5, 0)) if walls else ():
-        half = (6, 0.5) if x == 0 else (0.5, 6)
-        world.create_entity(Transform((x, y)), RigidBody(kind="static"), BoxCollider(half, **collider))
+    for x, y in ((0, -5.5), (0, 5.5), (-5.5, 0), (5.5, 0)):
+        wall(world, (x, y), (6, 0.5) if x == 0 else (0.5, 6), **collider)
     places = (np.stack(np.meshgrid(np.arange(6), np.arange(6)), -1).reshape(-1, 2)[:n] + 0.5) / 6 * 10 - 5
-    entities = []
     for k in range(n):
-        body = RigidBody(random.uniform(0.5, 2.0), random.normal(0, speed, 2) - 0.5 * places[k] * (not walls))
+        body = RigidBody(random.uniform(0.5, 2.0), random.normal(0, speed, 2))
         spin, half = Spin(random.normal(0, 4)), random.uniform(0.2, 0.45, 2)
         shape = BoxCollider(half, **collider) if k % 2 else SphereCollider(0.35, **collider)
-        entities.append(world.create_entity(Transform(places[k], random.uniform(0, 6)), body, spin, shape))
-    assert len(world.bodies) >= n  # all are in the world
-    return entities, np.array([world.component_for_entity(entity, Spin).moments for entity in entities]).reshape(-1)
-
-
-def totals(world, entities, inertia):
-    """(energy, momentum, angular momentum about the origin)."""
-    bodies = [world.component_for_entity(entity, RigidBody) for entity in entities]
-    x = np.array([world.component_for_entity(entity, Transform).position for entity in entities])
-    v, m = np.array([body.linear_velocity for body in bodies]), np.array([body.mass for body in bodies])
-    w = np.array([world.component_for_entity(entity, Spin).angular_velocity for entity in entities])
-    energy = 0.5 * (m * (v**2).sum(1)).sum() + 0.5 * (inertia * w**2).sum()
-    about = (m * (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0])).sum() + (inertia * w).sum()
-    return energy, (m[:, None] * v).sum(0), about, x
+        world.create_entity(Transform(places[k], random.uniform(0, 6)), body, spin, shape)
+    assert len(world.bodies.dynamic) == n  # all are in the world
 
 
 @pytest.mark.parametrize(("mu", "e"), [(0.0, 1.0), (0.5, 1.0), (0.5, 0.5)])
 def test_a_thousand_pairs_keep_momentum_angular_momentum_and_smooth_ones_energy(mu, e):
     """Boxes of any size, mass, angle and spin meet off their centres, each pair on its own."""
     random = np.random.default_rng(7)
-    with empty(collision="event_driven", max_impacts_per_step=64) as world:
+    with turning_world(collision="event_driven", max_impacts_per_step=64) as world:
         n = 1000
         away = np.stack(np.meshgrid(np.arange(40), np.arange(25)), -1).reshape(-1, 2) * 8.0
         place = np.concatenate((away, away + np.stack((np.full(n, 1.6), random.uniform(-0.8, 0.8, n)), 1)))
@@ -213,7 +161,7 @@ def test_a_thousand_pairs_keep_momentum_angular_momentum_and_smooth_ones_energy(
 def test_what_flies_past_a_corner_that_turns_has_not_touched_it(mode):
     """A thousand boxes that turn, and fast balls that graze or miss them: each pair keeps its energy."""
     random, n = np.random.default_rng(7), 1000
-    with empty(collision=mode) as world:
+    with turning_world(collision=mode) as world:
         away = np.stack(np.meshgrid(np.arange(40), np.arange(25)), -1).reshape(-1, 2) * 8.0
         world.create_entities(
             n, Transform.many(away, random.uniform(0, 6, n)), RigidBody.many(2.0),
@@ -239,7 +187,7 @@ def test_what_flies_past_a_corner_that_turns_has_not_touched_it(mode):
 @pytest.mark.parametrize("mode", MODES[1:])
 def test_where_two_have_bounced_they_do_not_touch_again_as_they_have_turned_since(mode):
     shape = convex_polygon.ConvexPolygonCollider(((-0.4, -0.2), (0.4, -0.3), (0.2, 0.3)), restitution=1.0)
-    with World(Physics(2, gravity=0), Rotation(), convex_polygon.plugin, settings=Settings(collision=mode)) as world:
+    with turning_world(2, 0, convex_polygon.plugin, collision=mode) as world:
         for place, angle, mass, velocity, spin in (
             ((-1.07270967, 0.55748379), 49.90143473864663, 1.0, (0.54818994, -4.16731752), 43.857732720865975),
             ((-0.34060533, 0.19047684), 5.700842573914769, 2.0, (2.5351161, 8.91141697), 14.667940476500256),
@@ -255,18 +203,18 @@ def test_where_two_have_bounced_they_do_not_touch_again_as_they_have_turned_sinc
 @pytest.mark.parametrize(("mu", "e"), [(0.0, 1.0), (0.4, 0.0), (0.4, 0.5), (0.4, 1.0)])
 def test_a_gas_of_boxes_and_balls_never_gains_energy_and_keeps_it_if_smooth_and_elastic(mu, e, mode):
     """To rounding; a smooth one in a discrete world, in which bodies overlap, within 2 %. Nothing leaves."""
-    with empty(collision=mode, max_impacts_per_step=64) as world:
-        entities, inertia = boxes_and_balls(world, 4, restitution=e, friction=mu)
-        last = first = totals(world, entities, inertia)[0]
+    with turning_world(collision=mode, max_impacts_per_step=64) as world:
+        boxes_and_balls(world, 4, restitution=e, friction=mu)
+        last = first = world.kinetic_energy()
         given = 1e-12 if e > 0.0 else 1e-5  # what does not bounce is left to contacts, which push out overlaps
         given = 2e-2 if mu == 0.0 and mode == "discrete" else given
         for _ in range(180):
             world.step()
-            now, _, _, places = totals(world, entities, inertia)
+            now = world.kinetic_energy()
             assert now <= last * (1 + given)
             last = now
         assert world.stats().counters["impacts"] > 50 or (e == 0.0 and mode != "event_driven")
-        assert np.abs(places).max() < 5.0
+        assert np.abs(world.bodies.dynamic.position).max() < 5.0
     assert last == pytest.approx(first, rel=given) if mu == 0.0 else last < 0.9 * first
 
 
@@ -276,60 +224,48 @@ def test_a_smooth_elastic_gas_of_boxes_in_space_keeps_energy(seed, mode):
     """To rounding, over more than 300 impacts; among them corners that slide along faces, and would graze them more
     often than the cap allows."""
     random = np.random.default_rng(seed)
-    with World(Physics(3, gravity=0), Rotation(), settings=Settings(collision=mode, max_impacts_per_step=64)) as world:
-        for k in range(6):
-            place, half = np.zeros(3), np.full(3, 4.0)
-            place[k // 2], half[k // 2] = 3.5 * (-1) ** k, 0.5
-            world.create_entity(Transform(place), RigidBody(kind="static"), BoxCollider(half, restitution=1.0))
+    with turning_world(3, collision=mode, max_impacts_per_step=64) as world:
+        room(world, 3.5, 0.5, 4.0, restitution=1.0)
         places = (np.stack(np.meshgrid(*[np.arange(4)] * 3), -1).reshape(-1, 3) + 0.5) * 1.5 - 3
-        half, turned = random.uniform(0.2, 0.35, (64, 3)), random.normal(0, 1, (64, 4))
+        half, turns = random.uniform(0.2, 0.35, (64, 3)), random.normal(0, 1, (64, 4))
         world.create_entities(
-            64, Transform.many(places, turned / np.linalg.norm(turned, axis=1)[:, None]),
+            64, Transform.many(places, turns / np.linalg.norm(turns, axis=1)[:, None]),
             RigidBody.many(linear_velocity=random.normal(0, 2, (64, 3))), Spin.many(random.normal(0, 4, (64, 3))),
             BoxCollider.many(half, restitution=1.0),
         )  # fmt: skip
-        moments = np.stack([(half**2).sum(1) - half[:, k] ** 2 for k in range(3)], 1) / 3
-        bodies, energies = world.bodies.dynamic, []
+        energy = world.kinetic_energy()
         for _ in range(200):
-            w, (c, x, y, z) = bodies.spin.angular_velocity, world.bodies.dynamic.rotation.T
-            # along the body's own axes: w + 2 u x (u x w - c w), u = (x, y, z)
-            u = np.stack((x, y, z), 1)
-            own = w + 2 * np.cross(u, np.cross(u, w) - c[:, None] * w)
-            energies.append(0.5 * (bodies.linear_velocity**2).sum() + 0.5 * (moments * own**2).sum())
-            assert world.kinetic_energy() == pytest.approx(energies[-1], rel=1e-12)
             world.step()
+            assert world.kinetic_energy() == pytest.approx(energy, rel=1e-12)
         assert world.stats().counters["impacts"] > 300
-        assert np.abs(bodies.position).max() < 3.0
-    assert np.allclose(energies, energies[0], rtol=1e-12)
+        assert np.abs(world.bodies.dynamic.position).max() < 3.0
 
 
-# -- with gravity ---------------------------------------------------------------------------------
+def room(world, far, thick, wide, **collider):
+    """Six walls, whose middles are so far from the origin."""
+    for k in range(6):
+        place, half = np.zeros(3), np.full(3, wide)
+        place[k // 2], half[k // 2] = far * (-1) ** k, thick
+        wall(world, place, half, **collider)
 
 
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("e", [0.3, 0.5])
+@pytest.mark.parametrize("e", [0.0, 0.3, 0.5])
 def test_boxes_that_bounce_come_to_rest(e, mode):
     """Four alone, which fall on any corner, and a stack of five that falls askew: on their faces, in their order."""
-    random = np.random.default_rng(3)
-    with empty(9.81, collision=mode) as world:
-        floor(world, restitution=e, friction=0.5)
-        entities = [
-            box(world, (3 + 1.5 * k, 2), (0.5, 0.5), rotation=random.uniform(0, 6), restitution=e, friction=0.5)
-            for k in range(4)
-        ]
-        entities += [
-            box(
-                world, (random.uniform(-0.1, 0.1), 1 + 1.3 * k), (0.5, 0.5), rotation=random.uniform(-0.3, 0.3),
-                restitution=e, friction=0.5,
-            )
-            for k in range(5)
-        ]  # fmt: skip
+    random, rough = np.random.default_rng(3), {"restitution": e, "friction": 0.5}
+    with turning_world(2, G, collision=mode) as world:
+        wall(world, (0, -1), (20, 1), **rough)
+        for k in range(4):
+            box(world, (3 + 1.5 * k, 2), (0.5, 0.5), rotation=random.uniform(0, 6), **rough)
+        for k in range(5):
+            place = random.uniform(-0.1, 0.1), 1 + 1.3 * k
+            box(world, place, (0.5, 0.5), rotation=random.uniform(-0.3, 0.3), **rough)
         run(world, 600)
-        energy, _, _, places = totals(world, entities, np.full(9, 1 / 6))
-        angles = np.array([world.component_for_entity(entity, Transform).rotation for entity in entities])
-    assert energy < 1e-9
-    assert places[:, 1] == pytest.approx([0.5] * 4 + [0.5 + k for k in range(5)], abs=0.03)
-    assert np.abs((angles + math.pi / 4) % (math.pi / 2) - math.pi / 4).max() < 0.02
+        moving = world.bodies.dynamic
+        assert world.kinetic_energy() < 1e-9
+        assert moving.position[:, 1] == pytest.approx([0.5] * 4 + [0.5 + k for k in range(5)], abs=0.03)
+        assert np.abs((moving.rotation + math.pi / 4) % (math.pi / 2) - math.pi / 4).max() < 0.02
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -338,23 +274,17 @@ def test_a_needle_in_a_room_gains_nothing(mode):
     of a wall gains height: 1 % of all energy at most, over two seconds."""
     for seed in range(3):
         random = np.random.default_rng(seed)
-        with World(
-            Physics(3, gravity=(0, -9.81, 0)), Rotation(), convex_hull.plugin,
-            settings=Settings(collision=mode, on_fault="ignore"),
-        ) as world:  # fmt: skip
-            for k in range(6):
-                place, half = np.zeros(3), np.full(3, 5.0)
-                place[k // 2], half[k // 2] = 4.0 * (-1) ** k, 1.0
-                world.create_entity(Transform(place), RigidBody(kind="static"), BoxCollider(half, restitution=0.8))
+        with turning_world(3, G, convex_hull.plugin, collision=mode, on_fault="ignore") as world:
+            room(world, 4.0, 1.0, 5.0, restitution=0.8)
             points = random.normal(size=(40, 3)) * (1, 0.03, 0.03)
             needle = convex_hull.ConvexHullCollider(0.8 * points / np.abs(points).max(), restitution=0.8)
             needle.offset, turn = -needle.centre_of_mass, random.normal(size=4)
             body, spin = RigidBody(linear_velocity=random.normal(size=3) * 2), Spin(random.normal(size=3) * 3)
             world.create_entity(Transform((-1.7,) * 3, turn / np.linalg.norm(turn)), body, spin, needle)
-            lowest = first = world.kinetic_energy() + 9.81 * (world.bodies.dynamic.position[0, 1] + 3.0)
+            lowest = first = world.kinetic_energy() + G * (world.bodies.dynamic.position[0, 1] + 3.0)
             for _ in range(130):
                 world.step()
-                energy = world.kinetic_energy() + 9.81 * (world.bodies.dynamic.position[0, 1] + 3.0)
+                energy = world.kinetic_energy() + G * (world.bodies.dynamic.position[0, 1] + 3.0)
                 assert energy < lowest + 0.01 * first, (seed, world.step_count)
                 lowest = min(lowest, energy)
 
@@ -362,17 +292,13 @@ def test_a_needle_in_a_room_gains_nothing(mode):
 def test_what_strikes_a_crate_that_rocks_bounces_alike_in_all_modes():
     """What tips over on the floor lands as a contact at rest; what else it meets in that step has its restitution."""
     speeds = []
-    for mode in ("discrete", "continuous", "event_driven"):
-        with World(Physics(2, gravity=(0, -9.81)), Rotation(), settings=Settings(collision=mode)) as world:
-            world.create_entity(Transform((0, -1)), BoxCollider((20, 1), friction=0.5))
-            crate = BoxCollider((0.5, 0.5), friction=0.5)
-            world.create_entity(Transform((0, 0.6254), 0.3), RigidBody(10.0), Spin(), crate)
-            for _ in range(10):
-                world.step()
-            body = RigidBody(1.0, linear_velocity=(10, 0))
-            ball = world.create_entity(Transform((-1.5, 0.6)), body, Spin(), SphereCollider(0.4, restitution=1.0))
-            for _ in range(25):
-                world.step()
-            speeds.append(world.component_for_entity(ball, RigidBody).linear_velocity[0])
+    for mode in MODES:
+        with turning_world(2, G, collision=mode) as world:
+            wall(world, (0, -1), (20, 1), friction=0.5)
+            box(world, (0, 0.6254), (0.5, 0.5), rotation=0.3, mass=10.0, friction=0.5)
+            run(world, 10)
+            struck = ball(world, (-1.5, 0.6), (10, 0), radius=0.4, restitution=1.0)
+            run(world, 25)
+            speeds.append(motion(world, struck)[0][0])
     assert max(speeds) < -4.5
     assert max(speeds) - min(speeds) < 0.1

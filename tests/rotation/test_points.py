@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from rotation.helpers_pair import MARGIN, TILT, Pair, matrix, rotation
+from rotation.helpers_pair import MARGIN, TILT, Pair, matrix, product, rotation
 
 from carom.components import AABBCollider, SphereCollider
 from carom.plugins.capsule import CapsuleCollider
@@ -158,11 +158,6 @@ def test_points_are_the_corners_of_what_two_faces_share(seed, d):
             other = np.column_stack((other_places, other_gaps)) / size
             assert len(other) == len(found)
             assert np.abs(other[:, None] - found[None]).max(axis=2).min(axis=1).max() < 1e-8
-
-
-def product(p, q):
-    """Of quaternions."""
-    return np.array((p[0] * q[0] - p[1:] @ q[1:], *(p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:]))))
 
 
 def scaled(shape, size):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rotation.helpers_turning import box, turning_world, wall
+from worlds import MODES
 
 from carom.components import AABBCollider, RigidBody, Transform
-from carom.framework import Settings, World
-from carom.plugins import Physics, half_space, terrain
+from carom.plugins import half_space, terrain
 from carom.plugins.half_space import HalfSpaceCollider
-from carom.plugins.rotation import BoxCollider, Rotation, Spin
+from carom.plugins.rotation import BoxCollider
 from carom.plugins.terrain import create_chain
 
 pytestmark = [pytest.mark.slow, pytest.mark.compiled]
@@ -48,17 +49,11 @@ def count_passed(mode, ground, e, friction, seed, count):
     heights = random.uniform(-0.5, 0.5, (count, len(NODES)))
     high = 0.5 + np.abs(np.sin(angles)) + 0.01 + random.uniform(0.02, 3.0, count)
     velocities = np.stack((random.uniform(-10, 10, count), random.uniform(-30, 0, count)), 1)
-    plugins, settings = (Rotation(), terrain.plugin, half_space.plugin), Settings(collision=mode, on_fault="ignore")
-    with World(Physics(2, gravity=0), *plugins, settings=settings) as world:
+    with turning_world(2, 0, terrain.plugin, half_space.plugin, collision=mode, on_fault="ignore") as world:
         lay_ground(world, ground, places, heights, restitution=e, friction=friction)
         for k in range(count):
-            body, spin = RigidBody(linear_velocity=velocities[k]), Spin(random.uniform(-FASTEST, FASTEST))
-            world.create_entity(
-                Transform((places[k], high[k]), angles[k]),
-                body,
-                spin,
-                BoxCollider(HALF, restitution=e, friction=friction),
-            )
+            place, spin = (places[k], high[k]), random.uniform(-FASTEST, FASTEST)
+            box(world, place, HALF, velocities[k], spin, angles[k], restitution=e, friction=friction)
         for _ in range(STEPS):
             world.step()
             middle, least = lowest(world.bodies.dynamic, places, heights, ground)
@@ -67,7 +62,7 @@ def count_passed(mode, ground, e, friction, seed, count):
     return passed.sum(), deepest
 
 
-@pytest.mark.parametrize("mode", ["continuous", "event_driven"])
+@pytest.mark.parametrize("mode", MODES[1:])
 @pytest.mark.parametrize("ground", ["wall", "box", "half-space", "chain"])
 @pytest.mark.parametrize("count", [25, pytest.param(500, marks=pytest.mark.long)])
 def test_no_thin_bar_passes_through_ground(count, ground, mode):
@@ -77,16 +72,14 @@ def test_no_thin_bar_passes_through_ground(count, ground, mode):
         assert deepest < 0.1
 
 
-@pytest.mark.parametrize("mode", ["continuous", "event_driven"])
+@pytest.mark.parametrize("mode", MODES[1:])
 def test_a_step_ends_for_a_bar_that_is_caught_in_a_thin_wall(mode):
     """It reaches through one wall beside another one, and turns: what it slides along it touches again at once."""
-    settings, rough = Settings(dt=0.05, collision=mode, on_fault="ignore"), {"restitution": 1.0, "friction": 0.5}
-    with World(Physics(2, gravity=0), Rotation(), settings=settings) as world:
+    rough = {"restitution": 1.0, "friction": 0.5}
+    with turning_world(dt=0.05, collision=mode, on_fault="ignore") as world:
         for place, half in (((4.01, 0), (0.01, 4.02)), ((0, -4.01), (4.02, 0.01))):
-            world.create_entity(Transform(place), RigidBody(kind="static"), BoxCollider(half, **rough))
-        bar, body = BoxCollider((0.3257, 0.01), **rough), RigidBody(linear_velocity=(12.987, 0))
-        place = Transform((3.366, -3.812), 8.542)
-        world.create_entity(place, body, Spin(2.126), bar)
+            wall(world, place, half, **rough)
+        box(world, (3.366, -3.812), (0.3257, 0.01), (12.987, 0), 2.126, 8.542, **rough)
         world.step()
         assert 0 < world.stats().counters["capped_impacts"] < 1000
 
@@ -94,39 +87,34 @@ def test_a_step_ends_for_a_bar_that_is_caught_in_a_thin_wall(mode):
 def test_no_bar_is_pushed_through_a_thin_wall_by_another_one():
     """Six elastic bars at 5 rad a step in a room whose walls are as thin: one strikes another against a wall, again and
     again within a step."""
-    random, settings = np.random.default_rng(891), Settings(dt=0.05, collision="event_driven", on_fault="ignore")
-    with World(Physics(2, gravity=0), Rotation(), settings=settings) as world:
+    random, rough = np.random.default_rng(891), {"restitution": 1.0, "friction": 0.5}
+    with turning_world(dt=0.05, collision="event_driven", on_fault="ignore") as world:
         for axis in range(2):
             for side in (-1, 1):
                 place, half = np.zeros(2), np.full(2, 3.02)
                 place[axis], half[axis] = 3.01 * side, 0.01
-                wall = BoxCollider(half, restitution=1.0, friction=0.5)
-                world.create_entity(Transform(place), RigidBody(kind="static"), wall)
+                wall(world, place, half, **rough)
         for _ in range(6):
-            place = Transform(random.uniform(-2, 2, 2), random.uniform(-3, 3))
-            body, spin = RigidBody(linear_velocity=20 * random.normal(size=2)), Spin(50 * random.normal())
-            world.create_entity(place, body, spin, BoxCollider((0.33, 0.01), restitution=1.0, friction=0.5))
+            place, angle = random.uniform(-2, 2, 2), random.uniform(-3, 3)
+            box(world, place, (0.33, 0.01), 20 * random.normal(size=2), 50 * random.normal(), angle, **rough)
         for _ in range(40):
             world.step()
             assert abs(world.bodies.dynamic.position).max() < 3.0
 
 
-@pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
+@pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("dt", [1 / 20, 1 / 60])
 def test_what_contacts_have_turned_is_put_out_of_walls_as_it_stands_then(dt, mode):
     """Bars that spin fall in a room: where a step ends no corner is deeper in a wall than half of their width."""
-    settings = Settings(dt=dt, collision=mode, on_fault="ignore")
     for seed in range(6):
         random, half = np.random.default_rng([seed, 5]), []
-        with World(Physics(2, gravity=(0, -9.81)), Rotation(), settings=settings) as world:
+        with turning_world(2, 9.81, dt=dt, collision=mode, on_fault="ignore") as world:
             for place in ((3.5, 0), (-3.5, 0), (0, 3.5), (0, -3.5)):
-                wall = BoxCollider((0.5, 4) if place[0] else (4, 0.5), friction=0.5)
-                world.create_entity(Transform(place), RigidBody(kind="static"), wall)
+                wall(world, place, (0.5, 4) if place[0] else (4, 0.5), friction=0.5)
             for k in range(8):
                 half.append((random.uniform(0.2, 0.5), random.uniform(0.02, 0.05)))
-                place = Transform((-2.1 + 1.4 * (k % 4), -1 + 2 * (k // 4)), random.uniform(-3, 3))
-                body, spin = RigidBody(linear_velocity=random.normal(0, 4, 2)), Spin(random.normal(0, 60))
-                world.create_entity(place, body, BoxCollider(half[-1], friction=0.5), spin)
+                place, angle = (-2.1 + 1.4 * (k % 4), -1 + 2 * (k // 4)), random.uniform(-3, 3)
+                box(world, place, half[-1], random.normal(0, 4, 2), random.normal(0, 60), angle, friction=0.5)
             h = np.array(half)
             for _ in range(round(1.5 / dt)):
                 world.step()

@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rotation.helpers_turning import box, part, turning_world
 from scipy.spatial.transform import Rotation as Turn
+from worlds import MODES
+from worlds import run as take
 
 from carom.components import AABBCollider, RigidBody, Transform
-from carom.framework import Settings, World
-from carom.plugins import Physics, terrain
-from carom.plugins.rotation import BoxCollider, Rotation, Spin
+from carom.plugins import terrain
+from carom.plugins.rotation import Spin
 from carom.plugins.terrain import create_height_field
 
 pytestmark = [pytest.mark.slow, pytest.mark.compiled]
@@ -38,7 +40,7 @@ def turns_of(bodies):
 
 def motion_of(world, bodies, bars):
     """(kinetic energies, angular momenta about the vertical) of the bars."""
-    spins = np.array([world.component_for_entity(bar, Spin).angular_velocity for bar in bars])
+    spins = np.array([part(world, bar, Spin).angular_velocity for bar in bars])
     turns = turns_of(bodies)
     own = turns.apply(spins, inverse=True)
     energy = 0.5 * (bodies.linear_velocity**2).sum(1) + 0.5 * (MOMENTS * own**2).sum(1)
@@ -56,9 +58,8 @@ def run(mode, ground, e, friction, seed, count):
     high = 0.5 + np.abs(turns.as_matrix()[:, 1]) @ HALF + random.uniform(0.02, 3.0, count)
     velocities = random.uniform(-10, 10, (count, 3))
     velocities[:, 1] = random.uniform(-30, 0, count)
-    settings = Settings(collision=mode, on_fault="ignore")
     material: Any = {"restitution": e, "friction": friction}
-    with World(Physics(3, gravity=0), Rotation(), terrain.plugin, settings=settings) as world:
+    with turning_world(3, 0, terrain.plugin, collision=mode, on_fault="ignore") as world:
         bars = []
         for k in range(count):
             x = k * APART
@@ -67,8 +68,8 @@ def run(mode, ground, e, friction, seed, count):
             else:
                 wall = AABBCollider((EDGE, 0.02, EDGE), **material)
                 world.create_entity(Transform((x, -0.02, 0)), RigidBody(kind="static"), wall)
-            pose, body = Transform((x, high[k], 0), turns[k].as_quat()[[3, 0, 1, 2]]), RigidBody(1.0, velocities[k])
-            bars.append(world.create_entity(pose, body, Spin(spins[k]), BoxCollider(HALF, **material)))
+            turn = turns[k].as_quat()[[3, 0, 1, 2]]
+            bars.append(box(world, (x, high[k], 0), HALF, velocities[k], spins[k], turn, **material))
         motions: list[tuple] = []
         for _ in range(STEPS):
             world.step()
@@ -80,14 +81,11 @@ def run(mode, ground, e, friction, seed, count):
                 gaps.append([p[1] - level_of(heights[k], p[0] - k * APART, p[2]) for k, p in enumerate(at)])
             passed |= np.abs(np.array(gaps[20]) + 1.0) < 1.0
             deepest = max(deepest, -np.min(np.where(np.array(gaps[20]) > -2.0, gaps, 0.0)))
-        return (
-            passed.sum(),
-            deepest,
-            *(np.max(np.abs(b - a) / (1.0 + np.abs(a))) for a, b in zip(motions[0], motions[-1], strict=True)),
-        )
+        changed = [np.max(np.abs(b - a) / (1.0 + np.abs(a))) for a, b in zip(motions[0], motions[-1], strict=True)]
+        return passed.sum(), deepest, *changed
 
 
-@pytest.mark.parametrize("mode", ["continuous", "event_driven"])
+@pytest.mark.parametrize("mode", MODES[1:])
 @pytest.mark.parametrize("ground", ["wall", "mesh"])
 @pytest.mark.parametrize("count", [8, pytest.param(300, marks=pytest.mark.long)])
 def test_no_thin_bar_passes_through_ground_in_space(count, ground, mode):
@@ -97,7 +95,7 @@ def test_no_thin_bar_passes_through_ground_in_space(count, ground, mode):
         assert deepest < 0.1
 
 
-@pytest.mark.parametrize("mode", ["continuous", "event_driven"])
+@pytest.mark.parametrize("mode", MODES[1:])
 @pytest.mark.parametrize("ground", ["wall", "mesh"])
 def test_smooth_elastic_bars_keep_their_energy_however_far_they_turn_in_a_step(ground, mode):
     passed, _, energy, spin = run(mode, ground, 1.0, 0.0, 17, 20)
@@ -112,28 +110,23 @@ def places_after(mode, parts):
     random, count = np.random.default_rng(5), 12
     turns = Turn.from_quat(random.normal(size=(count, 4)))
     halves = np.array(((1.0, 0.01, 0.01), (1.0, 0.5, 0.02)))[np.arange(count) % 2]
-    axes, rates = (
-        random.normal(size=(count, 3)),
-        random.uniform(-1, 1, count) * np.where(halves[:, 1] < 0.1, FASTEST, 10),
-    )
+    axes = random.normal(size=(count, 3))
+    rates = random.uniform(-1, 1, count) * np.where(halves[:, 1] < 0.1, FASTEST, 10)
     spins = axes / np.linalg.norm(axes, axis=1)[:, None] * rates[:, None]
     high = (np.abs(turns.as_matrix()[:, 1]) * halves).sum(1) + 0.1
     velocities = random.uniform(-10, 10, (count, 3)) - (0, 10, 0)
     material: Any = {"restitution": 0.5, "friction": 0.3}
-    settings = Settings(collision=mode, on_fault="ignore", dt=1 / 60 / parts)
-    with World(Physics(3, gravity=0), Rotation(), settings=settings) as world:
+    with turning_world(3, collision=mode, on_fault="ignore", dt=1 / 60 / parts) as world:
         wall = AABBCollider((99.0, 0.5, 9.0), **material)
         world.create_entity(Transform((50, -0.5, 0)), RigidBody(kind="static"), wall)
         for k in range(count):
-            pose = Transform((9 * k, high[k], 0), turns[k].as_quat()[[3, 0, 1, 2]])
-            body, collider = RigidBody(1.0, velocities[k]), BoxCollider(halves[k], **material)
-            world.create_entity(pose, body, Spin(spins[k]), collider)
-        for _ in range(2 * parts):
-            world.step()
+            turn = turns[k].as_quat()[[3, 0, 1, 2]]
+            box(world, (9 * k, high[k], 0), halves[k], velocities[k], spins[k], turn, **material)
+        take(world, 2 * parts)
         return world.bodies.dynamic.position.copy(), world.bodies.dynamic.linear_velocity.copy()
 
 
-@pytest.mark.parametrize("mode", ["continuous", "event_driven"])
+@pytest.mark.parametrize("mode", MODES[1:])
 def test_what_strikes_a_wall_leaves_it_the_same_in_steps_of_any_length(mode):
     (coarse, fast), (fine, slow) = places_after(mode, 1), places_after(mode, 32)
     astray, faster = np.sort(np.abs(coarse - fine).max(axis=1)), np.sort(np.abs(fast - slow).max(axis=1))

@@ -4,27 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rotation.helpers_pair import matrix, product, rotation
+from rotation.helpers_turning import part, turning_world, wall
+from worlds import MODES, run
 
 from carom.components import RigidBody, SphereCollider, Transform
-from carom.framework import Settings, World
+from carom.framework import World
 from carom.plugins import Physics
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
-MODES = ("discrete", "continuous", "event_driven")
-DOWN = (0, -10, 0)
 pytestmark = [pytest.mark.parametrize("mode", MODES), pytest.mark.parametrize("d", [2, 3])]
 
 
 def pit(d, mode, **settings):
     """Twelve boxes of any size, turned at random, above a pit."""
     random = np.random.default_rng(3)
-    world = World(Physics(d, gravity=DOWN[:d]), Rotation(), settings=Settings(collision=mode, **settings))
-    static = RigidBody(kind="static")
+    world = turning_world(d, 10, collision=mode, on_fault="ignore", **settings)
     for place, half in (
         ((0, -1, 0), (9, 1, 9)), ((2, 3, 0), (0.2, 4, 9)), ((-2, 3, 0), (0.2, 4, 9)), ((0, 3, 2), (9, 4, 0.2)),
         ((0, 3, -2), (9, 4, 0.2)),
     )[: 2 * d - 1]:  # fmt: skip
-        world.create_entity(Transform(place[:d]), static.copy(), BoxCollider(half[:d], friction=0.6))
+        wall(world, place[:d], half[:d], friction=0.6)
     for k in range(12):
         place = np.concatenate((random.uniform(-1, 1, 1), (0.8 + 1.2 * k,), random.uniform(-1, 1, d - 2)))
         turned, spin = (random.uniform(0, 6), random.normal()) if d == 2 else random.normal(size=(2, 4))
@@ -33,17 +33,11 @@ def pit(d, mode, **settings):
     return world
 
 
-def matrix(turned):
-    """Of an angle, or of a quaternion w, x, y, z."""
-    if np.ndim(turned) == 0:
-        return np.array(((np.cos(turned), -np.sin(turned)), (np.sin(turned), np.cos(turned))))
-    w, u = turned[0] / np.linalg.norm(turned), turned[1:] / np.linalg.norm(turned)
-    return (w * w - u @ u) * np.eye(3) + 2 * np.outer(u, u) + 2 * w * np.cross(u, np.eye(3)).T
-
-
 def distance_to(place, turned, half, point):
-    """From a box to a point; inside minus the way out."""
-    beyond = np.abs(matrix(turned).T @ (point - place)) - half
+    """From a box to a point; inside minus the way out. Turned: an angle, or a quaternion w, x, y, z."""
+    c, s = np.cos(turned), np.sin(turned)
+    axes = np.array(((c, -s), (s, c))) if np.ndim(turned) == 0 else matrix(turned / np.linalg.norm(turned))
+    beyond = np.abs(axes.T @ (point - place)) - half
     return np.linalg.norm(np.maximum(beyond, 0)) + min(beyond.max(), 0)
 
 
@@ -61,31 +55,43 @@ def first_touch(box, start, way, radius, farthest):
     return at if at <= farthest else None
 
 
-def test_a_file_or_a_snapshot_of_a_heap_goes_on_to_the_bit(d, mode, tmp_path):
-    """In mid-air, in contact and asleep."""
-    with pit(d, mode, sleeping=True, on_fault="ignore") as world:
+def test_a_heap_goes_on_from_files_to_the_bit_falls_asleep_and_is_woken_by_a_blow(d, mode, tmp_path):
+    """From snapshots too: in mid-air, in contact and asleep, where it stays to the bit without a spin."""
+    with pit(d, mode, sleeping=True) as world:
+        bodies = world.bodies.dynamic
         for steps in (40, 60, 500):
-            for _ in range(steps):
-                world.step()
+            run(world, steps)
             world.save(tmp_path / "heap.carom")
-            kept = world.snapshot()
-            hashes = []
-            with World.load(tmp_path / "heap.carom", Physics(d, gravity=DOWN[:d]), Rotation()) as loaded:
+            kept, hashes = world.snapshot(), []
+            with World.load(tmp_path / "heap.carom", Physics(d, gravity=(0, -10, 0)[:d]), Rotation()) as loaded:
                 for one in (world, world, loaded):
-                    for _ in range(30):
-                        one.step()
+                    run(one, 30)
                     hashes.append(one.state_hash())
                     world.restore(kept)
             assert len(set(hashes)) == 1
-        assert world.bodies.dynamic.asleep.all()
+        run(world, 30)
+        assert bodies.asleep.all()
+        state = bodies.position.copy(), bodies.rotation.copy()
+        assert world.kinetic_energy() == 0.0
+        world.step()
+        assert np.array_equal(bodies.position, state[0])
+        assert np.array_equal(bodies.rotation, state[1])
+        top = int(bodies.entity[bodies.position[:, 1].argmax()])
+        place = np.array(part(world, top, Transform).position) + (0.1, 2, 0)[:d]
+        world.create_entity(Transform(place), RigidBody(4, (0, -6, 0)[:d]), Spin(), SphereCollider(0.2))
+        turned, awake = np.array(part(world, top, Transform).rotation), 0
+        for _ in range(40):
+            world.step()
+            awake = max(awake, np.count_nonzero(~world.bodies.dynamic.asleep))
+        assert awake > 2
+        assert np.abs(part(world, top, Transform).rotation - turned).max() > 1e-5
 
 
 def test_queries_meet_the_boxes_as_they_are_turned(d, mode):
     random, found = np.random.default_rng(1), 0
-    with pit(d, mode, on_fault="ignore") as world:
+    with pit(d, mode) as world:
         for _ in range(30):
-            for _ in range(6):
-                world.step()
+            run(world, 6)
             point, radius = random.uniform((-2, -0.2, -1)[:d], (2, 4, 1)[:d]), random.uniform(0.05, 0.6)
             way = random.normal(size=d)
             way /= np.linalg.norm(way)
@@ -103,35 +109,11 @@ def test_queries_meet_the_boxes_as_they_are_turned(d, mode):
     assert found > 60
 
 
-def test_a_heap_falls_asleep_without_a_spin_and_a_blow_wakes_it(d, mode):
-    with pit(d, mode, sleeping=True, on_fault="ignore") as world:
-        bodies = world.bodies.dynamic
-        for _ in range(600):
-            world.step()
-        assert bodies.asleep.all()
-        state = bodies.position.copy(), bodies.rotation.copy()
-        assert world.kinetic_energy() == 0.0
-        world.step()
-        assert np.array_equal(bodies.position, state[0])
-        assert np.array_equal(bodies.rotation, state[1])
-        top = int(bodies.entity[bodies.position[:, 1].argmax()])
-        place = np.array(world.component_for_entity(top, Transform).position) + (0.1, 2, 0)[:d]
-        world.create_entity(Transform(place), RigidBody(4, (0, -6, 0)[:d]), Spin(), SphereCollider(0.2))
-        turned = np.array(world.component_for_entity(top, Transform).rotation)
-        awake = 0
-        for _ in range(40):
-            world.step()
-            awake = max(awake, np.count_nonzero(~world.bodies.dynamic.asleep))
-        assert awake > 2
-        assert np.abs(world.component_for_entity(top, Transform).rotation - turned).max() > 1e-5
-
-
 def test_impacts_are_told_at_the_surfaces_as_turned_then(d, mode):
     """Pairs that meet off their centres; cubes in space, whose free turn has a closed form. To 1e-6, in space to 3e-3,
     where an edge lies nearly on a face."""
     random, start, told = np.random.default_rng(3), {}, set()
-    settings = Settings(collision=mode, integrator="velocity_verlet", on_fault="ignore")
-    with World(Physics(d, gravity=0), Rotation(), settings=settings) as world:
+    with turning_world(d, collision=mode, integrator="velocity_verlet", on_fault="ignore") as world:
         for k in range(120):
             away, side = np.array((8 * (k // 2) + 1.6 * (k % 2), 0, 0)[:d]), 1 - 2 * (k % 2)
             place = away + random.uniform(-0.3, 0.3, d) * (0.3, 1, 1)[:d]
@@ -153,17 +135,7 @@ def test_impacts_are_told_at_the_surfaces_as_turned_then(d, mode):
                 for entity in (impact.entity_a, impact.entity_b):
                     place, velocity, turned, spin, half = start[entity]
                     at = (before + after) * spin
-                    now = turned + at if d == 2 else product(quaternion(at), turned)
+                    now = turned + at if d == 2 else product(rotation(*at), turned)
                     gap = distance_to(place + (before + after) * velocity, now, half, impact.point)
                     assert abs(gap) < (1e-6 if d == 2 else 3e-3)
     assert len(told) == 60
-
-
-def quaternion(turn):
-    angle = np.linalg.norm(turn)
-    return np.concatenate(((np.cos(angle / 2),), np.sin(angle / 2) * turn / angle))
-
-
-def product(p, q):
-    """The rotation q, then p."""
-    return np.concatenate(((p[0] * q[0] - p[1:] @ q[1:],), p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])))

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rotation.helpers_turning import box, part, turning_world, wall
+from worlds import MODES, run
 
 from carom.components import RigidBody, SphereCollider, Transform
-from carom.framework import Settings, World
-from carom.plugins import Physics
-from carom.plugins.rotation import BoxCollider, Rotation, Spin
+from carom.plugins.rotation import BoxCollider, Spin
 
 PAIRS, APART, POSES = 250, 40.0, 4000
 HALF = np.array((1.0, 0.01))
@@ -28,7 +28,7 @@ def least_gaps(places, velocities, angles, spins, radii, dt):
     return least
 
 
-@pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
+@pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("fastest", [50.0, 500.0])
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_a_thin_bar_passes_through_no_ball_and_strikes_none_that_it_does_not_meet(seed, fastest, mode):
@@ -41,7 +41,7 @@ def test_a_thin_bar_passes_through_no_ball_and_strikes_none_that_it_does_not_mee
     spins, angles, velocities, radii, places = (x[free] for x in (spins, angles, velocities, radii, places))
     gaps = least_gaps(places, velocities, angles, spins, radii, dt)
     soon = least_gaps(places, velocities, angles, spins, radii, 1.25 * dt)  # a usual substep looks ahead as far
-    with World(Physics(2, gravity=0), Rotation(), settings=Settings(collision=mode, on_fault="ignore")) as world:
+    with turning_world(collision=mode, on_fault="ignore") as world:
         balls = []
         for k, place in enumerate(places):
             centre = np.array((k * APART, 0.0))
@@ -51,55 +51,52 @@ def test_a_thin_bar_passes_through_no_ball_and_strikes_none_that_it_does_not_mee
             body = RigidBody(linear_velocity=velocities[k])
             balls.append(world.create_entity(Transform(centre + place), body, SphereCollider(radii[k])))
         world.step()
-        after = np.array([world.component_for_entity(entity, RigidBody).linear_velocity for entity in balls])
+        after = np.array([part(world, entity, RigidBody).linear_velocity for entity in balls])
     struck = np.abs(after - velocities).max(axis=1) > 1e-9
     assert struck[gaps < -1e-3].all()
     assert not struck[soon > 5e-3].any()
     assert min((gaps < -1e-3).sum(), (gaps > 1e-3).sum()) > 15
 
 
-@pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
+@pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("w", [0.2, 2.0])
 def test_a_turntable_whose_rim_goes_far_carries_a_box_level(w, mode):
     """It leaves the circle by w dt / 2 of its way, outwards."""
     seconds, dt, about = 2.0, 1 / 60, np.array((0, w, 0))
-    with World(Physics(3, gravity=(0, -10, 0)), Rotation(), settings=Settings(collision=mode, dt=dt)) as world:
+    with turning_world(3, 10, collision=mode, dt=dt) as world:
         table = BoxCollider((9, 0.5, 9), friction=2)
         world.create_entity(Transform((0, -0.5, 0)), RigidBody(kind="kinematic"), Spin(about), table)
-        body, place = RigidBody(1, (0, 0, -w)), Transform((1, 0.1, 0))
-        entity = world.create_entity(place, body, Spin(about), BoxCollider((0.1, 0.1, 0.1), friction=2))
-        for _ in range(round(seconds / dt)):
-            world.step()
-        place = world.component_for_entity(entity, Transform)
+        entity = box(world, (1, 0.1, 0), (0.1, 0.1, 0.1), (0, 0, -w), about, friction=2)
+        run(world, round(seconds / dt))
+        place = part(world, entity, Transform)
         x, q = np.array(place.position), np.array(place.rotation)
     assert abs(x[1] - 0.1) < 1e-4
     assert np.hypot(q[1], q[3]) < 1e-3  # half the tilt
     assert np.hypot(x[0], x[2]) == pytest.approx(np.exp(w * w * dt * seconds / 2), rel=2e-3)
 
 
-@pytest.mark.parametrize("mode", ["continuous", "event_driven"])
+@pytest.mark.parametrize("mode", MODES[1:])
 @pytest.mark.parametrize("d", [2, 3])
 def test_boxes_that_turn_and_fall_through_more_than_a_floor_in_a_step_stay_above_it(d, mode):
     random, boxes = np.random.default_rng(0), 30
-    physics, settings = Physics(d, gravity=(0, -9.81, 0)[:d]), Settings(dt=0.4, collision=mode, on_fault="ignore")
-    with World(physics, Rotation(), settings=settings) as world:
+    with turning_world(d, 9.81, dt=0.4, collision=mode, on_fault="ignore") as world:
         material: dict[str, Any] = {"restitution": 0.5, "friction": 0.5}
-        world.create_entity(Transform((0, -1, 0)[:d]), BoxCollider((1e4, 1.0, 1e4)[:d], **material))
+        wall(world, (0, -1, 0)[:d], (1e4, 1.0, 1e4)[:d], **material)
         for k in range(boxes):
             angle, spin = random.uniform(-3, 3), random.uniform(-6, 6)
             turned: Any = angle
             if d == 3:
                 spin, turned = random.uniform(-6, 6, d), random.normal(size=4)
                 turned /= np.linalg.norm(turned)
-            place = Transform((k * APART, random.uniform(2, 10), 0)[:d], turned)
-            world.create_entity(place, RigidBody(), Spin(spin), BoxCollider(random.uniform(0.3, 0.7, d), **material))
+            place = (k * APART, random.uniform(2, 10), 0)[:d]
+            box(world, place, random.uniform(0.3, 0.7, d), spin=spin, rotation=turned, **material)
         for _ in range(40):
             world.step()
             assert world.bodies.dynamic.position[:, 1].min() > -1.0
         assert world.bodies.dynamic.position[:, 1].min() > 0.0
 
 
-@pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
+@pytest.mark.parametrize("mode", MODES)
 def test_what_turns_fast_does_not_sink_into_what_the_floor_stops(mode):
     """A box that turns and the bar below it fall as fast: on their free ways they may not touch, but the bar is
     stopped. Neither that nor the box's second corner in a step leads in by more than a quarter of its half side: what
@@ -108,18 +105,16 @@ def test_what_turns_fast_does_not_sink_into_what_the_floor_stops(mode):
     for seed in range(30):
         random = np.random.default_rng((seed, 5))
         speed, below = random.uniform(2, 8), 0.25 + random.uniform(0, 0.2) * 8 / 60
-        with World(Physics(2, gravity=0), Rotation(), settings=Settings(collision=mode, on_fault="ignore")) as world:
-            world.create_entity(Transform((0, -1)), BoxCollider((20, 1)))
-            bar = world.create_entity(
-                Transform((0, below)), RigidBody(1, linear_velocity=(0, -speed)), Spin(), BoxCollider((1, 0.25))
-            )
+        with turning_world(collision=mode, on_fault="ignore") as world:
+            wall(world, (0, -1), (20, 1))
+            bar = box(world, (0, below), (1, 0.25), (0, -speed))
             above = below + 0.25 + np.sqrt(0.125) + random.uniform(0, 0.1)
-            place = Transform((random.uniform(-0.3, 0.3), above), random.uniform(0, 1))
-            spin = Spin(random.choice([-1, 1]) * random.uniform(15, 25))
-            box = world.create_entity(place, RigidBody(1, linear_velocity=(0, -speed)), spin, BoxCollider((0.25, 0.25)))
+            place, angle = (random.uniform(-0.3, 0.3), above), random.uniform(0, 1)
+            spin = random.choice([-1, 1]) * random.uniform(15, 25)
+            turning = box(world, place, (0.25, 0.25), (0, -speed), spin, angle)
             for _ in range(6):
                 world.step()
-                met = (world.contacts.entity_a == bar) & (world.contacts.entity_b == box)
+                met = (world.contacts.entity_a == bar) & (world.contacts.entity_b == turning)
                 assert (world.contacts.depth[met] < 0.25 * 0.25).all(), seed
                 hits += met.any()
     assert hits > 30
