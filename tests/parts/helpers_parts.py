@@ -56,11 +56,6 @@ def body_of(world: World, body: int) -> RigidBody:
     return world.component_for_entity(body, RigidBody)
 
 
-def run(world: World, steps: int) -> None:
-    for _ in range(steps):
-        world.step()
-
-
 def angular_momentum(world: World, bodies: list[int]) -> Any:
     """kg m^2/s about the origin."""
     total: Any = 0.0

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from parts.helpers_parts import CORNER, G, L, U, angular_momentum, at, body_of, floor, parts_world, piece, run
-from worlds import MODES
+from parts.helpers_parts import CORNER, G, L, U, angular_momentum, at, body_of, floor, parts_world, piece
+from worlds import MODES, run
 
 from carom import Parts, Physics, RigidBody, Rotation, SphereCollider, Transform, World, scenes
 from carom.plugins.joints import Hinge, Joints
@@ -103,23 +103,30 @@ def test_a_piece_on_a_hinge_has_the_period_of_a_physical_pendulum():
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_free_collisions_keep_momentum_and_energy(mode):
-    random = np.random.default_rng(7)
-    world, parts = parts_world(collision=mode)
-    bodies = []
-    for place in itertools.product((0.0, 1.8), (0.0, 1.8)):
-        velocity = random.normal(0.0, 1.5, 2) - np.array(place) + 0.9
-        bodies.append(
-            piece(world, parts, place, U, velocity=velocity, spin=random.normal(0.0, 3.0), restitution=1.0)[0]
-        )
-    energy, momentum, turning, struck = world.kinetic_energy(), world.momentum(), angular_momentum(world, bodies), 0
-    for _ in range(150):
+@pytest.mark.parametrize("d", [2, 3])
+def test_free_collisions_keep_momentum_and_angular_momentum_and_elastic_ones_energy(d, mode):
+    """Those in space rub and are not elastic; what turns freely there is exact on average alone."""
+    random, exact = np.random.default_rng(7), d == 2
+    world, parts = parts_world(dimensions=d, collision=mode, dt=1 / 60 if exact else 1 / 240)
+    material = {"restitution": 1.0} if exact else {"restitution": 0.7, "friction": 0.3}
+    bodies, speed = [], 1.5 if exact else 1.0
+    for place in itertools.product((0.0, 1.8), (0.0, 1.8), *[(0.0,)] * (d - 2)):
+        velocity = random.normal(0.0, speed, d) - np.array(place) + (0.9, 0.9, 0.0)[:d]
+        spin = random.normal(0.0, 3.0) if exact else random.normal(0.0, 2.0, 3)
+        boxes = U if exact else CORNER
+        bodies.append(piece(world, parts, place, boxes, velocity=velocity, spin=spin, **material)[0])
+    energies, momentum, turning = [world.kinetic_energy()], world.momentum(), angular_momentum(world, bodies)
+    for _ in range(150 if exact else 480):
         world.step()
-        struck += len(world.contacts)
-    assert struck > 2
-    assert world.kinetic_energy() == pytest.approx(energy, rel=1e-12)
+        energies.append(world.kinetic_energy())
+    if exact:
+        assert world.stats().counters["impacts"] > 2
+        assert energies == pytest.approx([energies[0]] * 151, rel=1e-12)
+    else:
+        assert energies[-1] < 0.98 * energies[0]
+        assert np.diff(energies).max() < 1e-4 * energies[0]
     assert world.momentum() == pytest.approx(momentum, abs=1e-12)
-    assert angular_momentum(world, bodies) == pytest.approx(turning, rel=1e-11)
+    assert angular_momentum(world, bodies) == pytest.approx(turning, rel=1e-11 if exact else 1e-9)
 
 
 def test_exact_flights_do_not_depend_on_the_step():
@@ -189,27 +196,6 @@ def test_what_bounces_on_a_part_of_what_rests_finds_it_at_rest():
     assert at(world, table[0]).rotation == pytest.approx(0.0, abs=1e-4)
 
 
-@pytest.mark.parametrize("mode", MODES)
-def test_free_collisions_in_space(mode):
-    random = np.random.default_rng(7)
-    world, parts = parts_world(dimensions=3, collision=mode, dt=1 / 240)
-    bodies = []
-    for place in itertools.product((0.0, 1.8), (0.0, 1.8), (0.0,)):
-        velocity = random.normal(0.0, 1.0, 3) - np.array(place) + (0.9, 0.9, 0)
-        spin = random.normal(0.0, 2.0, 3)
-        bodies.append(
-            piece(world, parts, place, CORNER, velocity=velocity, spin=spin, restitution=0.7, friction=0.3)[0]
-        )
-    energies, momentum, turning = [world.kinetic_energy()], world.momentum(), angular_momentum(world, bodies)
-    for _ in range(480):
-        world.step()
-        energies.append(world.kinetic_energy())
-    assert energies[-1] < 0.98 * energies[0]
-    assert np.diff(energies).max() < 1e-4 * energies[0]  # what turns freely is exact on average alone
-    assert world.momentum() == pytest.approx(momentum, abs=1e-12)
-    assert angular_momentum(world, bodies) == pytest.approx(turning, rel=1e-9)
-
-
 @pytest.mark.parametrize("mode", ["continuous", "event_driven"])
 @pytest.mark.parametrize("restitution", [0.0, 1.0])
 def test_fast_pieces_do_not_pass_walls(mode, restitution):
@@ -231,21 +217,6 @@ def test_fast_pieces_do_not_pass_walls(mode, restitution):
         now = world.kinetic_energy()
         assert now <= energy * (1 + gain)
         energy = max(now, 1e-12)
-
-
-def test_a_heap_of_pieces_comes_to_rest():
-    world, parts = parts_world((0, -G))
-    floor(world, friction=0.6)
-    bodies = [piece(world, parts, (0.2 * k, 0.7 + 1.1 * k), (L, U)[k % 2], friction=0.6)[0] for k in range(3)]
-    before = world.kinetic_energy() + world.potential_energy()
-    for _ in range(150):
-        world.step()
-        energy = world.kinetic_energy() + world.potential_energy()
-        assert energy <= before + 0.02 * G
-        before = min(energy, before)
-    assert world.kinetic_energy() < 1e-3
-    assert max(contact.depth for contact in world.contacts) < 0.02
-    assert min(at(world, body).y for body in bodies) > 0.1
 
 
 @pytest.mark.parametrize("mode", MODES)

@@ -7,19 +7,20 @@ import math
 
 import numpy as np
 import pytest
-from parts.helpers_parts import body_of, parts_world, run
+from parts.helpers_parts import body_of, parts_world
+from worlds import run
 
 from carom import ConvexPolygonCollider, RigidBody, Transform
 from carom.plugins import convex_polygon
 from carom.plugins.parts import PartOf, parts_from_outline
 from carom.plugins.rotation import Spin
 
+pytest.importorskip("mapbox_earcut")
 pytestmark = pytest.mark.plain
 ANGLE = ((0, 0), (2, 0), (2, 1), (1, 1), (1, 3), (0, 3))
 
 
 def test_pieces_of_random_outlines_are_convex_and_have_its_area():
-    pytest.importorskip("mapbox_earcut")
     random = np.random.default_rng(2)
     for _ in range(60):
         angles = np.sort(random.uniform(0.0, 2 * math.pi, random.integers(5, 20)))
@@ -41,7 +42,6 @@ def test_pieces_of_random_outlines_are_convex_and_have_its_area():
 
 
 def test_an_angle_is_two_boxes_and_turns_about_its_centre():
-    pytest.importorskip("mapbox_earcut")
     outline = parts_from_outline(ANGLE)
     assert [len(piece.vertices) for piece in outline.pieces] == [4, 4]
     assert outline.centre == pytest.approx((0.75, 1.25))
@@ -77,7 +77,6 @@ def test_an_angle_is_two_boxes_and_turns_about_its_centre():
     ],
 )
 def test_what_is_no_outline_is_refused(points, message):
-    pytest.importorskip("mapbox_earcut")
     with pytest.raises(ValueError, match=message):
         parts_from_outline(points)
 
