@@ -1,4 +1,4 @@
-"""Worlds of two dimensions with joints."""
+"""Worlds with joints, and bodies of two dimensions for them."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from carom.plugins.rotation import BoxCollider, Rotation, Spin
 G = 9.81
 
 
-def joint_world(gravity: Any = (0.0, -G), **settings: Any) -> tuple[World, Joints]:
+def joint_world(gravity: Any = (0.0, -G), d: int = 2, **settings: Any) -> tuple[World, Joints]:
     joints = Joints()
-    return World(Physics(dimensions=2, gravity=gravity), Rotation(), joints, settings=Settings(**settings)), joints
+    return World(Physics(dimensions=d, gravity=gravity), Rotation(), joints, settings=Settings(**settings)), joints
 
 
 def disc(world: World, place: Any, radius: float = 0.1, mass: float = 1.0, **spin: Any) -> int:
@@ -36,11 +36,6 @@ def chain(world: World, links: int, way: Any, half: Any, hangs: bool = True) -> 
         if k or hangs:
             hinges.append(world.create_entity(Hinge(bodies[k - 1] if k else None, bodies[k], anchor=k * way)))
     return bodies, hinges
-
-
-def run(world: World, steps: int) -> None:
-    for _ in range(steps):
-        world.step()
 
 
 def run_failing(world: World, steps: int, due: int) -> None:
@@ -88,7 +83,3 @@ def gaps(world: World, hinges: list[int]) -> np.ndarray:
             ends.append(place + np.array(((c, -s), (s, c))) @ local)
         found.append(np.linalg.norm(ends[1] - ends[0]))
     return np.array(found)
-
-
-def energy(world: World) -> float:
-    return world.kinetic_energy() + world.potential_energy()

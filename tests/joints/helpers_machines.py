@@ -7,11 +7,11 @@ import math
 import numpy as np
 from joints.helpers_joints import G, joint_world
 
-from carom import Physics, Plugin, RigidBody, Transform, World, column
+from carom import Plugin, RigidBody, Transform, column
 from carom.framework.typing import Vector
 from carom.framework.vectors import add, divided, dot, length, replace, scale, sub
-from carom.plugins.joints import CUSTOM, HOLD, LIMIT, Driven, Joint, Joints, Row, arm_of, moment
-from carom.plugins.rotation import Rotation, Spin
+from carom.plugins.joints import CUSTOM, HOLD, LIMIT, Driven, Joint, Row, arm_of, moment
+from carom.plugins.rotation import Spin
 
 machines = Plugin("machines", version="1.0")
 
@@ -117,11 +117,7 @@ class Rail(Driven):
 
 
 def machine_world(dimensions=2, gravity=G, **settings):
-    if dimensions == 2:
-        world, joints = joint_world((0.0, -gravity), **settings)
-    else:
-        joints = Joints()
-        world = World(Physics(dimensions=3, gravity=(0, -gravity, 0)), Rotation(), joints)
+    world, joints = joint_world((0.0, -gravity, 0.0)[:dimensions], dimensions, **settings)
     world.add_plugin(machines)
     return world, joints
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from worlds import run
 
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
@@ -35,8 +36,7 @@ def test_a_flipper_that_a_motor_starts_throws_the_ball_over_it(above, e, mode):
             ball = world.create_entity(
                 Transform((where * c - s * up, where * s + c * up)), RigidBody(), SphereCollider(RADIUS, restitution=e)
             )
-            for _ in range(2):
-                world.step()
+            run(world, 2)
             hinge.motor_speed, fastest = SPEED, 0.0
             for _ in range(4):
                 world.step()

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from joints.helpers_joints import at, disc, joint_world, plank, run
+from joints.helpers_joints import at, disc, joint_world, plank
+from worlds import run
 
 from carom import Physics, RigidBody, Rotation, SphereCollider, Transform, World
 from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Motor, MousePull, Slider, Weld

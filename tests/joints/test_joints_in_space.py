@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from joints.helpers_joints import G, at, run
+from joints.helpers_joints import G, at, joint_world
+from worlds import run
 
-from carom import Physics, RigidBody, Settings, Transform, World
+from carom import Physics, RigidBody, Transform, World
 from carom.plugins.joints import Ball, Cone, Hinge, Joints, Motor, Slider, Weld, Wheel
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
@@ -18,8 +19,7 @@ TURN = (math.cos(0.3), 0.2 * math.sin(0.3), -0.6 * math.sin(0.3), math.sqrt(0.6)
 
 
 def space(gravity: Any = (0.0, 0.0, -G), **settings: Any) -> tuple[World, Joints]:
-    joints = Joints()
-    return World(Physics(dimensions=3, gravity=gravity), Rotation(), joints, settings=Settings(**settings)), joints
+    return joint_world(gravity, 3, **settings)
 
 
 def block(world: World, place: Any, half: Any = (0.5, 0.1, 0.2), mass: float = 1.0, rotation: Any = 0.0) -> int:
@@ -65,14 +65,6 @@ def test_hinge_has_a_motor_and_limits():
     run(world, 1200)
     assert joints.state(entity).value == pytest.approx(2.0, abs=0.02)
     np.testing.assert_allclose(spin_of(world, body), 0.0, atol=1e-6)
-
-
-def test_motor_turns_to_an_angle_in_space():
-    world, joints = space(0)
-    body = world.create_entity(Transform((0, 0, 0), TURN), RigidBody(), Spin(inertia=np.full(3, 2.0)))
-    motor = world.create_entity(Motor(None, body, angle=1.0, axis=(0, 0, 1), max_torque=20.0))
-    run(world, 300)
-    assert joints.state(motor).value == pytest.approx(1.0, abs=0.01)
 
 
 def hinged(limits: Any = None, **fields: Any) -> tuple[World, Joints, int, int]:
@@ -191,24 +183,6 @@ def axes_of(rotation: Any) -> np.ndarray:
     w, x, y, z = rotation
     cross = np.array(((0, -z, y), (z, 0, -x), (-y, x, 0)))
     return np.eye(3) + 2.0 * (w * cross + cross @ cross)
-
-
-def test_welded_blocks_fly_as_one():
-    world, _ = space(0)
-    a, b = block(world, (0, 0, 0), rotation=TURN), block(world, (1, 0.3, 0))
-    world.create_entity(Weld(a, b, anchor=(0.5, 0, 0)))
-    for body, speed in ((a, (0, 1, 0)), (b, (0, -1, 0.5))):
-        world.component_for_entity(body, RigidBody).linear_velocity = speed
-    distance = np.linalg.norm(np.subtract(at(world, a).position, at(world, b).position))
-    momentum = world.momentum()
-    for _ in range(300):
-        world.step()
-        np.testing.assert_allclose(world.momentum(), momentum, atol=1e-12)
-        now = np.linalg.norm(np.subtract(at(world, a).position, at(world, b).position))
-        assert now == pytest.approx(distance, abs=0.02)
-    np.testing.assert_allclose(spin_of(world, a), spin_of(world, b), atol=0.02)
-    product = abs(np.dot(at(world, a).rotation, at(world, b).rotation))
-    assert product == pytest.approx(math.cos(0.3), abs=0.01)  # half the angle between both
 
 
 def test_slider_in_space_stops_at_its_limit():

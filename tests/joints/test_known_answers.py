@@ -7,10 +7,12 @@ import math
 
 import numpy as np
 import pytest
-from joints.helpers_joints import G, at, chain, disc, energy, gaps, joint_world, plank, run, spin_of
-from worlds import MODES
+from helpers_pairwise import pairwise
+from joints.helpers_joints import G, at, chain, disc, gaps, joint_world, plank, spin_of
+from worlds import MODES, run
 
 from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World
+from carom.lab.testing import energy
 from carom.plugins.joints import Distance, Hinge, Joints, Motor, MousePull, Slider, Weld, Wheel
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
@@ -92,28 +94,6 @@ def test_chain_holds_a_hundred_times_its_weight(way):
         assert joints.state(hinges[0]).impulse[1] == pytest.approx(2020 * G / 60, rel=0.02)
 
 
-def test_chain_of_200_swings_and_stays_together():
-    world, _ = joint_world(on_fault="ignore")
-    _, hinges = chain(world, 200, (1, 0), (0.5, 0.1))
-    worst = 0.0
-    for _ in range(60):
-        run(world, 10)
-        worst = max(worst, gaps(world, hinges).max())
-    assert worst < 0.2
-
-
-def test_free_chain_keeps_its_momentum():
-    world, _ = joint_world(0)
-    bodies, _ = chain(world, 20, (1, 0), (0.5, 0.1), hangs=False)
-    for k, body in enumerate(bodies):
-        world.component_for_entity(body, RigidBody).linear_velocity = (0.0, math.sin(k))
-    before, momentum = world.kinetic_energy(), world.momentum()
-    for _ in range(1000):
-        world.step()
-    np.testing.assert_allclose(world.momentum(), momentum, atol=1e-12)
-    assert world.kinetic_energy() < before
-
-
 @pytest.mark.parametrize("substeps", [2, 4, 8])
 @pytest.mark.parametrize("ratio", [0.0, 0.1, 0.5, 1.0])
 def test_spring_has_its_period_and_decay(substeps, ratio):
@@ -136,6 +116,18 @@ def test_spring_has_its_period_and_decay(substeps, ratio):
         assert less == pytest.approx(fades**2, rel=1e-6)
 
 
+def highest_energies(world):
+    """J, kinetic, in 10 s and in the 10 s after these."""
+    highest = []
+    for _ in range(2):
+        energies = []
+        for _ in range(600):
+            world.step()
+            energies.append(world.kinetic_energy())
+        highest.append(max(energies))
+    return highest
+
+
 @pytest.mark.parametrize(("springs", "frequency"), [(1, 2.0), (1, 20.0), (8, 5.0), (32, 10.0), (64, 15.0)])
 def test_springs_without_damping_give_no_energy(springs, frequency):
     """Where they are stiff, or many at one body, they may lose some."""
@@ -144,11 +136,7 @@ def test_springs_without_damping_give_no_energy(springs, frequency):
     for angle in 2.0 * math.pi * np.arange(springs) / springs:
         end = math.cos(angle), math.sin(angle)
         world.create_entity(Distance(None, body, point_a=end, length=1.0, frequency=frequency))
-    energies = []
-    for _ in range(1200):
-        world.step()
-        energies.append(world.kinetic_energy())
-    early, late = max(energies[:600]), max(energies[600:])
+    early, late = highest_energies(world)
     assert late < 1.02 * early
     assert springs * frequency > 40.0 or late > 0.98 * early
 
@@ -172,9 +160,7 @@ def test_door_on_a_spring_swings_about_its_edge_at_the_frequency_of_the_spring(d
     assert period(angles, 1 / 60) == pytest.approx(1.0, abs=2e-3)
 
 
-@pytest.mark.parametrize("frequency", [1.0, 8.0, 20.0, 29.0])
-@pytest.mark.parametrize("leaves", [1, 4])
-@pytest.mark.parametrize("substeps", [2, 4])
+@pytest.mark.parametrize(("frequency", "leaves", "substeps"), pairwise((1.0, 8.0, 20.0, 29.0), (1, 4), (2, 4)))
 def test_springs_of_doors_give_no_energy(frequency, leaves, substeps):
     world, _ = joint_world(0, substeps=substeps)
     before, bodies = None, []
@@ -187,11 +173,8 @@ def test_springs_of_doors_give_no_energy(frequency, leaves, substeps):
     world.step()
     for k, leaf in enumerate(bodies):
         world.component_for_entity(leaf, RigidBody).apply_impulse((0.1, 0.3 * (-1) ** k))
-    energies = []
-    for _ in range(1200):
-        world.step()
-        energies.append(world.kinetic_energy())
-    assert max(energies[600:]) < 1.05 * max(energies[:600])
+    early, late = highest_energies(world)
+    assert late < 1.05 * early
 
 
 @pytest.mark.parametrize("beside", [0.0, 1.5, 3.0])
@@ -207,11 +190,12 @@ def test_slider_on_a_spring_swings_at_its_frequency_wherever_its_axis_is(beside)
     assert period(ways, 1 / 60) == pytest.approx(1.0, abs=2e-3)
 
 
-@pytest.mark.parametrize("d", [2, 3])
-@pytest.mark.parametrize("kind", [Slider, Wheel])
-@pytest.mark.parametrize(("frequency", "substeps"), [(8.0, 2), (8.0, 4), (20.0, 4)])
-@pytest.mark.parametrize("beside", [-0.6, -2.0])
-def test_springs_beside_the_centres_of_their_bodies_give_no_energy(d, kind, frequency, substeps, beside):
+@pytest.mark.parametrize(
+    ("d", "kind", "stiff", "beside"),
+    pairwise((2, 3), (Slider, Wheel), ((8.0, 2), (8.0, 4), (20.0, 4)), (-0.6, -2.0)),
+)
+def test_springs_beside_the_centres_of_their_bodies_give_no_energy(d, kind, stiff, beside):
+    frequency, substeps = stiff
     pad, place = (0.0,) * (d - 2), (0.7, beside, 0.0)[:d]
     world = World(Physics(dimensions=d, gravity=0), Rotation(), Joints(), settings=Settings(substeps=substeps))
     a, b = (
@@ -224,15 +208,13 @@ def test_springs_beside_the_centres_of_their_bodies_give_no_energy(d, kind, freq
     world.create_entity(kind(a, b, frequency=frequency, **held))
     world.component_for_entity(a, RigidBody).apply_impulse((0.1, 0.25, *pad))
     world.component_for_entity(b, RigidBody).apply_impulse((0.1, -0.4, *pad))
-    energies = []
-    for _ in range(1200):
-        world.step()
-        energies.append(world.kinetic_energy())
-    assert max(energies[600:]) < 1.05 * max(energies[:600])
+    early, late = highest_energies(world)
+    assert late < 1.05 * early
 
 
-@pytest.mark.parametrize("frequency", [3.0, 29.0, 31.0, 100.0, 1e4])
-@pytest.mark.parametrize("damping_ratio", [0.0, 1.0])
+@pytest.mark.parametrize(
+    ("frequency", "damping_ratio"), [(3.0, 0.0), (29.0, 1.0), (31.0, 0.0), (100.0, 1.0), (1e4, 0.0), (1e4, 1.0)]
+)
 def test_springs_of_any_stiffness_gain_no_energy_in_a_chain(frequency, damping_ratio):
     world, joints = joint_world(0)
     bodies = [disc(world, (k, 0)) for k in range(1, 21)]

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from joints.helpers_joints import G, at, chain, disc, plank, run, run_failing
-from joints.helpers_machines import Gear, Pulley, Rail, Rod, Stop, body, machine_world, machines
+from joints.helpers_joints import G, at, disc, plank, run_failing
+from joints.helpers_machines import Gear, Pulley, Rail, Rod, Stop, body, machine_world
+from worlds import run
 
-from carom import Physics, RigidBody, SphereCollider, Transform, World
-from carom.plugins.joints import DRIVE, HOLD, LIMIT, SERVO, SPRING, Distance, Joints, Motor
-from carom.plugins.rotation import BoxCollider, Rotation, Spin
+from carom import RigidBody, SphereCollider, Transform
+from carom.plugins.joints import DRIVE, HOLD, LIMIT, SERVO, SPRING, Distance, Motor
+from carom.plugins.rotation import BoxCollider, Spin
 
 
 @pytest.mark.parametrize("dimensions", [2, 3])
@@ -111,30 +112,6 @@ def test_rod_as_a_function_moves_as_the_built_in_one(dimensions):
     np.testing.assert_allclose(places[0], places[1], atol=1e-9)
 
 
-def test_free_bodies_keep_momentum_and_angular_momentum():
-    world, _ = machine_world(gravity=0.0, dt=1 / 240)
-    a, b = body(world, (0, 0), 0.5), body(world, (1, 0.5), 0.3, mass=2.0, linear_velocity=(1, -2))
-    world.create_entity(Rod(a, b, (0.1, 0.2), (0, -0.3)))
-
-    def momentum():
-        turning = 0.0
-        for each, inertia in ((a, 0.5), (b, 0.3)):
-            x, y = at(world, each).position
-            u, v = world.component_for_entity(each, RigidBody).linear_velocity
-            mass = world.component_for_entity(each, RigidBody).mass
-            turning += mass * (x * v - y * u) + inertia * world.component_for_entity(each, Spin).angular_velocity
-        return np.append(world.momentum(), turning)
-
-    before = momentum()
-    world.step()  # it stops what the rod does not let them do
-    energy = world.kinetic_energy()
-    run(world, 480)
-    now = momentum()
-    np.testing.assert_allclose(now[:2], before[:2], atol=1e-12)
-    assert now[2] == pytest.approx(before[2], rel=2e-3)
-    assert world.kinetic_energy() == pytest.approx(energy, rel=0.02)
-
-
 def test_values_obey_every_rule():
     world, joints = machine_world(gravity=0.0)
     rails = {}
@@ -175,46 +152,6 @@ def test_fields_are_seen_at_once_and_wake_the_bodies():
     assert joints.of(a) == [gear]
 
 
-def build():
-    world, joints = machine_world()
-    a, b = disc(world, (0, -1), mass=2.0), disc(world, (2, -2))
-    _, hinges = chain(world, 4, (0.8, 0.6), (0.45, 0.1))
-    pulley = world.create_entity(Pulley(a, b, (0, 0), (2, 0), anchor_a=(0.1, 0.1)))
-    gear = world.create_entity(Gear(a, b, 0.7))
-    world.component_for_entity(a, Spin).angular_velocity = 5.0
-    world.create_entity(Distance(None, b, point_a=(2.5, 0)))
-    return world, joints, (pulley, gear, *hinges)
-
-
-def test_same_bits_again_from_snapshots_and_files(tmp_path):
-    world, joints, (_, gear, *hinges) = build()
-    run(world, 30)
-    snapshot, value = world.snapshot(), joints.state(gear).value
-    world.save(tmp_path / "machines.carom")
-    run(world, 30)
-    later = world.state_hash(), joints.state(gear).value
-    world.delete_entity(hinges[2])
-    run(world, 3)
-    world.restore(snapshot)
-    assert value != later[1] != 0.0
-    run(world, 30)
-    assert (world.state_hash(), joints.state(gear).value) == later
-    joints = Joints()
-    gravity = Physics(dimensions=2, gravity=(0, -G))
-    loaded = World.load(tmp_path / "machines.carom", gravity, Rotation(), joints, machines)
-    run(loaded, 30)
-    assert (loaded.state_hash(), joints.state(gear).value) == later
-
-
-def test_step_that_fails_leaves_forces_and_values_as_they_were():
-    found = []
-    for fails in (False, True):
-        world, joints, (_, gear, *_) = build()
-        run_failing(world, 20, 5 if fails else -1)
-        found.append((world.state_hash(), joints.state(gear).value))
-    assert found[0] == found[1]
-
-
 @pytest.mark.parametrize("kind", [Distance, Pulley])
 def test_step_that_fails_while_balls_bounce_on_a_body_leaves_the_directions_of_forces(kind):
     hashes = []
@@ -237,17 +174,16 @@ def test_step_that_fails_while_balls_bounce_on_a_body_leaves_the_directions_of_f
 def test_they_break_and_are_lost_as_others():
     world, joints = machine_world()
     a, b = body(world, (0, -1), mass=3.0), body(world, (2, -2))
-    pulley = Pulley(a, b, (0, 0), (2, 0), breaking_force=2.0 * 3.0 / 4.0 * G * 0.99)
     events = []
     for event in ("joint_broken", "joint_lost"):
         world.on(event, lambda entity, joint, event=event: events.append((event, joint)))
+    least = {"breaking_force": 0.99 * 1.5 * G}  # of 2 m_a m_b g / (m_a + m_b)
+    pulley, again = (Pulley(a, b, (0, 0), (2, 0), **limit) for limit in (least, {}))
     world.create_entity(pulley)
     run(world, 3)
     assert events == [("joint_broken", pulley)]
-    again = Pulley(a, b, (0, 0), (2, 0))
     world.create_entity(again)
     run(world, 30)
-    np.testing.assert_allclose(joints.columns()["impulse"][0, 1] * 60, 1.5 * G, rtol=1e-3)
     world.delete_entity(b)
     world.step()
     assert events[1:] == [("joint_lost", again)]

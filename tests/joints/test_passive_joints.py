@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from joints.helpers_joints import energy, joint_world
+from joints.helpers_joints import joint_world
+from worlds import run
 
 from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World
+from carom.lab.testing import energy
 from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Slider, Weld
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
@@ -144,8 +146,7 @@ def test_bodies_of_three_moments_that_tumble_about_a_joint_gain_nothing(seed):
             for x in (0.0, 1.0)
         ]  # fmt: skip
         world.create_entity(Ball(*ends, anchor=(0.5, 0, 0)))
-        for _ in range(2):
-            world.step()
+        run(world, 2)
         start = world.kinetic_energy()
         for _ in range(1200):
             world.step()

@@ -7,20 +7,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from joints.helpers_joints import G, at, run
+from joints.helpers_joints import G, at, joint_world
+from worlds import run
 
-from carom import Physics, RigidBody, Transform, World
+from carom import RigidBody, Transform, World
 from carom.plugins.joints import Joints, Wheel
-from carom.plugins.rotation import Rotation, Spin
+from carom.plugins.rotation import Spin
 
 pytestmark = [pytest.mark.plain, pytest.mark.parametrize("d", [2, 3])]
 
 
 def make(d: int, gravity: float = 0.0) -> tuple[World, Joints, dict[str, Any]]:
     """A world, its joints, and what a wheel about the last axis is given besides."""
-    joints, down = Joints(), [0.0, -gravity, 0.0][:d]
-    axle: dict[str, Any] = {} if d == 2 else {"axis": (0.0, 0.0, 2.0)}
-    return World(Physics(dimensions=d, gravity=down), Rotation(), joints), joints, axle
+    return *joint_world((0.0, -gravity, 0.0)[:d], d), {} if d == 2 else {"axis": (0.0, 0.0, 2.0)}
 
 
 def body(world: World, place: Any, mass: float, inertia: float, spin: Any = 0.0, **moves: Any) -> int:
