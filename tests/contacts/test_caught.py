@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers_modes import each_mode
-from worlds import ball, both_dimensions, box, make_world, velocity
+from worlds import ball, both_dimensions, box, make_world, run, velocity
 
 from carom.components import SphereCollider, Transform
 
@@ -58,13 +58,11 @@ def test_a_body_in_a_stack_that_loses_its_collider_falls_free(mode):
         world = make_world(gravity=(0.0, -9.81), collision=mode, dt=DT)
         box(world, (0.0, -0.5), half=(50.0, 0.5), kind="static")
         stack = [ball(world, (0.1 * (k % 2), 0.5 + k)) for k in range(5)]
-        for _ in range(60):
-            world.step()
+        run(world, 60)
         start = world.component_for_entity(stack[place], Transform).position[1]
         speed = velocity(world, stack[place])[1]
         world.remove_component(stack[place], SphereCollider)
-        for _ in range(30):
-            world.step()
+        run(world, 30)
         steps = 30 * 30 if mode == "event_driven" else 30 * 31  # on the parabola; by semi-implicit Euler
         fallen = start + 30 * DT * speed - 9.81 * DT**2 * steps / 2
         assert world.component_for_entity(stack[place], Transform).position[1] == pytest.approx(fallen, abs=1e-9)

@@ -7,7 +7,7 @@ import dataclasses
 import esper
 import numpy as np
 import pytest
-from worlds import ball, both_dimensions, make_world
+from worlds import ball, both_dimensions, make_world, run
 
 from carom.components import RigidBody, Transform
 from carom.framework import CaromError, Component, Contact, Phase, System, column
@@ -81,8 +81,7 @@ def crowd(d=2, count=60, seed=0, steps=2):
                 world.add_component(entity, make())
         if rng.random() < 0.3:
             world.add_component(entity, Tag(), type_alias=Alias)
-    for _ in range(steps):
-        world.step()
+    run(world, steps)
     return world, entities
 
 
@@ -126,23 +125,6 @@ def check_between(rows, first, second, expected):
     normals = rows.normals_from(between.a, between.rows)
     assert normals.shape == (len(expected), rows.normal.shape[1])
     assert normals.tobytes() == b"".join(contact.normal.tobytes() for *_, contact in expected)
-
-
-@pytest.mark.plain
-@pytest.mark.parametrize("count", [2, 3, 7, 12, pytest.param(150, marks=pytest.mark.compiled)])
-def test_few_contacts_and_many(count):
-    """Whatever the number of contacts beside the number of entities that have the component."""
-    world, entities = crowd(count=count, seed=count)
-    for entity in entities[1:]:
-        for component in (Missile, Enemy):
-            if world.has_component(entity, component):
-                world.remove_component(entity, component)
-    world.add_component(entities[0], Missile())
-    for first, second in [(Missile, Tag), (Tag, Missile), (Missile, Missile), (Missile, RigidBody), (Enemy, Tag)]:
-        rows = world.contacts
-        expected = list(by_definition(world, rows, first, second))
-        assert [bits(contact) for *_, contact in rows.pairs(first, second)] == [bits(row[-1]) for row in expected]
-        check_between(rows, first, second, expected)
 
 
 def test_records_are_copies():

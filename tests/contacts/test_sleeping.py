@@ -8,13 +8,10 @@ import numpy as np
 import pytest
 from contacts.helpers_sleeping import MODES, is_asleep, sleep, sleepy_world, tower
 from helpers_pairwise import pairwise
-from worlds import ball, box, make_world
+from worlds import METHODS, ball, box, make_world, position, run
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Phase, Settings, System, World
-from carom.plugins import Physics
-
-METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
 
 
 def rows_of(world: World, entities) -> list[tuple]:
@@ -28,15 +25,11 @@ def rows_of(world: World, entities) -> list[tuple]:
 
 
 def test_off_by_default_and_nothing_sleeps():
-    world = sleepy_world(sleeping=False)
     assert Settings().sleeping is False
+    world = sleepy_world(sleeping=False)
     boxes = tower(world, 0.0)
-    for _ in range(60):
-        world.step()
+    run(world, 60)
     assert not any(is_asleep(world, *boxes))
-    assert not world.bodies.asleep.any()
-    assert "_sleep_state" not in world.physics.table.arrays
-    assert not any(name in str(world.plan()) for name in ("rest_sleepers", "update_sleep", "leave_out_still"))
 
 
 @pytest.mark.parametrize(
@@ -65,8 +58,7 @@ def test_neighbours_that_do_not_touch_do_not_wake_each_other_in_turns(mode, gap)
     """The second one comes to rest later."""
     world = sleepy_world(collision=mode)
     neighbours = box(world, (0.0, 0.5)), box(world, (1.0 + gap, 0.6))
-    for _ in range(90):
-        world.step()
+    run(world, 90)
     for _ in range(60):
         world.step()
         assert all(is_asleep(world, *neighbours))
@@ -75,8 +67,7 @@ def test_neighbours_that_do_not_touch_do_not_wake_each_other_in_turns(mode, gap)
 def test_not_before_half_a_second_at_rest():
     world = sleepy_world()
     boxes = tower(world, 0.0, 1)
-    for _ in range(28):
-        world.step()
+    run(world, 28)
     assert is_asleep(world, *boxes) == [False]
     sleep(world, *boxes)
 
@@ -98,8 +89,7 @@ def test_what_drifts_flies_or_is_carried_does_not_sleep():
 def test_what_slides_slowly_does_not_stop():
     world = sleepy_world()
     slow = box(world, (0.0, 0.05), (0.02, 0.0), half=0.05, friction=0.0)
-    for _ in range(120):
-        world.step()
+    run(world, 120)
     assert world.component_for_entity(slow, RigidBody).linear_velocity[0] == pytest.approx(0.02)
 
 
@@ -112,9 +102,8 @@ def test_sleeps_on_a_kinematic_body_that_stands_until_it_moves():
     world.component_for_entity(lift, RigidBody).linear_velocity = (0.0, 1.0)
     world.step()
     assert is_asleep(world, carried) == [False]
-    for _ in range(30):
-        world.step()
-    assert world.component_for_entity(carried, Transform).position[1] > 6.4
+    run(world, 30)
+    assert position(world, carried)[1] > 6.4
 
 
 def test_a_sleeping_pile_costs_no_flight_no_pairs_and_no_solving():
@@ -123,7 +112,7 @@ def test_a_sleeping_pile_costs_no_flight_no_pairs_and_no_solving():
     sleep(world, *boxes)
     world.reset_stats()
     world.step()
-    counters = world.physics.counters()
+    counters = world.stats().counters
     for name in ("bodies", "candidates", "pairs", "contacts", "resting_contacts", "impacts"):
         assert counters[name] == 0, name
     assert len(world.contacts) == 12
@@ -173,25 +162,27 @@ def test_waking_goes_on_as_if_nothing_had_happened():
     assert len(world.contacts.begin) == len(world.contacts.end) == 0
 
 
-def test_contacts_of_sleepers_are_listed_in_order_and_make_no_events():
+def test_contacts_of_sleepers_are_listed_in_order_and_stay():
     world = sleepy_world()
     boxes = tower(world, 0.0)
     rolling = ball(world, (-10.0, 0.3), (1.0, 0.0), radius=0.3)
     late = tower(world, 10.0)
-    told = []
+    told, stays = [], []
     for name in ("contact_begin", "contact_end"):
         world.on(name, lambda contact, name=name: told.append((name, contact.entity_a, contact.entity_b)))
+    world.on("contact_stay", lambda contact: stays.append((contact.entity_a, contact.entity_b)))
     world.step()
     told.clear()
     sleep(world, *boxes, *late)
+    stays.clear()
+    world.step()
     contacts = world.contacts
     assert not is_asleep(world, rolling)[0]
-    assert len(contacts) == 7
     pairs = list(zip(contacts.entity_a.tolist(), contacts.entity_b.tolist(), strict=True))
-    assert pairs == sorted(pairs)
+    assert len(pairs) == len(contacts.stay) == 7
+    assert pairs == sorted(pairs) == sorted(stays)
     assert set(contacts.step.tolist()) == {world.step_count - 1}
     assert (contacts.normal_impulse > 0.0).all()
-    assert len(contacts.stay) == 7
     assert told == []
     world.wake(boxes[0])
     world.step()
@@ -212,17 +203,6 @@ def test_what_a_game_writes_into_the_contacts_of_sleepers_changes_nothing_but_wh
     assert (world.contacts.normal == normals).all()
     assert world.contacts.enabled.all()
     assert all(is_asleep(world, *boxes))
-
-
-def test_contact_stay_is_told_of_sleepers():
-    world = sleepy_world()
-    boxes = tower(world, 0.0, 2)
-    stays = []
-    world.on("contact_stay", lambda contact: stays.append((contact.entity_a, contact.entity_b)))
-    sleep(world, *boxes)
-    stays.clear()
-    world.step()
-    assert len(stays) == 2
 
 
 def test_sensors_do_not_wake_and_tell_who_comes_and_goes():
@@ -246,27 +226,38 @@ def test_sensors_do_not_wake_and_tell_who_comes_and_goes():
     assert all(is_asleep(world, *boxes))
 
 
+class Disable(System):
+    phase = Phase.NARROW
+    open = True
+
+    def process(self, dt):
+        if self.open:
+            self.world.contacts.enabled[:] = False
+
+
 def test_disabling_the_contact_of_sleepers_wakes_them():
-    class Trapdoor(System):
-        phase = Phase.NARROW
-        open = False
-
-        def process(self, dt):
-            if self.open:
-                self.world.contacts.enabled[:] = False
-
-    world = sleepy_world()
+    world, trapdoor = sleepy_world(), Disable()
     boxes = tower(world, 0.0, 1)
-    trapdoor = Trapdoor()
+    trapdoor.open = False
     world.add_system(trapdoor)
     sleep(world, *boxes)
     trapdoor.open = True
     world.step()
     assert is_asleep(world, *boxes) == [False]
-    for _ in range(30):
-        world.step()
-    assert world.component_for_entity(boxes[0], Transform).position[1] < 0.0
+    run(world, 30)
+    assert position(world, boxes[0])[1] < 0.0
     assert is_asleep(world, *boxes) == [False]
+
+
+def test_what_is_held_apart_by_disabled_contacts_does_not_sleep():
+    world, off = make_world(2, 0.0, sleeping=True), Disable()
+    pair = ball(world, 0.0), ball(world, 0.9)
+    world.add_system(off)
+    run(world, 60)
+    assert not any(is_asleep(world, *pair))
+    world.remove_system(off)
+    world.step()
+    assert len(world.contacts.begin) == 1
 
 
 def test_one_way_platforms_that_look_at_velocities_hold_sleepers():
@@ -285,86 +276,48 @@ def test_one_way_platforms_that_look_at_velocities_hold_sleepers():
     assert min(heights) > 0.49
 
 
-def test_what_is_held_apart_by_disabled_contacts_does_not_sleep():
-    class Off(System):
-        phase = Phase.NARROW
-
-        def process(self, dt):
-            self.world.contacts.enabled[:] = False
-
-    world = make_world(2, 0.0, sleeping=True)
-    pair = ball(world, 0.0), ball(world, 0.9)
-    off = Off()
-    world.add_system(off)
-    for _ in range(60):
-        world.step()
-    assert not any(is_asleep(world, *pair))
-    world.remove_system(off)
-    world.step()
-    assert len(world.contacts.begin) == 1
-
-
-class WakeWithinTheStep(System):
-    """Wakes an entity after the flight, when it is known already which bodies are awake in the step."""
-
-    phase = Phase.INTEGRATION
-
-    def __init__(self, entity, when):
-        self.entity, self.when = entity, when
-
-    def process(self, dt):
-        if self.world.step_count == self.when:
-            self.world.wake(self.entity)
-
-
-@pytest.mark.parametrize("balls", [3, 60])
-def test_balls_above_a_sleeping_crowd_are_tested_alone(balls):
-    """The search for pairs costs work for those that are awake; what they do is the same as where nothing sleeps."""
+def test_balls_above_a_sleeping_crowd_fly_as_where_nothing_sleeps():
+    """The search for pairs costs work for those that are awake only."""
     places = []
     for sleeping in (True, False):
-        with World(Physics(dimensions=2, gravity=(0.0, -9.81)), settings=Settings(sleeping=sleeping)) as world:
-            world.create_entity(Transform((0.0, -0.5)), AABBCollider(half_extents=(1000.0, 0.5)))
-            x = np.arange(300) * 1.5
-            world.create_entities(
-                300, Transform.many(np.stack([x, np.full(300, 0.5)], axis=1)), RigidBody.many(mass=1.0),
-                AABBCollider.many(half_extents=(0.5, 0.5)),
-            )  # fmt: skip
-            flyers = world.create_entities(
-                balls, Transform.many(np.stack([x[:balls], np.full(balls, 9.0)], axis=1)),
-                RigidBody.many(mass=1.0, gravity_scale=0.0, linear_velocity=(0.5, 0.0)),
-                SphereCollider.many(radius=0.5, restitution=1.0),
-            )  # fmt: skip
-            for _ in range(120):
-                world.step()
-            if sleeping:
-                assert world.bodies.asleep.sum() == 300
-                assert world.physics.state.static_grid.suits
-            for _ in range(120):
-                world.step()
-            places.append([world.component_for_entity(entity, Transform).position.copy() for entity in flyers])
-    assert np.array_equal(places[0], places[1])
+        world, x = sleepy_world(sleeping=sleeping), np.arange(300) * 1.5
+        world.create_entities(
+            300, Transform.many(np.stack([x, np.full(300, 0.5)], axis=1)), RigidBody.many(),
+            AABBCollider.many(half_extents=(0.5, 0.5)),
+        )  # fmt: skip
+        flyers = world.create_entities(
+            3, Transform.many(np.stack([x[:3], np.full(3, 9.0)], axis=1)),
+            RigidBody.many(gravity_scale=0.0, linear_velocity=(0.5, 0.0)),
+            SphereCollider.many(radius=0.5, restitution=1.0),
+        )  # fmt: skip
+        run(world, 120)
+        assert world.bodies.asleep.sum() == 300 * sleeping
+        run(world, 120)
+        places.append([position(world, entity).tolist() for entity in flyers])
+    assert places[0] == places[1]
 
 
 def test_a_body_that_is_woken_within_a_step_finds_what_it_touches():
     """All bodies look for others in that step, not only those that were awake when it began."""
-    with World(Physics(dimensions=2, gravity=(0.0, -9.81)), settings=Settings(sleeping=True)) as world:
-        world.create_entity(Transform((0.0, -0.5)), AABBCollider(half_extents=(50.0, 0.5)))
-        places = [(3.0 * k, 0.5 + h) for k in range(3) for h in range(2)]
-        boxes = world.create_entities(
-            6, Transform.many(places), RigidBody.many(mass=1.0), AABBCollider.many(half_extents=(0.5, 0.5))
-        )
-        world.create_entity(
-            Transform((0.0, 30.0)), RigidBody(mass=1.0, gravity_scale=0.0, linear_velocity=(0.1, 0.0)),
-            SphereCollider(radius=0.5),
-        )  # fmt: skip
-        world.add_system(WakeWithinTheStep(boxes[0], 200))
-        for _ in range(200):
-            world.step()
-        assert is_asleep(world, *boxes) == [True] * 6
-        contacts = len(world.contacts)
-        world.step()
-        assert is_asleep(world, *boxes) == [False, False, True, True, True, True]
-        assert len(world.contacts) == contacts
+
+    class WakeAfterTheFlight(System):
+        phase = Phase.INTEGRATION
+
+        def process(self, dt):
+            if self.world.step_count == 200:
+                self.world.wake(boxes[0])
+
+    world = sleepy_world()
+    boxes = [entity for k in range(3) for entity in tower(world, 3.0 * k, 2)]
+    flyer = ball(world, (0.0, 30.0), (0.1, 0.0))
+    world.component_for_entity(flyer, RigidBody).gravity_scale = 0.0
+    world.add_system(WakeAfterTheFlight())
+    run(world, 200)
+    assert is_asleep(world, *boxes) == [True] * 6
+    contacts = len(world.contacts)
+    world.step()
+    assert is_asleep(world, *boxes) == [False, False, True, True, True, True]
+    assert len(world.contacts) == contacts
 
 
 @pytest.mark.parametrize("mode", MODES)

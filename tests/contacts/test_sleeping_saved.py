@@ -6,7 +6,7 @@ import pickle
 
 import pytest
 from contacts.helpers_sleeping import CAUSES, GRAVITY, is_asleep, sleep, sleepy_world, tower, two_towers
-from worlds import ball, floor
+from worlds import ball, floor, run
 
 from carom.components import RigidBody, Transform
 from carom.framework import Phase, Settings, System, World
@@ -17,6 +17,13 @@ from carom.plugins.springs import Springs
 @pytest.fixture(scope="module")
 def asleep():
     return two_towers()
+
+
+class Failing(System):
+    phase = Phase.RESPONSE
+
+    def process(self, dt):
+        raise ValueError("no")
 
 
 def go_on(world: World, boxes: list[int], steps: int = 12) -> list[str]:
@@ -33,9 +40,7 @@ def go_on(world: World, boxes: list[int], steps: int = 12) -> list[str]:
 
 @pytest.mark.parametrize("when", ["due", "asleep", "woken"])
 def test_snapshots_and_files_go_on_to_the_bit(when, tmp_path):
-    world = World(
-        Physics(2, gravity=(0.0, -GRAVITY)), convex_polygon.plugin, settings=Settings(sleeping=True)
-    )
+    world = World(Physics(2, gravity=(0.0, -GRAVITY)), convex_polygon.plugin, settings=Settings(sleeping=True))
     floor(world, friction=0.5)
     boxes = tower(world, 0.0)
     corners = ((-0.5, -0.5), (0.5, -0.5), (0.0, 0.5))
@@ -76,8 +81,7 @@ def test_a_world_that_does_not_sleep_goes_on_from_a_snapshot_of_one_that_does():
 def test_a_snapshot_from_before_wakes_what_sleeps():
     world = sleepy_world()
     boxes = tower(world, 0.0)
-    for _ in range(5):
-        world.step()
+    run(world, 5)
     snapshot = world.snapshot()
     first = [world.step() or world.state_hash() for _ in range(10)]
     sleep(world, *boxes)
@@ -88,12 +92,6 @@ def test_a_snapshot_from_before_wakes_what_sleeps():
 
 @pytest.mark.parametrize("cause", ["push", "touched", "bottom deleted", "static placed"])
 def test_a_failed_step_is_undone(asleep, cause):
-    class Failing(System):
-        phase = Phase.RESPONSE
-
-        def process(self, dt):
-            raise ValueError("no")
-
     world, boxes, _, snapshot = asleep
     world.settings = world.settings.replace(dt=1 / 60)
     world.restore(snapshot)
@@ -136,8 +134,7 @@ def test_a_spring_from_a_sleeper_to_what_is_awake_goes_on_from_a_snapshot_to_the
     springs.connect(boxes[0], ball(world, (0.0, 3.0)), stiffness=20.0, damping=0.5)
     snapshot, ends = world.snapshot(), []
     for _ in range(2):
-        for _ in range(10):
-            world.step()
+        run(world, 10)
         ends.append(world.state_hash())
         world.restore(snapshot)
     assert ends[0] == ends[1]
@@ -145,12 +142,6 @@ def test_a_spring_from_a_sleeper_to_what_is_awake_goes_on_from_a_snapshot_to_the
 
 @pytest.mark.parametrize("fails", ["the step in which all wake", "the step after"])
 def test_turned_off_a_failed_step_puts_nobody_back_to_sleep(fails):
-    class Failing(System):
-        phase = Phase.RESPONSE
-
-        def process(self, dt):
-            raise ValueError("no")
-
     world = sleepy_world()
     boxes = tower(world, 0.0)
     sleep(world, *boxes)

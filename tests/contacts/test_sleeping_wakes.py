@@ -17,7 +17,7 @@ from contacts.helpers_sleeping import (
     tower,
     two_towers,
 )
-from worlds import ball, box, floor
+from worlds import ball, box, floor, position, run
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Phase, Settings, System, World
@@ -41,8 +41,7 @@ def test_rows_that_move_take_their_sleep_along():
         world.delete_entity(entity)
     for k in range(80):  # the table grows
         ball(world, (30.0 + 2.0 * k, 5.0))
-    for _ in range(5):
-        world.step()
+    run(world, 5)
     assert all(is_asleep(world, *boxes, *first[1::2]))
     rows = [world.bodies.row_of(entity) for entity in boxes]
     assert (world.bodies.position[rows] == before).all()
@@ -59,7 +58,7 @@ def test_a_plan_between_falling_asleep_and_the_next_step_changes_nothing():
         while not is_asleep(each, boxes[1])[0]:
             each.step()
         if each is world:
-            assert "rest_sleepers" in str(each.plan())
+            each.plan()
         assert len(each.contacts.stay) == len(each.contacts) == 3
         for _ in range(3):
             each.step()
@@ -96,17 +95,6 @@ def test_a_replaced_integration_lets_nothing_sleep():
 
 
 @pytest.mark.plain
-def test_without_its_collider_the_last_sleeper_falls():
-    world = sleepy_world()
-    boxes = tower(world, 0.0, 1)
-    sleep(world, *boxes)
-    world.remove_component(boxes[0], AABBCollider)
-    for _ in range(30):
-        world.step()
-    assert world.component_for_entity(boxes[0], Transform).position[1] < 0.0
-
-
-@pytest.mark.plain
 def test_turned_off_all_wake():
     world = sleepy_world()
     boxes = tower(world, 0.0)
@@ -118,7 +106,7 @@ def test_turned_off_all_wake():
     assert len(world.contacts.begin) == len(world.contacts.end) == 0
     world.component_for_entity(boxes[0], RigidBody).linear_velocity = (1.0, 0.0)
     world.step()
-    assert world.component_for_entity(boxes[0], Transform).position[0] > 0.0
+    assert position(world, boxes[0])[0] > 0.0
 
 
 def test_a_body_with_a_value_that_cannot_be_wakes_the_others():
@@ -126,10 +114,9 @@ def test_a_body_with_a_value_that_cannot_be_wakes_the_others():
     boxes = tower(world, 0.0)
     sleep(world, *boxes)
     world.bodies.position[world.bodies.row_of(boxes[0])] = np.nan
-    for _ in range(30):
-        world.step()
+    run(world, 30)
     assert not any(is_asleep(world, *boxes))
-    assert world.component_for_entity(boxes[1], Transform).position[1] < 1.2
+    assert position(world, boxes[1])[1] < 1.2
 
 
 def test_queries_find_sleepers():
@@ -165,8 +152,7 @@ def test_what_wakes_an_island(asleep, cause):
     world.settings = world.settings.replace(dt=1 / 60)
     world.restore(snapshot)
     CAUSES[cause](world, boxes)
-    for _ in range(14 if cause == "touched by kinematic" else 3):
-        world.step()
+    run(world, 14 if cause == "touched by kinematic" else 3)
     left = [entity for entity in boxes if world.entity_exists(entity)]
     bodies = [e for e in left if world.component_for_entity(e, RigidBody).kind == "dynamic"]
     assert not any(is_asleep(world, *bodies))
@@ -174,7 +160,7 @@ def test_what_wakes_an_island(asleep, cause):
 
 
 def test_an_island_that_is_disturbed_between_falling_asleep_and_the_next_step():
-    for cause in ("in a column", "teleported", "grown", "bottom deleted", "floor moved", "constant force"):
+    for cause in ("in a column", "teleported", "grown", "bottom deleted", "floor moved", "constant force", "told"):
         world = sleepy_world()
         boxes = tower(world, 0.0)
         while not is_asleep(world, boxes[1])[0]:
@@ -210,10 +196,9 @@ def test_a_ball_thrown_at_a_sleeping_pile_wakes_that_island_alone(mode, speed):
             break
     assert not any(is_asleep(world, *near))
     assert all(is_asleep(world, *far))
-    assert world.component_for_entity(thrown, Transform).position[0] < 0.5 or mode == "discrete"
-    for _ in range(3):
-        world.step()
-    moved = world.component_for_entity(near[1], Transform).position[0]
+    assert position(world, thrown)[0] < 0.5 or mode == "discrete"
+    run(world, 3)
+    moved = position(world, near[1])[0]
     assert moved > 0.0 or (mode == "discrete" and speed > 100.0)
 
 
@@ -244,7 +229,7 @@ def test_what_is_struck_in_the_second_place_wakes_before_it():
 
 
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "rk4"])
-def test_springs_and_other_force_systems_wake(integrator):
+def test_a_spring_that_changes_wakes(integrator):
     springs, settings = Springs(), Settings(sleeping=True, integrator=integrator)
     world = World(Physics(2, gravity=(0.0, -GRAVITY)), springs, settings=settings)
     floor(world)
@@ -253,20 +238,6 @@ def test_springs_and_other_force_systems_wake(integrator):
     spring = springs.connect(boxes[0], hook, stiffness=1.0, damping=0.2, rest_length=1.0)
     sleep(world, *boxes)
     spring.stiffness = 2.0
-    world.step()
-    assert is_asleep(world, *boxes) == [False]
-
-    class Wind(ForceSystem):
-        strength = 0.0
-
-        def add_forces(self, bodies, time):
-            bodies.force += (self.strength, 0.0)
-
-    sleep(world, *boxes)
-    wind = Wind()
-    world.add_system(wind)
-    sleep(world, *boxes)
-    wind.strength = 0.5
     world.step()
     assert is_asleep(world, *boxes) == [False]
 
@@ -310,24 +281,24 @@ def test_what_sleeps_falls_at_once_where_gravity_says(mode, d):
         world.gravity = (0.0, GRAVITY, 0.0)[:d]
         if again:
             world.restore(world.snapshot())  # what wakes is not forgotten
-        for _ in range(60):
-            world.step()
+        run(world, 60)
         risen = 0.5 * GRAVITY * (1.0 if mode == "event_driven" else 1.0 + 1 / 60)  # semi-implicit
-        assert world.component_for_entity(body, Transform).position[1] == pytest.approx(0.5 + risen, abs=2e-3)
+        assert position(world, body)[1] == pytest.approx(0.5 + risen, abs=2e-3)
         assert is_asleep(world, body, light) == [False, True]
         hashes.append(world.state_hash())
         world.restore(snapshot)
     assert hashes[0] == hashes[1]
 
 
-def test_a_force_system_that_comes_or_goes_wakes_what_it_pushes():
+@pytest.mark.parametrize("integrator", ["semi_implicit_euler", "rk4"])
+def test_a_force_system_that_comes_goes_or_changes_wakes_what_it_pushes(integrator):
     class Wind(ForceSystem):
         strength = 0.5
 
         def add_forces(self, bodies, time):
             bodies.force += (self.strength, 0.0)
 
-    world, wind = sleepy_world(), Wind()
+    world, wind = sleepy_world(integrator=integrator), Wind()
     boxes = tower(world, 0.0)
     sleep(world, *boxes)
     for change in (world.add_system, world.remove_system):
@@ -340,6 +311,10 @@ def test_a_force_system_that_comes_or_goes_wakes_what_it_pushes():
         change(wind)
         world.step()
         assert all(is_asleep(world, *boxes))
+    world.add_system(wind)
+    wind.strength = 0.5
+    world.step()
+    assert not any(is_asleep(world, *boxes))
 
 
 @pytest.mark.parametrize("column", [False, True])
@@ -363,7 +338,7 @@ def test_a_system_that_moves_a_sleeper_within_the_step_wakes_it(column):
     kick.entity = boxes[2]
     world.step()
     assert not any(is_asleep(world, *boxes))
-    assert world.component_for_entity(boxes[2], Transform).position[0] > 0.0
+    assert position(world, boxes[2])[0] > 0.0
 
 
 @pytest.mark.parametrize("cause", ["floor moved", "floor without friction"])
@@ -384,14 +359,3 @@ def test_a_query_hides_no_change_of_what_sleepers_stand_on(cause, restored):
         world.restore(snapshot)
     world.step()
     assert not any(is_asleep(world, *boxes))
-
-
-def test_woken_as_it_is_about_to_sleep_it_sleeps_later():
-    world = sleepy_world()
-    boxes = tower(world, 0.0, 1)
-    while not is_asleep(world, *boxes)[0]:
-        world.step()
-    world.wake(boxes[0])
-    world.step()
-    assert not any(is_asleep(world, *boxes))
-    sleep(world, *boxes)
