@@ -134,14 +134,13 @@ def test_no_energy_drift_of_a_bouncing_ball(integrator, rate):
 @pytest.mark.parametrize(
     ("rule", "mixed"), [("max", 0.9), ("min", 0.4), ("average", 0.65), ("multiply", 0.36), ("geometric_mean", 0.6)]
 )
-@pytest.mark.parametrize("swapped", [False, True])
-def test_restitution_mixing(rule, mixed, swapped):
-    """Relative speed after = mixed(e1, e2) times before."""
-    world = make_world(**({} if rule == "max" else {"restitution_mixing": rule}))  # the default
-    e1, e2 = (0.4, 0.9) if swapped else (0.9, 0.4)
-    a, b = ball(world, -0.51, 1.0, restitution=e1), ball(world, 0.51, -1.0, restitution=e2)
-    run(world, 3)
-    assert velocity(world, b)[0] - velocity(world, a)[0] == pytest.approx(2 * mixed, abs=8 * EPS)
+def test_restitution_mixing(rule, mixed):
+    """Relative speed after = mixed(e1, e2) times before, whichever has which."""
+    for e1, e2 in ((0.4, 0.9), (0.9, 0.4)):
+        world = make_world(**({} if rule == "max" else {"restitution_mixing": rule}))  # the default
+        a, b = ball(world, -0.51, 1.0, restitution=e1), ball(world, 0.51, -1.0, restitution=e2)
+        run(world, 3)
+        assert velocity(world, b)[0] - velocity(world, a)[0] == pytest.approx(2 * mixed, abs=8 * EPS)
 
 
 @pytest.mark.parametrize(("factor", "bounces"), [(1.9, False), (2.1, True)])
