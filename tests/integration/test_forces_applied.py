@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers_motion import DRIFT, Oscillator, SpringAndDrag, all_methods, oscillators, record
+from helpers_motion import DRIFT, Oscillator, SpringAndDrag, all_methods, record
 from integration.helpers_forces import DT, Calls, body
-from oracles import integrators_naive as naive
-from worlds import EPS, make_world, position, run, velocity
+from worlds import EPS, make_world, run
 
 from carom.components import RigidBody, Transform
 from carom.framework import Phase
@@ -131,9 +130,7 @@ def test_force_of_every_frame_does_not_depend_on_the_frame_rate(hz):
     assert rigid.linear_velocity[0] == pytest.approx(3.0 * 4.0 / 2.0, rel=1e-14)
 
 
-@pytest.mark.parametrize(
-    "frame", [DT, 2 * DT, 4 * DT, 8 * DT]
-)
+@pytest.mark.parametrize("frame", [DT, 2 * DT, 4 * DT, 8 * DT])
 def test_force_on_a_body_that_a_system_has_just_made(frame):
     """It acts for one step, like any force that a system applies, whatever the frame rate."""
     world = make_world(dt=DT)
@@ -148,16 +145,3 @@ def test_force_on_a_body_that_a_system_has_just_made(frame):
     while world.step_count < 8:
         world.advance(frame)
     assert made[0].linear_velocity[0] == DT
-
-
-@all_methods
-def test_force_outside_acts_beside_force_systems(method):
-    """A constant push on a spring: exact in every stage, so the textbook's x'' = -x + 0.5 from (1, 0)."""
-    world = oscillators(method, DT, 1.0)
-    (_, rigid), = world.get_component(RigidBody)  # fmt: skip
-    for _ in range(20):
-        rigid.apply_force((0.5, 0.0))
-        world.step()
-    x, v = naive.trajectory(method, 1.0, 0.0, DT, 20, lambda x, v, t: 0.5 - x)
-    assert position(world, 1)[0] == pytest.approx(x[-1], rel=1e-13)
-    assert velocity(world, 1)[0] == pytest.approx(v[-1], rel=1e-13)

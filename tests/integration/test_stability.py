@@ -10,6 +10,7 @@ from helpers_motion import (
     ORDERS,
     STIFFNESS,
     Oscillator,
+    SpringAndDrag,
     all_methods,
     damped_oscillation,
     matrix_powers,
@@ -17,7 +18,7 @@ from helpers_motion import (
     record,
 )
 from oracles import integrators_naive as naive
-from worlds import EPS, make_world
+from worlds import EPS, make_world, run
 
 from carom.components import RigidBody, Transform
 from carom.framework import ForceSystem
@@ -134,7 +135,7 @@ def test_linear_damping_has_the_methods_order_with_a_spring(method):
     for steps in (200, 400):
         world = make_world(dt=1 / steps, integrator=method)
         world.create_entity(Transform((1, 0)), RigidBody(linear_damping=w), Oscillator(STIFFNESS))
-        world.add_system(SpringForce())
+        world.add_system(SpringAndDrag())
         positions, velocities = record(world, steps)
         x, v = damped_oscillation(0.5, 1.0)
         errors.append(math.hypot(positions[-1, 0, 0] - x, (velocities[-1, 0, 0] - v) / w))
@@ -147,18 +148,11 @@ def test_heavily_damped_bodies_creep(method):
     world = make_world(dt=1 / 60, integrator=method)
     world.create_entity(Transform((1, 0)), RigidBody(linear_damping=600.0), Oscillator(600.0))
     world.create_entity(Transform((1, 0)), RigidBody(), Oscillator(1.0))
-    world.add_system(SpringForce())
+    world.add_system(SpringAndDrag())
     positions, _ = record(world, 60)
     np.testing.assert_allclose(positions[:, 0, 0], np.exp(-np.arange(61) / 60), rtol=0.05)
     expected = matrix_powers(method, 1.0, 0.0, 1 / 60, 60)[:, 0]
     np.testing.assert_allclose(positions[:, 1, 0], expected, rtol=0, atol=1e-13)
-
-
-class SpringForce(ForceSystem):
-    requires = (Oscillator,)
-
-    def add_forces(self, bodies, time):
-        bodies.force[:] -= bodies.oscillator.stiffness[:, None] * bodies.position
 
 
 class Network(ForceSystem):
@@ -182,8 +176,7 @@ def return_error(method, steps=600):
     world.create_entities(n, Transform.many(start), RigidBody.many(rng.uniform(0.5, 2, n), rng.normal(size=(n, 2))))
     world.add_system(Network(np.diag(springs.sum(axis=1)) - springs))
     for _ in range(2):
-        for _ in range(steps):
-            world.step()
+        run(world, steps)
         world.bodies.linear_velocity[:] *= -1
     return np.abs(world.bodies.position - start).max()
 
