@@ -156,3 +156,4 @@ def test_turned_off_a_failed_step_puts_nobody_back_to_sleep(fails):
     world.step()
     assert not any(is_asleep(world, *boxes))
     assert len(world.contacts) == 3
+    assert len(world.contacts.begin) == len(world.contacts.end) == 0

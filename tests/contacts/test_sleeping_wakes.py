@@ -94,21 +94,6 @@ def test_a_replaced_integration_lets_nothing_sleep():
     assert not any(is_asleep(world, *boxes))
 
 
-@pytest.mark.plain
-def test_turned_off_all_wake():
-    world = sleepy_world()
-    boxes = tower(world, 0.0)
-    sleep(world, *boxes)
-    world.settings = world.settings.replace(sleeping=False)
-    world.step()
-    assert not any(is_asleep(world, *boxes))
-    assert len(world.contacts) == 3
-    assert len(world.contacts.begin) == len(world.contacts.end) == 0
-    world.component_for_entity(boxes[0], RigidBody).linear_velocity = (1.0, 0.0)
-    world.step()
-    assert position(world, boxes[0])[0] > 0.0
-
-
 def test_a_body_with_a_value_that_cannot_be_wakes_the_others():
     world = sleepy_world(on_fault="ignore")
     boxes = tower(world, 0.0)
@@ -117,15 +102,6 @@ def test_a_body_with_a_value_that_cannot_be_wakes_the_others():
     run(world, 30)
     assert not any(is_asleep(world, *boxes))
     assert position(world, boxes[1])[1] < 1.2
-
-
-def test_queries_find_sleepers():
-    world = sleepy_world()
-    boxes = tower(world, 0.0)
-    sleep(world, *boxes)
-    assert world.query_sphere((0.0, 1.5), 0.2) == [boxes[1]]
-    world.step()
-    assert all(is_asleep(world, *boxes))
 
 
 def test_settings_and_wake_are_checked():

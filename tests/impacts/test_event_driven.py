@@ -66,7 +66,7 @@ def test_b17_galperin(mode, dt, digits):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("digits", [5, 6])
+@pytest.mark.parametrize("digits", [5, pytest.param(6, marks=pytest.mark.long)])
 def test_b17_galperin_3141592(digits):
     check_galperin(Settings(collision="event_driven"), digits, 6.0)
 

@@ -41,7 +41,7 @@ def test_what_no_joint_can_be_is_refused_at_the_call(make, message):
 
 
 @pytest.mark.plain
-@pytest.mark.parametrize("number", [1e16, 1e29, 1e160, 1e300])
+@pytest.mark.parametrize("number", [1e16, 1e160, 1e300])
 def test_numbers_that_no_step_can_take_are_refused_with_their_field(number):
     for make, field in (
         (lambda: Distance(1, 2, length=number), "Distance.least"),

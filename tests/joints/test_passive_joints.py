@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from joints.helpers_joints import joint_world
 from worlds import run
 
 from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World
@@ -108,29 +107,6 @@ def test_no_chain_gains_energy_from_what_it_touches(d):
                 lowest = min(lowest, world.kinetic_energy())
                 touched += len(world.contacts)
     assert touched > 500
-
-
-@pytest.mark.parametrize("substeps", SUBSTEPS)
-def test_sliders_of_a_light_body_between_heavy_ones_give_no_energy(substeps):
-    world, _ = joint_world(0, substeps=substeps, on_fault="ignore")
-    post = world.create_entity(Transform((8, -2)), RigidBody(kind="static"), SphereCollider(0.2))
-    bodies = [
-        world.create_entity(
-            Transform(place), RigidBody(mass=mass, linear_velocity=velocity), Spin(spin), SphereCollider(0.5)
-        )
-        for place, mass, velocity, spin in (
-            ((-6, 0), 178.0, (3, -0.5), -0.06),
-            ((-2, -8), 0.752, (1.2, -2.1), -3.5),
-            ((4, 6), 282.0, (1.8, 2.3), -1.4),
-        )
-    ]
-    world.create_entity(Slider(bodies[1], bodies[0], direction=(-1.77, -0.117)))
-    world.create_entity(Slider(bodies[1], post, direction=(0.154, 0.399), collide_connected=True))
-    world.create_entity(Ball(bodies[2], bodies[1], anchor=(1, -1), collide_connected=True))
-    start = world.kinetic_energy()
-    for _ in range(600):
-        world.step()
-        assert world.kinetic_energy() <= start
 
 
 @pytest.mark.parametrize("seed", [0, 7])

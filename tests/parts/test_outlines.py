@@ -7,13 +7,9 @@ import math
 
 import numpy as np
 import pytest
-from parts.helpers_parts import body_of, parts_world
-from worlds import run
 
-from carom import ConvexPolygonCollider, RigidBody, Transform
-from carom.plugins import convex_polygon
-from carom.plugins.parts import PartOf, parts_from_outline
-from carom.plugins.rotation import Spin
+from carom import ConvexPolygonCollider
+from carom.plugins.parts import parts_from_outline
 
 pytest.importorskip("mapbox_earcut")
 pytestmark = pytest.mark.plain
@@ -41,28 +37,10 @@ def test_pieces_of_random_outlines_are_convex_and_have_its_area():
             assert own <= corners
 
 
-def test_an_angle_is_two_boxes_and_turns_about_its_centre():
+def test_an_angle_is_two_boxes():
     outline = parts_from_outline(ANGLE)
     assert [len(piece.vertices) for piece in outline.pieces] == [4, 4]
     assert outline.centre == pytest.approx((0.75, 1.25))
-    world, parts = parts_world()
-    world.add_plugin(convex_polygon.plugin)
-    first, *others = outline.pieces
-    body = world.create_entity(
-        Transform(outline.centre), RigidBody(4.0 * first.share), Spin(1.0),
-        ConvexPolygonCollider(first.vertices, offset=first.position),
-    )  # fmt: skip
-    for piece in others:
-        collider = ConvexPolygonCollider(piece.vertices)
-        world.create_entity(PartOf(body, piece.position, mass=4.0 * piece.share), collider)
-    run(world, 30)
-    assert body_of(world, body).mass == pytest.approx(4.0)
-    assert parts.centre(body) == pytest.approx((0, 0), abs=1e-15)
-    inertia = sum(  # of two boxes of 1 kg/m^2
-        w * h * ((w * w + h * h) / 12 + (x - 0.75) ** 2 + (y - 1.25) ** 2)
-        for w, h, x, y in ((2, 1, 1, 0.5), (1, 2, 0.5, 2))
-    )
-    assert world.component_for_entity(body, Spin).moments == pytest.approx(inertia)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Known answers of mechanics: rough impacts, billiards, a leaning card, bars that whirl between walls."""
+"""Known answers of mechanics: rough impacts, billiards, a leaning card, a crate on a floor with seams."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def test_a_rack_of_fifteen_keeps_momentum_and_angular_momentum(spin, mu, mode):
     assert last[0] == pytest.approx(first[0], rel=1e-12) if mu == 0.0 else last[0] < 0.95 * first[0]
 
 
-@pytest.mark.parametrize(("mu", "mode"), zip((0.2, 0.4, 0.6), MODES, strict=True))
+@pytest.mark.parametrize(("mu", "mode"), [*zip((0.2, 0.4, 0.6), MODES, strict=True)])
 def test_a_card_that_leans_on_a_wall_slides_where_friction_ends(mu, mode):
     """With the same friction at both ends, at tan a = (2 mu + q (1 + mu^2)) / (1 - mu^2) from the wall, q the thickness
     over the length: .99 of it stands within a mm for 3 s, with 16 substeps, and 1.04 falls."""
@@ -135,35 +135,6 @@ def test_a_card_that_leans_on_a_wall_slides_where_friction_ends(mu, mode):
             run(world, 180)
             way = np.abs(pose(world, entity)[:2] - place).max()
         assert way < 1e-3 if times < 1 else way > 0.1
-
-
-@pytest.mark.parametrize("mode", MODES[1:])
-@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
-def test_a_thin_bar_that_whirls_between_walls_stays_between_them(e, mode):
-    """40 of 2 m by 2 cm, each in a room of 3 m whose walls are 1 m thick, up to 500 rad/s and 30 m/s: no corner is ever
-    out by 5 mm. Without restitution some have more impacts than a step takes, and sink in, but come out again."""
-    random, half, room, n = np.random.default_rng(3), np.array((1.0, 0.01)), 1.5, 40
-    with turning_world(collision=mode, max_impacts_per_step=64, on_fault="ignore") as world:
-        centres = np.stack((10.0 * np.arange(n), np.zeros(n)), 1)
-        for x, _ in centres:
-            for way in (-1, 1):
-                wall(world, (x + way * (room + 0.5), 0), (0.5, room + 1), restitution=e, friction=0.2)
-                wall(world, (x, way * (room + 0.5)), (room + 1, 0.5), restitution=e, friction=0.2)
-        for centre in centres:
-            place, angle = centre + random.uniform(-0.2, 0.2, 2), random.uniform(0, 3)
-            velocity, spin = random.uniform(-30, 30, 2), random.uniform(-500, 500)
-            box(world, place, half, velocity, spin, angle, restitution=e, friction=0.2)
-        out = []
-        for _ in range(60):
-            world.step()
-            for centre, place, angle in zip(
-                centres, world.bodies.dynamic.position, world.bodies.dynamic.rotation, strict=True
-            ):
-                c, s = np.cos(angle), np.sin(angle)
-                corners = half * ((-1, -1), (1, -1), (-1, 1), (1, 1)) @ ((c, s), (-s, c))
-                out.append(np.abs(place - centre + corners).max() - room)
-    assert max(out) < (0.25 if e == 0.0 else 0.005)
-    assert max(out[-n:]) < 0.02
 
 
 @pytest.mark.parametrize("mode", MODES)
