@@ -127,6 +127,23 @@ def check_between(rows, first, second, expected):
     assert normals.tobytes() == b"".join(contact.normal.tobytes() for *_, contact in expected)
 
 
+@pytest.mark.plain
+@pytest.mark.parametrize("count", [2, 3, 7, 12, pytest.param(150, marks=pytest.mark.compiled)])
+def test_few_contacts_and_many(count):
+    """Whatever the number of contacts beside the number of entities that have the component."""
+    world, entities = crowd(count=count, seed=count)
+    for entity in entities[1:]:
+        for component in (Missile, Enemy):
+            if world.has_component(entity, component):
+                world.remove_component(entity, component)
+    world.add_component(entities[0], Missile())
+    for first, second in [(Missile, Tag), (Tag, Missile), (Missile, Missile), (Missile, RigidBody), (Enemy, Tag)]:
+        rows = world.contacts
+        expected = list(by_definition(world, rows, first, second))
+        assert [bits(contact) for *_, contact in rows.pairs(first, second)] == [bits(row[-1]) for row in expected]
+        check_between(rows, first, second, expected)
+
+
 def test_records_are_copies():
     """Writing into the arrays of a contact changes neither the columns nor another record."""
     world, _ = crowd()

@@ -30,6 +30,7 @@ def test_off_by_default_and_nothing_sleeps():
     boxes = tower(world, 0.0)
     run(world, 60)
     assert not any(is_asleep(world, *boxes))
+    assert not any(name in str(world.plan()) for name in ("rest_sleepers", "update_sleep", "leave_out_still"))
 
 
 @pytest.mark.parametrize(
@@ -276,7 +277,8 @@ def test_one_way_platforms_that_look_at_velocities_hold_sleepers():
     assert min(heights) > 0.49
 
 
-def test_balls_above_a_sleeping_crowd_fly_as_where_nothing_sleeps():
+@pytest.mark.parametrize("balls", [3, 60])
+def test_balls_above_a_sleeping_crowd_fly_as_where_nothing_sleeps(balls):
     """The search for pairs costs work for those that are awake only."""
     places = []
     for sleeping in (True, False):
@@ -286,12 +288,13 @@ def test_balls_above_a_sleeping_crowd_fly_as_where_nothing_sleeps():
             AABBCollider.many(half_extents=(0.5, 0.5)),
         )  # fmt: skip
         flyers = world.create_entities(
-            3, Transform.many(np.stack([x[:3], np.full(3, 9.0)], axis=1)),
+            balls, Transform.many(np.stack([x[:balls], np.full(balls, 9.0)], axis=1)),
             RigidBody.many(gravity_scale=0.0, linear_velocity=(0.5, 0.0)),
             SphereCollider.many(radius=0.5, restitution=1.0),
         )  # fmt: skip
         run(world, 120)
         assert world.bodies.asleep.sum() == 300 * sleeping
+        assert not sleeping or world.physics.state.static_grid.suits
         run(world, 120)
         places.append([position(world, entity).tolist() for entity in flyers])
     assert places[0] == places[1]

@@ -17,7 +17,7 @@ from contacts.helpers_sleeping import (
     tower,
     two_towers,
 )
-from worlds import ball, box, floor, position, run
+from worlds import ball, box, floor, position, run, velocity
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Phase, Settings, System, World
@@ -58,7 +58,7 @@ def test_a_plan_between_falling_asleep_and_the_next_step_changes_nothing():
         while not is_asleep(each, boxes[1])[0]:
             each.step()
         if each is world:
-            each.plan()
+            assert "rest_sleepers" in str(each.plan())
         assert len(each.contacts.stay) == len(each.contacts) == 3
         for _ in range(3):
             each.step()
@@ -174,8 +174,7 @@ def test_a_ball_thrown_at_a_sleeping_pile_wakes_that_island_alone(mode, speed):
     assert all(is_asleep(world, *far))
     assert position(world, thrown)[0] < 0.5 or mode == "discrete"
     run(world, 3)
-    moved = position(world, near[1])[0]
-    assert moved > 0.0 or (mode == "discrete" and speed > 100.0)
+    assert position(world, near[1])[0] > 0.0 or (mode == "discrete" and speed > 100.0)
 
 
 def test_a_bullet_wakes_what_it_sweeps_into():
@@ -186,8 +185,8 @@ def test_a_bullet_wakes_what_it_sweeps_into():
     shot = world.create_entity(Transform((-20.0, 1.5)), bullet, SphereCollider(0.05))
     world.step()
     assert not any(is_asleep(world, *boxes))
-    assert world.component_for_entity(shot, RigidBody).linear_velocity[0] < 2000.0
-    assert world.component_for_entity(boxes[1], RigidBody).linear_velocity[0] > 1000.0
+    assert velocity(world, shot)[0] < 2000.0
+    assert velocity(world, boxes[1])[0] > 1000.0
 
 
 def test_what_is_struck_in_the_second_place_wakes_before_it():

@@ -11,6 +11,7 @@ from helpers_pairwise import pairwise
 from worlds import both_dimensions
 
 from carom.lab import testing as kit
+from carom.systems.impacts.group import WORK
 
 each_collision = pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
 TOUCHING = 0.5 * math.sqrt(3) + 1e-15  # rows of balls that touch, and do not overlap by a rounding error
@@ -122,6 +123,19 @@ def test_a_light_ball_is_not_shot_out_between_two_heavy_ones(restitution):
         fastest = np.linalg.norm(world.bodies.linear_velocity, axis=1).max()
         assert speed < fastest <= 2.0 * speed * world.stats().counters["impacts"]
         assert world.kinetic_energy() <= energy * (1.0 + 1e-12)
+
+
+def test_groups_take_no_more_work_than_a_step_has():
+    """Four hundred elastic balls that overlap: ten thousand impacts at one time, which kept a step busy for seconds."""
+    random = np.random.default_rng(0)
+    with kit.make_world(2) as world:
+        for place, velocity in zip(random.uniform(-2, 2, (400, 2)), random.uniform(-9, 9, (400, 2)), strict=True):
+            kit.ball(world, place, velocity, radius=0.5, restitution=1.0)
+        momentum = world.bodies.linear_velocity.sum(axis=0)
+        for _ in range(3):
+            world.step()
+            assert 0 < world.physics.state.impacts.group_visits <= WORK
+        np.testing.assert_allclose(world.bodies.linear_velocity.sum(axis=0), momentum, rtol=0, atol=1e-9)
 
 
 @each_collision

@@ -90,6 +90,15 @@ def test_calls_per_step_and_their_times(method):
 
 
 @all_methods
+def test_forces_without_force_systems_are_summed_once(method):
+    """Nothing depends on the state: one evaluation per step for any method."""
+    world = make_world(gravity=10.0, dt=DT, integrator=method)
+    body(world)
+    run(world, 3)
+    assert world.stats().counters["force_evaluations"] == 3
+
+
+@all_methods
 def test_two_force_systems_and_gravity_add_up(method):
     world = make_world(gravity=10.0, dt=DT, integrator=method)
     world.create_entity(Transform((0, 0)), RigidBody(2.0, constant_force=(1.0, 0.0)), Charge(1.0))

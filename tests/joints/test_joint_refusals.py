@@ -226,16 +226,6 @@ def test_a_pull_by_the_mouse_has_no_other_body():
     assert joints.of(other) == [entity]
 
 
-def test_one_number_is_for_all_of_a_vector():
-    world, _ = joint_world(gravity=0)
-    body = disc(world, (2, 2))
-    pull = world.create_entity(MousePull(body, grip=(2, 2), target=(2, 2)))
-    world.step()
-    world.component_for_entity(pull, MousePull).target = 1.0
-    run(world, 120)
-    assert at(world, body).position == pytest.approx((1, 1), abs=1e-3)
-
-
 def test_ends_that_do_not_fit_the_world_are_refused_at_the_call():
     world, joints = joint_world(gravity=(0, 0))
     rope = world.create_entity(Distance(disc(world, (0, 0)), disc(world, (2, 0))))

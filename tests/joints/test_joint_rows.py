@@ -9,7 +9,33 @@ from worlds import run
 
 from carom import Physics, RigidBody, SphereCollider, Transform, World
 from carom.plugins.joints import Ball, Distance, Hinge, Joints, MousePull, Weld
+from carom.plugins.joints.rows import JointRows
 from carom.plugins.rotation import BoxCollider, Rotation
+
+
+def test_a_change_writes_the_rows_of_what_it_changes(monkeypatch):
+    written, put = [], JointRows.put
+
+    def counted(rows, joint, *made):
+        written.append(joint.entity)
+        return put(rows, joint, *made)
+
+    monkeypatch.setattr(JointRows, "put", counted)
+    world, joints = joint_world()
+    bodies, hinges = chain(world, 40, (1, 0), (0.45, 0.1))
+    run(world, 2)
+    assert written == hinges
+    for _ in range(2):  # the second time as before: nothing to write
+        world.component_for_entity(hinges[7], Hinge).motor_speed = 1.0
+    loose = disc(world, (0, 50))
+    run(world, 2)
+    for gone in (loose, hinges[20], bodies[30]):
+        world.delete_entity(gone)
+    new = world.create_entity(Ball(bodies[0], bodies[39], anchor=(20, 0)))
+    run(world, 2)
+    assert written[40:] == [hinges[7], new]
+    left = [entity for k, entity in enumerate(hinges) if k not in (20, 30, 31)]
+    assert joints.columns()["entity"].tolist() == [*left, new]
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -114,7 +140,7 @@ def test_vectors_of_joints_can_be_written_into():
     run(world, 240)
     assert at(world, body).position == pytest.approx((3, 0), abs=1e-6)
     assert at(world, lamp).position == pytest.approx((5, 1), abs=0.01)
-    target.target = (1, 1)
+    target.target = 1.0  # one number is for all of it
     assert held.tolist() == [1, 1]
     held[1] = np.nan
     with pytest.raises(ValueError, match=rf"entity {pull}: MousePull\.target must be finite"):

@@ -55,45 +55,6 @@ def test_it_hangs_on_its_spring_on_its_axis_and_turns_as_its_motor_can(d):
     assert joints.state(entity).speed == pytest.approx(0.0, abs=1e-6)
 
 
-@pytest.mark.compiled
-def test_car_and_wheel_keep_their_momenta(d):
-    """Free in space, while the motor turns one against the other and the spring swings."""
-    world, joints, axle = make(d)
-    spin = 0.5 if d == 2 else (0.2, -0.1, 0.5)
-    car = body(world, (0.0, 0.0, 0.0)[:d], 5.0, 2.0, spin, linear_velocity=(1.0, 0.5, 0.2)[:d])
-    b = body(world, (1.0, -0.5, 0.0)[:d], 1.0, 0.1)
-    motor = {"motor_speed": -20.0, "max_torque": 1.0}
-    entity = world.create_entity(Wheel(car, b, (1.0, -0.5, 0.0)[:d], (0, 1, 0)[:d], frequency=3.0, **axle, **motor))
-
-    def momenta():
-        total, about = np.zeros(d), np.zeros(3)
-        for each, mass in ((car, 5.0), (b, 1.0)):
-            velocity = world.component_for_entity(each, RigidBody).linear_velocity
-            part, place = world.component_for_entity(each, Spin), at(world, each)
-            total = total + mass * velocity
-            arm, push = (np.append(v, np.zeros(3 - d)) for v in (place.position, mass * velocity))
-            about = about + np.cross(arm, push)
-            if d == 2:
-                about[2] += part.moments * part.angular_velocity
-            else:
-                turned = rotated(place.rotation)
-                about += turned @ part.moments @ turned.T @ part.angular_velocity
-        return np.concatenate((total, about))
-
-    world.step()
-    before = momenta()
-    run(world, 60)
-    assert abs(joints.state(entity).value) > 1e-3
-    np.testing.assert_allclose(momenta(), before, atol=3e-3 if d == 3 else 1e-9)
-    assert (at(world, b).rotation != 0.0) if d == 2 else abs(at(world, b).rotation[3]) > 0.1
-
-
-def rotated(q: Any) -> np.ndarray:
-    """The axes of a body, as columns."""
-    w, v = q[0], q[1:]
-    return (w * w - v @ v) * np.eye(3) + 2.0 * np.outer(v, v) + 2.0 * w * np.cross(v, np.eye(3)).T
-
-
 def test_what_no_wheel_can_be_is_refused_at_the_call(d):
     world, _, axle = make(d)
     b, anchor = body(world, (0.0,) * d, 1.0, 1.0), (0.0,) * d

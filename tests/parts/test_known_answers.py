@@ -11,7 +11,7 @@ import pytest
 from parts.helpers_parts import CORNER, G, L, U, angular_momentum, at, body_of, floor, parts_world, piece
 from worlds import MODES, run
 
-from carom import Parts, Physics, RigidBody, Rotation, SphereCollider, Transform, World, scenes
+from carom import RigidBody, SphereCollider, Transform, scenes
 from carom.plugins.joints import Hinge, Joints
 from carom.plugins.parts import PartOf
 from carom.plugins.rotation import BoxCollider, Spin
@@ -286,31 +286,3 @@ def test_a_table_that_a_thousand_kilograms_fall_on_is_not_driven_into_the_floor(
         turned = at(world, table).rotation
         lowest = at(world, table).y - 0.7 * abs(np.sin(turned)) - 0.3 * abs(np.cos(turned))
         assert lowest > -0.3  # half of a foot
-
-
-@pytest.mark.parametrize("d", [2, 3])
-def test_a_part_keeps_its_inertia_while_its_collider_is_off(d):
-    """As bodies do; also after a restore, and in what Spin.moments says."""
-    spun = []
-    for off in (False, True):
-        with World(Physics(d, gravity=(0.0,) * d), Rotation(), Parts()) as world:
-            body = world.create_entity(Transform((0.0,) * d), RigidBody(2.0), Spin(), BoxCollider((0.5,) * d))
-            turn = 0.7 if d == 2 else (0.8, 0.36, 0.48, 0.0)
-            parts = [
-                world.create_entity(PartOf(body, (x, 0.3, 0.2)[:d], turn, mass=2.0), BoxCollider((0.2, 0.5, 0.3)[:d]))
-                for x in (1.0, -1.0)
-            ]
-            world.step()
-            if off:
-                world.remove_component(parts[0], BoxCollider)
-                world.step()
-                world.restore(world.snapshot())
-            else:
-                world.step()
-            spin = world.component_for_entity(body, Spin)
-            spin.apply_torque(3.0 if d == 2 else (1.0, 2.0, 3.0))
-            for _ in range(5):
-                world.step()
-            spun.append((np.array(spin.angular_velocity), np.array(spin.moments)))
-    for one, other in zip(*spun, strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-15)

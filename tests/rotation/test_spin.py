@@ -219,7 +219,7 @@ def test_a_world_with_the_plugin_but_without_a_spin_runs_the_same_stages_and_bit
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("seed", range(2))
 def test_a_collider_that_is_gone_for_a_moment_leaves_the_inertia_as_it_was(seed, d, tmp_path):
-    """Free flight of lopsided boxes, some with a part, is to the bit that of twins which keep theirs, also in a file;
+    """Free flight of lopsided boxes and a part is to the bit that of twins which keep theirs, also in a file;
     torques, impulses and energy too. Another mass counts, and so does another collider."""
     random, found = np.random.default_rng(seed), []
     values = [(random.uniform(0.1, 0.6, d), random.uniform(-0.3, 0.3, d), random.uniform(0.5, 4)) for _ in range(4)]

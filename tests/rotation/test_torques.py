@@ -181,27 +181,6 @@ def test_a_failed_step_and_a_snapshot_bring_back_every_bit(d, method):
         assert world.state_hash() == later
 
 
-def test_what_a_flight_takes_out_has_not_turned():
-    """A body whose place becomes nan in a step is put back, with its rotation and its spin."""
-    far = [False]
-
-    def add(bodies):
-        spring(bodies)
-        if far[0]:
-            bodies.force[0] = math.inf
-
-    with space(2, "rk4") as world:
-        entity = world.create_entity(Transform((0, 0), 1.0), RigidBody(), Spin(0.5, 1.0))
-        world.add_system(Forces(add))
-        world.step()
-        body, spin = part(world, entity, Transform), part(world, entity, Spin)
-        before = body.rotation, spin.angular_velocity
-        far[0] = True
-        with pytest.warns(UserWarning, match="takes no part"):
-            world.step()
-        assert (body.rotation, spin.angular_velocity) == before
-
-
 @pytest.mark.parametrize(("wrong", "d", "method"), pairwise((math.nan, -math.inf, 1e200), (2, 3), tuple(ORDERS)))
 def test_a_torque_that_cannot_be_takes_its_body_out(wrong, d, method):
     """As a force that cannot be does: it is named once, stands still, and others go on to the bit as without it."""
@@ -316,10 +295,12 @@ def test_torques_end_with_their_system():
         system, spin = Forces(spring), part(world, entity, Spin)
         world.add_system(system)
         world.step()
+        assert "turn_on_way" in {kernel.kernel for kernel in world.plan().kernels}
         world.remove_system(system)
         before = spin.angular_velocity
         world.step()
         assert spin.angular_velocity == before != 0.5
+        assert "turn_on_way" not in {kernel.kernel for kernel in world.plan().kernels}
 
 
 @methods
