@@ -229,7 +229,8 @@ def test_a_collider_that_is_gone_for_a_moment_leaves_the_inertia_as_it_was(seed,
             for k, (half, offset, mass) in enumerate(values):
                 body = RigidBody(mass), Spin(2.0 if d == 2 else (2.0, 1.0, -3.0)), BoxCollider(half, offset=offset)
                 bodies.append(world.create_entity(Transform(9.0 * k * np.eye(d)[0]), *body))
-            world.create_entity(PartOf(bodies[0], np.eye(d)[0], mass=0.3), SphereCollider(0.2))
+            turn, half = 0.7 if d == 2 else (0.8, 0.36, 0.48, 0.0), (0.2, 0.5, 0.3)[:d]
+            bodies.append(world.create_entity(PartOf(bodies[0], np.eye(d)[0], turn, mass=0.3), BoxCollider(half)))
             world.step()
             removed = [part(world, body, BoxCollider) for body in bodies if goes]
             for body in bodies[: len(removed)]:
