@@ -42,6 +42,14 @@ def sleep(world: World, *entities: int, steps: int = 90) -> None:
     assert all(is_asleep(world, *entities))
 
 
+def sleeping_tower(height: int = 3, **settings) -> tuple[World, list[int]]:
+    """(world, boxes of a tower that sleeps in it)."""
+    world = sleepy_world(**settings)
+    boxes = tower(world, 0.0, height)
+    sleep(world, *boxes)
+    return world, boxes
+
+
 def two_towers():
     """Two towers that sleep, apart, and their snapshot."""
     world = sleepy_world()

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from contacts.helpers_sleeping import MODES, is_asleep, sleep, sleepy_world, tower
+from contacts.helpers_sleeping import MODES, is_asleep, sleep, sleeping_tower, sleepy_world, tower
 from helpers_pairwise import pairwise
 from worlds import METHODS, ball, box, make_world, position, run
 
@@ -37,9 +37,7 @@ def test_off_by_default_and_nothing_sleeps():
     ("mode", "method", "d", "substeps"), pairwise(MODES, METHODS, (2, 3), (1, 4)), ids=lambda value: str(value)
 )
 def test_falls_asleep_and_stays_to_the_bit(mode, method, d, substeps):
-    world = sleepy_world(d, collision=mode, integrator=method, substeps=substeps)
-    boxes = tower(world, 0.0, 2)
-    sleep(world, *boxes)
+    world, boxes = sleeping_tower(2, d=d, collision=mode, integrator=method, substeps=substeps)
     before, contacts = world.state_hash(), len(world.contacts)
     assert contacts == 2
     for _ in range(20):
@@ -150,9 +148,7 @@ def test_what_is_awake_has_the_same_bits_as_without_sleeping(d, mode):
 
 def test_waking_goes_on_as_if_nothing_had_happened():
     """The impulses that carry a tower are there again: it does not sag."""
-    world = sleepy_world()
-    boxes = tower(world, 0.0, 6)
-    sleep(world, *boxes)
+    world, boxes = sleeping_tower(6)
     before = world.bodies.dynamic.position.copy()
     impulses = world.contacts.normal_impulse.copy()
     world.wake(boxes[0])
@@ -194,9 +190,7 @@ def test_contacts_of_sleepers_are_listed_in_order_and_stay():
 
 
 def test_what_a_game_writes_into_the_contacts_of_sleepers_changes_nothing_but_what_it_reads():
-    world = sleepy_world()
-    boxes = tower(world, 0.0)
-    sleep(world, *boxes)
+    world, boxes = sleeping_tower()
     normals = world.contacts.normal.copy()
     world.contacts.normal[:] = 7.0
     world.contacts.enabled[:] = False

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pickle
 
 import pytest
-from contacts.helpers_sleeping import CAUSES, GRAVITY, is_asleep, sleep, sleepy_world, tower, two_towers
+from contacts.helpers_sleeping import CAUSES, GRAVITY, is_asleep, sleep, sleeping_tower, sleepy_world, tower, two_towers
 from worlds import ball, floor, run
 
 from carom.components import RigidBody, Transform
@@ -142,9 +142,7 @@ def test_a_spring_from_a_sleeper_to_what_is_awake_goes_on_from_a_snapshot_to_the
 
 @pytest.mark.parametrize("fails", ["the step in which all wake", "the step after"])
 def test_turned_off_a_failed_step_puts_nobody_back_to_sleep(fails):
-    world = sleepy_world()
-    boxes = tower(world, 0.0)
-    sleep(world, *boxes)
+    world, boxes = sleeping_tower()
     world.settings = world.settings.replace(sleeping=False)
     if fails == "the step after":
         world.step()

@@ -13,6 +13,7 @@ from contacts.helpers_sleeping import (
     is_asleep,
     part,
     sleep,
+    sleeping_tower,
     sleepy_world,
     tower,
     two_towers,
@@ -85,9 +86,7 @@ def test_several_steps_in_one_call_show_the_contacts_that_stay():
 
 
 def test_a_replaced_integration_lets_nothing_sleep():
-    world = sleepy_world()
-    boxes = tower(world, 0.0)
-    sleep(world, *boxes)
+    world, boxes = sleeping_tower()
     world.remove_system(world.get_processor(Integration))
     world.step()
     world.step()
@@ -95,9 +94,7 @@ def test_a_replaced_integration_lets_nothing_sleep():
 
 
 def test_a_body_with_a_value_that_cannot_be_wakes_the_others():
-    world = sleepy_world(on_fault="ignore")
-    boxes = tower(world, 0.0)
-    sleep(world, *boxes)
+    world, boxes = sleeping_tower(on_fault="ignore")
     world.bodies.position[world.bodies.row_of(boxes[0])] = np.nan
     run(world, 30)
     assert not any(is_asleep(world, *boxes))
@@ -113,9 +110,7 @@ def test_settings_and_wake_are_checked():
 
 
 def test_the_contacts_of_the_last_sleeper_end_when_nothing_can_move_any_more():
-    world = sleepy_world()
-    boxes = tower(world, 0.0, 1)
-    sleep(world, *boxes)
+    world, boxes = sleeping_tower(1)
     assert len(world.contacts) == 1
     world.component_for_entity(boxes[0], RigidBody).kind = "static"
     world.step()
@@ -178,9 +173,7 @@ def test_a_ball_thrown_at_a_sleeping_pile_wakes_that_island_alone(mode, speed):
 
 
 def test_a_bullet_wakes_what_it_sweeps_into():
-    world = sleepy_world()
-    boxes = tower(world, 0.0)
-    sleep(world, *boxes)
+    world, boxes = sleeping_tower()
     bullet = RigidBody(1.0, (3000.0, 0.0), ccd=True)
     shot = world.create_entity(Transform((-20.0, 1.5)), bullet, SphereCollider(0.05))
     world.step()
@@ -192,9 +185,7 @@ def test_a_bullet_wakes_what_it_sweeps_into():
 def test_what_is_struck_in_the_second_place_wakes_before_it():
     """A bullet strikes a ball, and that, in the same step, what sleeps."""
     for mode in ("continuous", "event_driven"):
-        world = sleepy_world(collision=mode)
-        boxes = tower(world, 0.0)
-        sleep(world, *boxes)
+        world, boxes = sleeping_tower(collision=mode)
         first = ball(world, (-3.0, 1.5), (0.0, 0.0), radius=0.3, mass=0.1, restitution=1.0)
         ball(world, (-8.0, 1.5), (500.0, 0.0), radius=0.3, mass=5.0, restitution=1.0)
         world.step()
@@ -234,9 +225,7 @@ EQUAL = {  # what changes nothing
 
 @pytest.mark.parametrize("mode", MODES)
 def test_equal_values_wake_nothing(mode):
-    world = sleepy_world(collision=mode)
-    boxes = tower(world, 0.0)
-    sleep(world, *boxes)
+    world, boxes = sleeping_tower(collision=mode)
     for cause, write in EQUAL.items():
         write(world, boxes)
         world.step()
@@ -319,9 +308,7 @@ def test_a_system_that_moves_a_sleeper_within_the_step_wakes_it(column):
 @pytest.mark.parametrize("cause", ["floor moved", "floor without friction"])
 @pytest.mark.parametrize("restored", [False, True])
 def test_a_query_hides_no_change_of_what_sleepers_stand_on(cause, restored):
-    world = sleepy_world()
-    boxes = tower(world, 0.0)
-    sleep(world, *boxes)
+    world, boxes = sleeping_tower()
     ground = min(world.get_entities())
     if cause == "floor moved":
         world.component_for_entity(ground, Transform).position = (0.0, -2.0)

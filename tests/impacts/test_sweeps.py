@@ -226,9 +226,7 @@ def test_they_touch_then_and_not_before(pair, d):
 def test_what_is_missed_is_missed_by_something(pair, d):
     """The least gap during the motion, by a ternary search: the gap of convex shapes is a convex function of time."""
     code, cases, v, hit, _ = ways(pair, d)
-    missed = np.flatnonzero(~hit)[::6]
-    cases, v = cases.take(missed), v[missed]
-    slack = 1e-12 * (cases.scale() + np.linalg.norm(v, axis=1))
+    slack = 1e-12 * scale_of(cases, v)
     low, high = np.zeros(len(v)), np.ones(len(v))
     for _ in range(60):
         one, two = low + (high - low) / 3, high - (high - low) / 3

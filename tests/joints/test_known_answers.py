@@ -31,6 +31,15 @@ def period(angles, dt):
     return float(np.diff(passes).mean()) * dt
 
 
+def values(world, joints, joint, steps):
+    """Of a joint, after each of these steps."""
+    found = []
+    for _ in range(steps):
+        world.step()
+        found.append(joints.state(joint).value)
+    return np.array(found)
+
+
 @pytest.mark.parametrize(("rate", "bound"), [(60, 3e-4), (120, 1e-4), (240, 3e-5)])
 def test_physical_pendulum_has_the_period_of_the_elliptic_integral(rate, bound):
     world, _ = joint_world(dt=1.0 / rate)
@@ -89,12 +98,8 @@ def test_spring_has_its_period_and_decay(substeps, ratio):
         body = disc(world, (0, -1.3))
         first = disc(world, (0, 0)) if free else None
         spring = world.create_entity(Distance(first, body, length=1.0, frequency=2.0, damping_ratio=ratio))
-        ways = []
-        for _ in range(60):
-            world.step()
-            ways.append(joints.state(spring).value - 1.0)
-        assert ways[0] == pytest.approx(0.3 * (1.0 - 0.5 * (omega * dt) ** 2), abs=0.01)
-        x = np.array(ways)
+        x = values(world, joints, spring, 60) - 1.0
+        assert x[0] == pytest.approx(0.3 * (1.0 - 0.5 * (omega * dt) ** 2), abs=0.01)
         trace, less = np.linalg.lstsq(np.column_stack((x[1:-1], -x[:-2])), x[2:], rcond=None)[0]
         assert trace == pytest.approx(2.0 * fades * math.cos(turn), rel=1e-6)
         assert less == pytest.approx(fades**2, rel=1e-6)
@@ -137,11 +142,7 @@ def test_door_on_a_spring_swings_about_its_edge_at_the_frequency_of_the_spring(d
     door = world.create_entity(Hinge(None, leaf, anchor=(0, 0, *pad), frequency=1.0, **axis))
     world.step()
     world.component_for_entity(leaf, Spin).apply_impulse((0, 1.0, *pad), at=(arm + 0.5, 0, *pad))
-    angles = []
-    for _ in range(600):
-        world.step()
-        angles.append(joints.state(door).value)
-    assert period(angles, 1 / 60) == pytest.approx(1.0, abs=2e-3)
+    assert period(values(world, joints, door, 600), 1 / 60) == pytest.approx(1.0, abs=2e-3)
 
 
 @pytest.mark.parametrize(("frequency", "leaves", "substeps"), pairwise((1.0, 8.0, 20.0, 29.0), (1, 4), (2, 4)))
@@ -167,11 +168,7 @@ def test_slider_on_a_spring_swings_at_its_frequency_wherever_its_axis_is(beside)
     a, b = plank(world, (0, 0), (0.5, 0.5)), plank(world, (0.5, beside), (0.5, 0.5))
     slider = world.create_entity(Slider(a, b, direction=(1, 0), frequency=1.0))
     world.component_for_entity(b, RigidBody).apply_impulse((0.5, 0))
-    ways = []
-    for _ in range(600):
-        world.step()
-        ways.append(joints.state(slider).value)
-    assert period(ways, 1 / 60) == pytest.approx(1.0, abs=2e-3)
+    assert period(values(world, joints, slider, 600), 1 / 60) == pytest.approx(1.0, abs=2e-3)
 
 
 @pytest.mark.parametrize(
