@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from carom.framework import System
 from carom.framework.plugins.registry import Registry
 from carom.lab.testing import ball, box, floor, make_world, position, run, velocity
 from carom.plugins import Physics
 
 __all__ = [
-    "EPS", "METHODS", "MODES", "Conserved", "ball", "both_dimensions", "box", "floor", "make_world", "mostly_2d",
-    "position", "registry", "run", "velocity",
+    "EPS", "METHODS", "MODES", "Calls", "Conserved", "ball", "both_dimensions", "box", "floor", "make_world",
+    "mostly_2d", "position", "registry", "run", "velocity",
 ]  # fmt: skip
 
 EPS = np.finfo(float).eps
@@ -19,6 +20,17 @@ MODES = ("discrete", "continuous", "event_driven")
 METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
 both_dimensions = pytest.mark.parametrize("d", [2, 3])
 mostly_2d = pytest.mark.parametrize("d", [2, pytest.param(3, marks=pytest.mark.slow)])  # 3D compiles all again
+
+
+class Calls(System):
+    """Runs a function in a phase."""
+
+    def __init__(self, phase, function):
+        self.phase = phase
+        self.function = function
+
+    def process(self, dt):
+        self.function()
 
 
 class Conserved:

@@ -7,10 +7,10 @@ import dataclasses
 import esper
 import numpy as np
 import pytest
-from worlds import ball, both_dimensions, make_world, run
+from worlds import Calls, ball, both_dimensions, make_world, run
 
 from carom.components import RigidBody, Transform
-from carom.framework import CaromError, Component, Contact, Phase, System, column
+from carom.framework import CaromError, Component, Contact, Phase, column
 
 LISTS = ("contacts", "begin", "stay", "end", "impacts")
 FIELDS = [field.name for field in dataclasses.fields(Contact)]
@@ -215,15 +215,12 @@ def test_in_a_system_and_from_another_world():
     other, _ = crowd(count=5, seed=1)
     told = []
 
-    class Look(System):
-        phase = Phase.END
+    def look():
+        begin = world.contacts.begin
+        told.append([(a, b) for a, b, _ in begin.pairs(Missile, Tag)])
+        told.append(list(zip(*(c.tolist() for c in begin.between(Missile, Tag)[1:]), strict=True)))
 
-        def process(self, dt):
-            begin = self.world.contacts.begin
-            told.append([(a, b) for a, b, _ in begin.pairs(Missile, Tag)])
-            told.append(list(zip(*(c.tolist() for c in begin.between(Missile, Tag)[1:]), strict=True)))
-
-    world.add_system(Look())
+    world.add_system(Calls(Phase.END, look))
     world.step()
     with other:
         inside = [(a, b) for a, b, _ in world.contacts.begin.pairs(Missile, Tag)]

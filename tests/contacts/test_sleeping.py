@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from contacts.helpers_sleeping import MODES, is_asleep, sleep, sleeping_tower, sleepy_world, tower
 from helpers_pairwise import pairwise
-from worlds import METHODS, ball, box, make_world, position, run
+from worlds import METHODS, Calls, ball, box, make_world, position, run
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Phase, Settings, System, World
@@ -256,17 +256,13 @@ def test_what_is_held_apart_by_disabled_contacts_does_not_sleep():
 
 
 def test_one_way_platforms_that_look_at_velocities_hold_sleepers():
-    class OneWay(System):
-        phase = Phase.NARROW
-
-        def process(self, dt):
-            contacts, bodies = self.world.contacts, self.world.bodies
-            rows = [bodies.row_of(entity) for entity in contacts.entity_b.tolist()]
-            contacts.enabled[:] = bodies.linear_velocity[rows, 1] < 0.0
+    def let_through():
+        contacts, bodies = world.contacts, world.bodies
+        contacts.enabled[:] = bodies.linear_velocity[bodies.rows_of(contacts.entity_b), 1] < 0.0
 
     world = sleepy_world()
     tower(world, 0.0, 1)
-    world.add_system(OneWay())
+    world.add_system(Calls(Phase.NARROW, let_through))
     heights = [world.step() or world.bodies.dynamic.position[0, 1] for _ in range(100)]
     assert min(heights) > 0.49
 
@@ -297,18 +293,12 @@ def test_balls_above_a_sleeping_crowd_fly_as_where_nothing_sleeps(balls):
 def test_a_body_that_is_woken_within_a_step_finds_what_it_touches():
     """All bodies look for others in that step, not only those that were awake when it began."""
 
-    class WakeAfterTheFlight(System):
-        phase = Phase.INTEGRATION
-
-        def process(self, dt):
-            if self.world.step_count == 200:
-                self.world.wake(boxes[0])
-
     world = sleepy_world()
     boxes = [entity for k in range(3) for entity in tower(world, 3.0 * k, 2)]
     flyer = ball(world, (0.0, 30.0), (0.1, 0.0))
     world.component_for_entity(flyer, RigidBody).gravity_scale = 0.0
-    world.add_system(WakeAfterTheFlight())
+    after_the_flight = Calls(Phase.INTEGRATION, lambda: world.step_count == 200 and world.wake(boxes[0]))
+    world.add_system(after_the_flight)
     run(world, 200)
     assert is_asleep(world, *boxes) == [True] * 6
     contacts = len(world.contacts)

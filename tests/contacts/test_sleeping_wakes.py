@@ -18,10 +18,10 @@ from contacts.helpers_sleeping import (
     tower,
     two_towers,
 )
-from worlds import ball, box, floor, position, run, velocity
+from worlds import Calls, ball, box, floor, position, run, velocity
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import ForceSystem, Phase, Settings, System, World
+from carom.framework import ForceSystem, Phase, Settings, World
 from carom.plugins import Physics
 from carom.plugins.springs import Springs
 from carom.systems import Integration
@@ -68,16 +68,9 @@ def test_a_plan_between_falling_asleep_and_the_next_step_changes_nothing():
 
 
 def test_several_steps_in_one_call_show_the_contacts_that_stay():
-    class Look(System):
-        phase = Phase.START
-
-        def process(self, dt):
-            stays.append(len(self.world.contacts.stay))
-
-    stays = []
-    world = sleepy_world()
+    world, stays = sleepy_world(), []
     boxes = tower(world, 0.0)
-    world.add_system(Look())
+    world.add_system(Calls(Phase.START, lambda: stays.append(len(world.contacts.stay))))
     for _ in range(12):
         world.advance(5 / 60)
     assert all(is_asleep(world, *boxes))
@@ -283,23 +276,17 @@ def test_a_force_system_that_comes_goes_or_changes_wakes_what_it_pushes(integrat
 
 @pytest.mark.parametrize("column", [False, True])
 def test_a_system_that_moves_a_sleeper_within_the_step_wakes_it(column):
-    class Kick(System):
-        phase = Phase.FORCES
-        entity = 0
+    def kick():
+        if kicked and column:
+            world.bodies.linear_velocity[world.bodies.row_of(kicked.pop()), 0] = 1.0
+        elif kicked:
+            part(world, kicked.pop(), RigidBody).linear_velocity = (1.0, 0.0)
 
-        def process(self, dt):
-            if self.entity and column:
-                self.world.bodies.linear_velocity[self.world.bodies.row_of(self.entity), 0] = 1.0
-            elif self.entity:
-                self.world.component_for_entity(self.entity, RigidBody).linear_velocity = (1.0, 0.0)
-            self.entity = 0
-
-    world = sleepy_world()
+    world, kicked = sleepy_world(), []
     boxes = tower(world, 0.0)
-    kick = Kick()
-    world.add_system(kick)
+    world.add_system(Calls(Phase.FORCES, kick))
     sleep(world, *boxes)
-    kick.entity = boxes[2]
+    kicked.append(boxes[2])
     world.step()
     assert not any(is_asleep(world, *boxes))
     assert position(world, boxes[2])[0] > 0.0

@@ -1,9 +1,8 @@
-"""Bodies for tests of forces, and functions called in a phase of the step."""
+"""Bodies for tests of forces."""
 
 from __future__ import annotations
 
 from carom.components import RigidBody, Transform
-from carom.framework import System
 
 DT = 0.125  # a power of two: sums of steps are exact
 
@@ -13,14 +12,3 @@ def body(world, mass=1.0, velocity=(0.0, 0.0), *, at=(0.0, 0.0), **kwargs):
     rigid = RigidBody(mass, velocity, **kwargs)
     world.create_entity(Transform(at), rigid)
     return rigid
-
-
-class Calls(System):
-    """Runs a function in a phase."""
-
-    def __init__(self, phase, function):
-        self.phase = phase
-        self.function = function
-
-    def process(self, dt):
-        self.function()

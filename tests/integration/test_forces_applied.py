@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers_motion import DRIFT, Oscillator, SpringAndDrag, all_methods, record
-from integration.helpers_forces import DT, Calls, body
-from worlds import EPS, make_world, run
+from integration.helpers_forces import DT, body
+from worlds import EPS, Calls, make_world, run
 
 from carom.components import RigidBody, Transform
 from carom.framework import Phase

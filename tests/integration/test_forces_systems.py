@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers_motion import STAGES, Oscillator, SpringAndDrag, all_methods, oscillators, record
-from integration.helpers_forces import DT, Calls, body
+from integration.helpers_forces import DT, body
 from oracles import integrators_naive as naive
-from worlds import EPS, make_world, position, run, velocity
+from worlds import EPS, Calls, make_world, position, run, velocity
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Component, ForceSystem, Phase, column

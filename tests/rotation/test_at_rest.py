@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 from rotation.helpers_turning import G, box, motion, part, pose, turned, turning_world, wall
-from worlds import MODES, run
+from worlds import MODES, Calls, run
 
 from carom.components import RigidBody, SphereCollider, Transform
-from carom.framework import Phase, System
+from carom.framework import Phase
 from carom.plugins import capsule, convex_hull, convex_polygon, half_space
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_hull import ConvexHullCollider
@@ -252,11 +252,8 @@ def test_contacts_tell_the_depth_of_boxes_as_they_are_turned_in_the_end(spin):
 def test_a_floor_whose_contact_is_disabled_holds_a_box_no_more_than_one_that_is_gone(e):
     """Nor do any of its points while a ball strikes the box in the same step."""
 
-    class Trapdoor(System):
-        phase = Phase.NARROW
-
-        def process(self, dt):
-            self.world.contacts.enabled[self.world.contacts.entity_a == floor] = False
+    def open_trapdoor():
+        world.contacts.enabled[world.contacts.entity_a == floor] = False
 
     found = []
     for deleted in (False, True):
@@ -270,7 +267,7 @@ def test_a_floor_whose_contact_is_disabled_holds_a_box_no_more_than_one_that_is_
             if deleted:
                 world.delete_entity(floor)
             else:
-                world.add_system(Trapdoor())
+                world.add_system(Calls(Phase.NARROW, open_trapdoor))
             world.step()
             found.append([part(world, body, RigidBody).linear_velocity[1] for body in (low, high)])
     assert found[0] == pytest.approx(found[1], abs=1e-12)

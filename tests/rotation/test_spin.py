@@ -10,10 +10,10 @@ import pytest
 import scipy.spatial
 from rotation.helpers_turning import box, part, turning_world, wall
 from scipy.spatial.transform import Rotation as Turn
-from worlds import run
+from worlds import Calls, run
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import CaromError, Phase, StepError, System, World
+from carom.framework import CaromError, Phase, StepError, World
 from carom.plugins import Physics, capsule, convex_hull, convex_polygon
 from carom.plugins.parts import PartOf, Parts
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
@@ -131,12 +131,6 @@ def test_an_impulse_at_a_point_gives_momentum_and_angular_momentum(seed, d):
 
 
 def test_a_torque_acts_for_the_frame_in_which_it_is_applied_and_in_a_system_for_one_step():
-    class Push(System):
-        phase = Phase.FORCES
-
-        def process(self, dt):
-            spin.apply_torque(2.0)
-
     with space() as world:
         entity = world.create_entity(Transform((0, 0)), RigidBody(), Spin(inertia=0.5))
         world.bodies  # noqa: B018
@@ -148,7 +142,7 @@ def test_a_torque_acts_for_the_frame_in_which_it_is_applied_and_in_a_system_for_
         assert part(world, entity, RigidBody).linear_velocity[1] == pytest.approx(3 * 3 / 60)
         world.step()
         assert spin.angular_velocity == pytest.approx(2.5 / 0.5 * 3 / 60)
-        world.add_system(Push())
+        world.add_system(Calls(Phase.FORCES, lambda: spin.apply_torque(2.0)))
         run(world, 2)
         assert spin.angular_velocity == pytest.approx((2.5 * 3 + 2.0 * 2) / 0.5 / 60)
 
