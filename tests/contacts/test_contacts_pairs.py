@@ -37,7 +37,7 @@ class Special(Tag):
 class Alias: ...
 
 
-TYPES = (Missile, Enemy, Tag, Special, Alias, RigidBody, Transform, Unused, int)
+TYPES = (Missile, Enemy, Tag, Special, Alias, RigidBody, Unused, int)
 PAIRS_OF_TYPES = [(first, second) for first in TYPES for second in TYPES]
 
 

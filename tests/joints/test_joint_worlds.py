@@ -275,7 +275,7 @@ def test_columns_have_values_and_the_speeds_at_which_these_change(d):
 @pytest.mark.parametrize("ropes", [False, True])
 def test_fast_boxes_pass_no_thin_wall_whether_something_holds_them_or_not(mode, ropes):
     """The touch turns a box far within the step."""
-    for k in range(20):
+    for k in range(0, 20, 2):
         world, _ = joint_world((0.0, 0.0), collision=mode)
         world.create_entity(Transform((5, 0)), BoxCollider((0.02, 50)))
         fast = RigidBody(linear_velocity=(100.0 + 3 * k, 40.0))

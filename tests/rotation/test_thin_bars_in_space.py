@@ -89,7 +89,7 @@ def run(mode, ground, e, friction, seed, count):
 @pytest.mark.parametrize("ground", ["wall", "mesh"])
 @pytest.mark.parametrize("count", [8, pytest.param(300, marks=pytest.mark.long)])
 def test_no_thin_bar_passes_through_ground_in_space(count, ground, mode):
-    for e, friction in ((0.0, 0.0), (0.0, 0.5), (0.5, 0.5), (1.0, 0.5)):
+    for e, friction in ((0.0, 0.0), (0.0, 0.5), (1.0, 0.5)):
         passed, deepest, *_ = run(mode, ground, e, friction, 13, count)
         assert passed == 0
         assert deepest < 0.1

@@ -90,8 +90,8 @@ def test_a_heap_goes_on_from_files_to_the_bit_falls_asleep_and_is_woken_by_a_blo
 def test_queries_meet_the_boxes_as_they_are_turned(d, mode):
     random, found = np.random.default_rng(1), 0
     with pit(d, mode) as world:
-        for _ in range(30):
-            run(world, 6)
+        for _ in range(20):
+            run(world, 9)
             point, radius = random.uniform((-2, -0.2, -1)[:d], (2, 4, 1)[:d]), random.uniform(0.05, 0.6)
             way = random.normal(size=d)
             way /= np.linalg.norm(way)
