@@ -18,6 +18,7 @@ class Clock:
         self._base_count = 0
         self.gathered = 0.0
         self.dropped_steps = 0
+        self.scale = 1.0  # seconds simulated per second of a frame
 
     @property
     def time(self) -> float:
@@ -36,8 +37,13 @@ class Clock:
             self.dt = dt
 
     def gather(self, seconds: float, limit: int) -> int:
-        """Add a frame's ``seconds`` and take whole steps out of them, at most ``limit``; the surplus is dropped."""
-        self.gathered += seconds
+        """Add a frame's ``seconds``, scaled, and take whole steps out of them; the surplus is dropped.
+
+        limit
+            steps of a frame at scale 1 and below: a frame that is too long loses the same part of itself at any other
+        """
+        limit = math.ceil(limit * max(1.0, self.scale))
+        self.gathered += min(seconds * self.scale, sys.float_info.max)
         rest = math.fmod(self.gathered, self.dt)  # exact, however long the frame was
         steps = round(min((self.gathered - rest) / self.dt, sys.float_info.max))
         if rest > (1.0 - self.ROUNDING) * self.dt:
@@ -47,11 +53,12 @@ class Clock:
         return min(steps, limit)
 
     def state(self) -> tuple[float, ...]:
-        """What :meth:`restore` takes: seconds and counts."""
-        return (self.dt, self.step_count, self._base_time, self._base_count, self.gathered, self.dropped_steps)
+        """What :meth:`restore` takes: seconds, counts and the scale."""
+        counts = (self.step_count, self._base_time, self._base_count, self.gathered, self.dropped_steps)
+        return (self.dt, *counts, self.scale)
 
     def restore(self, state: tuple[float, ...]) -> None:
         """Go back to what :meth:`state` returned."""
-        dt, count, base_time, base_count, gathered, dropped = state
-        self.dt, self._base_time, self.gathered = dt, base_time, gathered
+        dt, count, base_time, base_count, gathered, dropped, scale = state
+        self.dt, self._base_time, self.gathered, self.scale = dt, base_time, gathered, scale
         self.step_count, self._base_count, self.dropped_steps = int(count), int(base_count), int(dropped)

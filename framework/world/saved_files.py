@@ -29,7 +29,7 @@ from ..errors import CaromError
 from ..settings import Settings
 from .snapshots import Snapshot
 
-FORMAT = 5  # of the files; a reader refuses others
+FORMAT = 6  # of the files; a reader refuses others
 PARTS = ("dimensions", "plugins", "dead", "next_id", "contacts", "physics", "clock", "steps")  # of a snapshot, as it is
 ARRAY = "#array"
 PART = ".carom-part-"  # and a random number: a file that is being written

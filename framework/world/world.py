@@ -36,6 +36,7 @@ from .state_verbs import StateVerbs
 
 P = TypeVar("P", bound=esper.Processor)
 
+FASTEST = 10.0  # time_scale
 _numbers = itertools.count(1)
 
 
@@ -330,14 +331,27 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
     def advance(self, seconds: float) -> int:
         """Take as many fixed steps as fit into the time not yet simulated and these ``seconds``; returns how many.
 
-        At most ``settings.max_steps_per_advance``; whole steps beyond that are dropped and counted in
-        ``stats().counters["dropped_steps"]``. What is less than a step is kept: ``alpha``. ValueError if ``seconds``
-        are negative or not finite.
+        The seconds are multiplied by :attr:`time_scale`. At most ``settings.max_steps_per_advance``, times the scale
+        above 1; whole steps beyond that are dropped and counted in ``stats().counters["dropped_steps"]``. What is less
+        than a step is kept: ``alpha``. ValueError if ``seconds`` are negative or not finite.
         """
         self._open()
         if not (isinstance(seconds, numbers.Real) and math.isfinite(seconds) and seconds >= 0):
             raise ValueError(f"advance takes seconds, finite and not negative, got {seconds!r}")
         return self._pipeline.advance(float(seconds))
+
+    @property
+    def time_scale(self) -> float:
+        """Seconds simulated per second of a frame, 0 (pause) to 10; 1 if nothing else is set. Only :meth:`advance`
+        heeds it, from its next call on. ValueError for any other number."""
+        return self._pipeline.clock.scale
+
+    @time_scale.setter
+    def time_scale(self, scale: float) -> None:
+        if isinstance(scale, bool) or not (isinstance(scale, numbers.Real) and 0 <= scale <= FASTEST):
+            raise ValueError(f"world {self.name!r}: time_scale must be a number from 0 to {FASTEST:g}, got {scale!r}")
+        self._open()
+        self._pipeline.clock.scale = float(scale)
 
     @property
     def alpha(self) -> float:

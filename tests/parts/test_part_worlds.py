@@ -400,6 +400,27 @@ def test_pieces_of_one_group_fall_through_each_other_and_onto_all_else(mode):
 
 
 @pytest.mark.compiled
+@pytest.mark.parametrize("kind", ["dynamic", "kinematic"])
+def test_pieces_are_drawn_as_one_and_anew_where_they_were_put(kind):
+    """A part has its body's place, and its turn: half a step late both, and from a teleport on where they are."""
+    world, parts = parts_world()
+    body = piece(world, parts, (0.0, 0.0), velocity=(6.0, -3.0), spin=30.0)[0]
+    body_of(world, body).kind = kind
+    world.advance(1.5 / 60)
+    world.advance(1.0 / 60)
+    drawn, turn = world.bodies.interpolated_position, world.bodies.interpolated_rotation
+    start = at(world, body).position - np.array((6.0, -3.0)) / 60
+    np.testing.assert_allclose(drawn, [start + np.array((6.0, -3.0)) / 120] * 2, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(turn, [30.0 * 1.5 / 60] * 2, rtol=0, atol=1e-12)
+    of_kind = getattr(world.bodies, kind)
+    np.testing.assert_array_equal(of_kind.interpolated_position, drawn)
+    at(world, body).position, at(world, body).rotation = (100.0, 0.0), 2.0
+    world.advance(0.0)
+    for drawn, exact in ((world.bodies.interpolated_position, (100.0, 0.0)), (world.bodies.interpolated_rotation, 2.0)):
+        np.testing.assert_array_equal(drawn, [exact] * 2)
+
+
+@pytest.mark.compiled
 def test_snapshots_rollback_and_files_go_on_to_the_bit(tmp_path):
     world, parts = parts_world((0, -G))
     floor(world, friction=0.5)

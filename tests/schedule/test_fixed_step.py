@@ -13,7 +13,7 @@ from helpers_steps import both_ways  # noqa: F401  every test with each
 from worlds import METHODS, ball, floor, make_world
 
 from carom.components import RigidBody, Transform
-from carom.framework import CaromError, StepError, System
+from carom.framework import CaromError, StepError, System, World
 
 
 def busy_world(**settings):
@@ -166,6 +166,9 @@ def test_frames_beyond_all_measure(seconds):
     """C26: bounded work, and less than a step is left for any rounding of the sum."""
     world = make_world()
     assert world.advance(seconds) == 8
+    world.time_scale = 10.0
+    assert world.advance(seconds) == 80
+    world.time_scale = 1.0
     assert 0.0 <= world.alpha <= 1.0
     assert world.clock.gathered < world.settings.dt
     assert world.advance(0.0) == 0
@@ -181,6 +184,74 @@ def test_seconds_that_are_none_are_refused(seconds):
     with pytest.raises(ValueError, match="advance takes seconds"):
         world.advance(seconds)
     assert world.clock.state() == state
+
+
+@pytest.mark.parametrize("scale", [0.1, 0.25, 1 / 3, 1.0, 2.5, 10])
+def test_slow_motion_takes_the_same_steps_less_often(hashes_by_step, scale):
+    """After n frames floor(n scale 60 / rate) steps, each with the bits that it has at any scale; alpha the rest."""
+    expected, world, frames = hashes_by_step("semi_implicit_euler"), busy_world(), []
+
+    class Frames(System):
+        def process(self, dt):
+            frames.append(dt)
+
+    world.add_system(Frames(), frame=True)
+    world.time_scale = scale
+    exact = Fraction(scale).limit_denominator(10)
+    for n in range(1, min(int(100 / scale), 300) + 1):
+        world.advance(1 / 60)
+        assert world.step_count == n * exact // 1
+        assert world.alpha == pytest.approx(float(n * exact % 1), abs=1e-7)
+        assert world.state_hash() == expected[world.step_count]
+    assert (set(frames), world.stats().counters["dropped_steps"]) == ({1 / 60}, 0)
+    assert world.advance(50.0) == math.ceil(8 * max(1, scale))  # a frame that is too long
+    before = world.step_count
+    world.step()
+    assert (world.step_count, world.time) == (before + 1, (before + 1) * (1 / 60))
+
+
+def test_a_pause_moves_nothing_and_draws_the_same(tmp_path):
+    """Pushes of paused frames wait as those of frames without a step do; the scale is in snapshots and files."""
+    world = make_world()
+    handle = RigidBody(1.0, (1.0, 0.0))
+    world.create_entity(Transform((0, 0)), handle)
+    world.advance(1.5 / 60)
+    world.time_scale = 0
+    kept, drawn = world.snapshot(), world.bodies.interpolated_position
+    for seconds in (0.0, 1 / 60, 1e300):
+        handle.apply_force((60.0, 0.0))
+        assert world.advance(seconds) == 0
+        np.testing.assert_array_equal(world.bodies.interpolated_position, drawn)
+    world.time_scale = 1.0
+    handle.apply_force((60.0, 0.0))
+    assert world.advance(0.5 / 60) == 1
+    assert handle.linear_velocity.tolist() == [2.0, 0.0]
+    world.restore(kept)
+    assert (world.time_scale, world.advance(1.0)) == (0.0, 0)
+    world.save(tmp_path / "paused")
+    other = World.load(tmp_path / "paused", *[type(plugin)() for plugin in world.plugins])
+    assert (other.time_scale, other.alpha, other.advance(1.0)) == (0.0, world.alpha, 0)
+
+
+@pytest.mark.parametrize("scale", [-0.1, 10.1, math.nan, math.inf, True, "1", None])
+def test_scales_of_time_that_are_none_are_refused(scale):
+    world = make_world()
+    world.time_scale = 2
+    with pytest.raises(ValueError, match=f"world {world.name!r}: time_scale must be a number from 0 to 10, got"):
+        world.time_scale = scale
+    assert world.time_scale == 2.0
+
+
+def test_a_system_stops_time_from_the_next_frame_on():
+    """Of this frame all steps are taken, as they were counted before."""
+
+    class Hit(System):
+        def process(self, dt):
+            world.time_scale = 0.0
+
+    world = make_world()
+    world.add_system(Hit())
+    assert [world.advance(3 / 60), world.advance(3 / 60)] == [3, 0]
 
 
 def test_replacing_other_settings_leaves_time_exact():
