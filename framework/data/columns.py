@@ -81,6 +81,18 @@ class Column:
         array[...] = self.empty_value(3) if self.item == "rotation" and dimensions == 3 else value
         return array
 
+    def of_all(self, stored: Any, dimensions: int) -> Any:
+        """What many rows hold: the value that one component has ``stored``, or the default in place of None.
+
+        ValueError for a vector of other dimensions.
+        """
+        if stored is None:
+            return self.empty_value(dimensions)
+        self.check_dimensions(stored, dimensions)
+        if isinstance(stored, np.ndarray):
+            return stored.copy()
+        return self.whole(stored, dimensions) if self.item_shape(dimensions) else stored
+
     def bounds(self) -> tuple[float, float] | None:
         """From where to where numbers may be; None: any that the type holds."""
         return self.limits if self.dtype is float else None

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-import re
 from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
 
 import numpy as np
 
-from ..names import did_you_mean, near_names
+from ..names import did_you_mean, near_names, snake_case
 from .arrays.column import ArrayColumn, array_column, hold_arrays
 from .columns import LARGEST, REQUIRED, Column, special_column
 from .columns import column as plain_column
@@ -54,8 +53,7 @@ class Component:
             if issubclass(base, Component) and not base._abstract:
                 raise TypeError(f"{base.__name__} is final: esper finds components by their exact type, not by a base")
         cls._abstract = abstract
-        snake = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", cls.__name__).lower()
-        cls.prefix = "" if flat else snake + "."
+        cls.prefix = "" if flat else snake_case(cls.__name__) + "."
         own = {name: value for name, value in vars(cls).items() if isinstance(value, Column)}
         for name in own:
             if hasattr(Component, name):
@@ -251,18 +249,24 @@ class Component:
 
 
 class Many:
-    """One component type's values for many entities; made by ``Component.many``."""
+    """One component type's values for many entities; made by ``Component.many``.
 
-    def __init__(self, component: type[Component], values: dict[str, Any]) -> None:
+    like
+        an unbound component whose values hold for all, but for the ``values`` that are given
+    """
+
+    def __init__(self, component: type[Component], values: dict[str, Any], like: Component | None = None) -> None:
         self.component = component
         self.values = values
+        self.like = like
 
     def store(self, count: int, dimensions: int) -> RowStore:
         """Checked columns of ``count`` rows, or one value for all; ValueError names field and row."""
         arrays, constants = {}, {}
         for name, column in self.component.columns.items():
             if name not in self.values:
-                constants[column.key] = column, column.empty_value(dimensions)
+                stored = None if self.like is None else (self.like._values or {}).get(name)
+                constants[column.key] = column, column.of_all(stored, dimensions)
                 continue
             array = column.checked_many(self.values[name], count, dimensions)
             if count > 1 and array.strides[0] == 0:  # one value for all

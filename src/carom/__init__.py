@@ -17,7 +17,7 @@ _NAMES = {
         "Settings", "Snapshot", "Stats", "StepError", "System", "UnhandledPairError", "Vector", "World",
         "array_column", "column", "use_kernels",
     ),
-    "components": ("ALL_LAYERS", "AABBCollider", "Collider", "RigidBody", "SphereCollider", "Transform"),
+    "components": ("ALL_LAYERS", "AABBCollider", "Collider", "Prefab", "RigidBody", "SphereCollider", "Transform"),
     "systems": (
         "CUBIC", "LINE", "PARABOLA", "BroadPhase", "CandidateLimitError", "ContactEvents", "ForceAccumulation",
         "Integration", "Integrator", "NarrowPhase", "Response", "SpatialTree",
