@@ -39,6 +39,7 @@ _NAMES = {
         "create_chain", "create_height_field", "create_triangle_mesh",
     ),
     "plugins.tile_grid": ("TileGridCollider", "cells_of_text"),
+    "plugins.timers": ("Timer", "Timers"),
 }  # fmt: skip
 _MODULES = {name: module for module, names in _NAMES.items() for name in names}
 __all__ = sorted(_MODULES)  # pyright: ignore[reportUnsupportedDunderAll]

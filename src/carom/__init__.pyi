@@ -32,6 +32,8 @@ from .plugins.terrain import create_height_field as create_height_field
 from .plugins.terrain import create_triangle_mesh as create_triangle_mesh
 from .plugins.tile_grid import TileGridCollider as TileGridCollider
 from .plugins.tile_grid import cells_of_text as cells_of_text
+from .plugins.timers import Timer as Timer
+from .plugins.timers import Timers as Timers
 from .systems import *
 
 __version__: str
