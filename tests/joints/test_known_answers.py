@@ -13,7 +13,7 @@ from worlds import MODES, run
 
 from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World
 from carom.lab.testing import energy
-from carom.plugins.joints import Distance, Hinge, Joints, Motor, MousePull, Slider, Wheel
+from carom.plugins.joints import Distance, Hinge, Joints, Motor, MousePull, Slider, Weld, Wheel
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 
@@ -294,6 +294,19 @@ def test_mouse_lifts_nothing_that_is_too_heavy():
     world.create_entity(MousePull(body, grip=(0, 0), target=(0, 1), max_force=0.5 * G))
     run(world, 60)
     assert at(world, body).y == pytest.approx(-0.25 * G, rel=0.05)
+
+
+@pytest.mark.parametrize("boxes", [5, 10])
+def test_welded_cantilever_stands(boxes):
+    world, _ = joint_world()
+    body = None
+    for k in range(boxes):
+        before, body = body, plank(world, (k + 0.5, 0), (0.5, 0.25))
+        world.create_entity(Weld(before, body, anchor=(k, 0)))
+    assert body is not None
+    run(world, 600)
+    assert -1e-4 < at(world, body).y < 0.0
+    assert world.kinetic_energy() < 1e-3
 
 
 def test_contacts_and_joints_hold_together():
