@@ -213,6 +213,23 @@ def test_springs_of_any_stiffness_gain_no_energy_in_a_chain(frequency, damping_r
         assert joints.state(last).value == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.parametrize("speed", [1.0, 20.0])
+@pytest.mark.parametrize("most", [None, 50.0])
+def test_no_motor_is_stronger_than_limits(speed, most):
+    world, joints = joint_world(0)
+    door = world.create_entity(Transform((1, 0)), RigidBody(1.0), Spin(inertia=0.3))
+    sled = world.create_entity(Transform((0, 9)), RigidBody(1.0), Spin(inertia=0.3))
+    driven = {"limits": (-0.1, 1.2), "motor_speed": speed}
+    hinge = world.create_entity(Hinge(None, door, anchor=(0, 0), max_torque=most, **driven))
+    slider = world.create_entity(Slider(None, sled, direction=(1, 0), max_force=most, **driven))
+    for _ in range(120):
+        world.step()
+        assert joints.state(hinge).value < 1.2 + 1e-6
+        assert joints.state(slider).value < 1.2 + 1e-6
+    assert joints.state(hinge).value == pytest.approx(1.2)
+    assert joints.state(slider).value == pytest.approx(1.2)
+
+
 def test_rope_never_pushes_and_holds():
     world, joints = joint_world()
     body = disc(world, (0, -0.2))
