@@ -32,6 +32,7 @@ _NAMES = {
     ),
     "plugins.one_way_segment": ("OneWaySegmentCollider",),
     "plugins.parts": ("PartOf", "Parts", "parts_from_outline"),
+    "plugins.paths": ("Path", "Paths"),
     "plugins.rotation": ("BoxCollider", "Rotation", "Spin"),
     "plugins.springs": ("Spring", "Springs"),
     "plugins.terrain": (

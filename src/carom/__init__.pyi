@@ -20,6 +20,8 @@ from .plugins.one_way_segment import OneWaySegmentCollider as OneWaySegmentColli
 from .plugins.parts import PartOf as PartOf
 from .plugins.parts import Parts as Parts
 from .plugins.parts import parts_from_outline as parts_from_outline
+from .plugins.paths import Path as Path
+from .plugins.paths import Paths as Paths
 from .plugins.rotation import BoxCollider as BoxCollider
 from .plugins.rotation import Rotation as Rotation
 from .plugins.rotation import Spin as Spin
