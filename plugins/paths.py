@@ -90,9 +90,9 @@ class Path(Component):
     else:
         points = _points_column()
     speed: float = column(minimum=0.0, unit="m/s")
-    mode: Mode = column("back_and_forth", choices=MODES, kw_only=True)
-    ease: bool = column(False, dtype=bool, kw_only=True)
-    travelled: float = column(0.0, minimum=0.0, kw_only=True, unit="m")
+    mode: Mode = column(default="back_and_forth", choices=MODES, kw_only=True)
+    ease: bool = column(default=False, dtype=bool, kw_only=True)
+    travelled: float = column(default=0.0, minimum=0.0, kw_only=True, unit="m")
 
     def check_in(self, contents: Any, entity: int | None, beside: Collection[type[Any]] = ()) -> None:
         """ValueError if its entity is no body that moves."""

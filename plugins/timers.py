@@ -29,11 +29,11 @@ class Timer(Component):
     plugin: ClassVar[str] = "timers"
 
     seconds: float = column(minimum=SHORTEST, unit="s")
-    repeat: bool = column(False, dtype=bool)
+    repeat: bool = column(default=False, dtype=bool)
     # Not for the constructor: the time from which it counts, how often it has been due since, and with which seconds.
-    started: float | None = special_column(None, optional=True, init=False, unit="s")
-    count: int = special_column(0, dtype=int, init=False)
-    period: float | None = special_column(None, optional=True, init=False, unit="s")
+    started: float | None = special_column(default=None, optional=True, init=False, unit="s")
+    count: int = special_column(default=0, dtype=int, init=False)
+    period: float | None = special_column(default=None, optional=True, init=False, unit="s")
 
     def left(self, time: float) -> float:
         """Seconds until it is due, at that ``time`` of the world: ``timer.left(world.time)``."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from carom.components import ALL_LAYERS, AABBCollider, RigidBody, SphereCollider, Transform
+from carom.components import ALL_LAYERS, AABBCollider, Prefab, RigidBody, SphereCollider, Transform
 from carom.framework import (
     Bodies,
     Component,
@@ -30,8 +30,10 @@ from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider
 from carom.plugins.half_space import HalfSpaceCollider
 from carom.plugins.one_way_segment import OneWaySegmentCollider
+from carom.plugins.paths import Path
 from carom.plugins.springs import Springs
 from carom.plugins.tile_grid import TileGridCollider
+from carom.plugins.timers import Timer
 
 
 class Health(Component):
@@ -107,6 +109,8 @@ def colliders() -> list[Component]:
         TileGridCollider(((1, 0), (1, 1)), 0.5, faces="floors", restitution=0.5),
         Health(80.0, lives=2, path=((0.0, 0.0), (1.0, 1.0))),
         RigidBody(2.0, (1.0, 0.0), kind="kinematic", max_linear_speed=None, ccd=True),
+        Path(((0.0, 0.0), (1.0, 1.0)), 2.0, mode="loop", ease=True),
+        Timer(1.0, repeat=True),
     ]
     return made
 
@@ -119,6 +123,8 @@ def mistakes() -> None:
     CapsuleCollider(0.5)  # pyright: ignore[reportCallIssue]
     RigidBody(velocity=(1.0, 0.0))  # pyright: ignore[reportCallIssue]
     RigidBody(kind="moving")  # pyright: ignore[reportArgumentType]
+    Path(((0.0, 0.0), (1.0, 1.0)), 2.0, mode="round")  # pyright: ignore[reportArgumentType]
+    Timer(repeat=True)  # pyright: ignore[reportCallIssue]
     Health(points="many", path=((0.0, 0.0),))  # pyright: ignore[reportArgumentType]
     TileGridCollider(((1,),), 0.5, bounce=1.0)  # pyright: ignore[reportCallIssue]
 
@@ -171,6 +177,14 @@ def play(steps: int = 30) -> tuple[float, int, str]:
     heavy: NDArray[np.float64] = world.bodies.dynamic.mass
     assert len(heavy) == len(world.bodies.dynamic)
     world.bodies.dynamic.linear_velocity[:, 0] += 1.0
+
+    world.time_scale = 0.5 * world.time_scale
+    pebble = Prefab(RigidBody(0.1), SphereCollider(0.05))
+    first: int = pebble.spawn(world, position=(20.0, 0.0), mass=0.2)
+    pebbles: range = pebble.spawn_many(world, 3, position=np.zeros((3, 2)))
+    drawn: NDArray[np.float64] = world.bodies.interpolated_position
+    assert first < pebbles[0]
+    assert len(drawn) == len(world.bodies)
 
     below: list[int] = world.query_point((0.0, -0.5))
     near = world.query_nearest((0.0, 0.0))

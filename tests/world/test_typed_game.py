@@ -15,13 +15,13 @@ def test_the_typed_game_runs_twice_alike():
     first, second = typed_game.play(), typed_game.play()
     assert first == second
     assert first[1] > 0
-    assert len(typed_game.colliders()) == 13
+    assert len(typed_game.colliders()) == 15
 
 
 def test_what_is_wrong_there_is_wrong_when_it_runs():
     """Each line of ``mistakes`` raises."""
     lines = [line.strip() for line in inspect.getsource(typed_game.mistakes).splitlines()[1:]]
-    assert len(lines) == 9
+    assert len(lines) == 11
     for line in lines:
         try:
             exec(line, vars(typed_game))
