@@ -107,8 +107,9 @@ def test_what_is_created_inside_a_step_counts_from_its_end(kind):
         Makes.phase, world = phase, world_of()
         log = log_of(world)
         world.add_system(Makes(), before=before)
-        world.step()
-        run(world, 9)
+        run(world, 3)
+        give(world, kind, 100.0)  # so that this step has others to look at anyway
+        run(world, 7)
         assert log == [(5, made[-1])]
 
 
