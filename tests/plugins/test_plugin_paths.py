@@ -10,6 +10,7 @@ import pytest
 from worlds import MODES
 
 from carom import (
+    AABBCollider,
     NoPhysicsError,
     Path,
     Paths,
@@ -114,6 +115,25 @@ def test_at_its_end_it_stands_and_what_stands_can_sleep():
     assert tuple(at(world, entity)) == SQUARE[-1]
     assert not world.bodies.linear_velocity.any()
     assert world.state_hash() == before
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("mode", MODES)
+def test_what_sleeps_on_a_lift_rides_on_when_it_goes_on(mode):
+    """Up and to the side with ease, to sleep, and up again: never a gap of more than what a step of 24 m/s^2 makes."""
+    world = World(Physics(2, gravity=(0, -9.81)), Paths(), settings=Settings(sleeping=True, collision=mode))
+    parts = RigidBody(kind="kinematic"), AABBCollider((1.0, 0.25), friction=0.5)
+    path = Path([(0, 0), (0, 2), (1, 2)], 2.0, mode="once", ease=True)
+    lift = world.create_entity(Transform((0, 0)), *parts, path)
+    crate = world.create_entity(Transform((0, 0.75)), RigidBody(), AABBCollider((0.5, 0.5), friction=0.5))
+    body = world.component_for_entity(crate, RigidBody)
+    for end in ((1.0, 2.0), (1.0, 6.0)):
+        for _ in range(300):
+            world.step()
+            assert abs(at(world, crate)[1] - at(world, lift)[1] - 0.75) < 24.0 / 60**2
+        assert tuple(at(world, lift)) == end
+        assert body.asleep
+        path.points, path.travelled = [(1, 2), (1, 6)], 0.0
 
 
 def test_what_is_elsewhere_goes_to_its_path_at_its_speed():
