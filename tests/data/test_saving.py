@@ -126,7 +126,7 @@ REFUSED = {
     "missing plugin": (None, {"plugins": GOOD}, r"needs plugin 'springs' 1\.0"),
     "older plugin": (None, {"plugins": [*GOOD, OldSprings()]}, r"plugin 'springs' 1\.0, this one is 0\.9"),
     "dimension": (None, {"plugins": [Physics(3), *GOOD[1:], Springs()]}, "2 dimensions, and plugin 'physics' is for 3"),
-    "missing component": (None, {"components": []}, r"class Bullet of helpers_snapshots: .*components=\[Bullet\]"),
+    "missing component": (None, {"components": []}, r"class Bullet of data.helpers_snapshots: .*components=\[Bullet\]"),
     "other fields": (None, {"components": [OTHER_BULLET]}, "Bullet had other fields .*: expires, power"),
     "two of a name": (None, {"components": [Bullet, OTHER_BULLET]}, "two component classes are named Bullet"),
 }
