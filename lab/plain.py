@@ -17,18 +17,7 @@ def jsonable(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [jsonable(item) for item in value]
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return jsonable(_plain(value))
+        return jsonable(dataclasses.asdict(value))
+    if isinstance(value, np.ndarray):
+        return jsonable(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _plain(record: Any) -> dict[str, Any]:
-    found = dataclasses.asdict(record)
-    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in found.items()}
-
-
-class JsonRecord:
-    """A dataclass that converts to plain data."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return _plain(self)

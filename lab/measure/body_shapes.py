@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,11 +124,19 @@ def sizes_of(world: World) -> dict[int, float]:
     return dict(zip(shapes.entity.tolist(), shapes.size.tolist(), strict=True))
 
 
-def dynamic_by_id(world: World) -> tuple[Floats, Floats, Floats]:
-    """Positions, velocities (n, d) and masses (n,) of the dynamic bodies, ascending by entity id; copies."""
+def size_of(world: World, sizes: Mapping[int, float]) -> float:
+    """The smallest extent of the dynamic bodies, m, of these sizes; without shapes the largest coordinate, else 1."""
+    ids, position, _, _ = state_by_id(world)
+    known = [sizes[entity] for entity in ids.tolist() if entity in sizes]
+    return min(known, default=0.0) or float(np.abs(position).max(initial=0.0)) or 1.0
+
+
+def state_by_id(world: World) -> tuple[NDArray[np.int64], Floats, Floats, Floats]:
+    """The dynamic bodies, ascending by entity id, which is the order of creation: ids (n,), positions and velocities
+    (n, d), masses (n,); copies."""
     dynamic = world.bodies.dynamic
     order = np.argsort(dynamic.entity, kind="stable")
-    return dynamic.position[order], dynamic.linear_velocity[order], dynamic.mass[order]
+    return dynamic.entity[order], dynamic.position[order], dynamic.linear_velocity[order], dynamic.mass[order]
 
 
 def sensor_entities(world: World) -> NDArray[np.int64]:
@@ -142,16 +150,21 @@ def sensor_entities(world: World) -> NDArray[np.int64]:
     return np.asarray(bodies.entity)[found]
 
 
-def overlaps_of(world: World) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
+def overlaps_of(
+    world: World, sizes: Mapping[int, float] | None = None, sensors: NDArray[np.int64] | None = None
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats, Floats]:
     """The pairs of solid shapes that overlap in the contacts of the last step, of which one is of a dynamic body: the
-    entities of both, (k,) each, and how deep, in sizes of the smaller one."""
-    contacts, dynamic, sensors = world.contacts, world.bodies.dynamic.entity, sensor_entities(world)
+    entities of both, (k,) each, how deep, m, and the size of the smaller one, m. sizes, sensors: those of the world,
+    where they are known."""
+    contacts, dynamic = world.contacts, world.bodies.dynamic.entity
+    sensors = sensor_entities(world) if sensors is None else sensors
     a, b = contacts.entity_a, contacts.entity_b
-    deep = (contacts.depth > 0.0) & (np.isin(a, dynamic) | np.isin(b, dynamic))
+    deep = (contacts.depth > 0.0) & (np.isin(a, dynamic) | np.isin(b, dynamic))  # platforms pass walls
     deep &= ~(np.isin(a, sensors) | np.isin(b, sensors))
-    sizes = sizes_of(world)
-    smaller = [min(sizes.get(entity, np.inf) for entity in pair) for pair in zip(a[deep], b[deep], strict=True)]
-    return a[deep], b[deep], contacts.depth[deep] / np.array(smaller, float)
+    sizes = sizes_of(world) if sizes is None else sizes
+    pairs = zip(a[deep].tolist(), b[deep].tolist(), strict=True)
+    smaller = [min(sizes.get(one, np.inf), sizes.get(other, np.inf)) for one, other in pairs]
+    return a[deep], b[deep], contacts.depth[deep], np.array(smaller, float)
 
 
 # -- bodies that escaped ---------------------------------------------------------------------------------
@@ -161,33 +174,32 @@ COVERED = 0.5
 ROUNDING = 1e-9  # relative to the coordinates: tolerance for the faces of adjacent walls of different sizes
 
 
-@dataclass(frozen=True)
-class Enclosure:
+class Enclosure(NamedTuple):
     """The space inside the walls, up to their outer faces; infinite on a side without a wall."""
 
     lower: Floats
     upper: Floats
 
-    @classmethod
-    def around(cls, world: World) -> Enclosure:
-        """The enclosure of the dynamic bodies by the static boxes of ``world`` in its present state."""
-        dimensions = dimensions_of(world)
-        lower, upper = np.full(dimensions, -np.inf), np.full(dimensions, np.inf)
-        shapes = shapes_of(world, SOLID)
-        bodies, walls = shapes.where(~shapes.static), shapes.where(shapes.static & ~shapes.round & ~shapes.sensor)
-        for axis in range(dimensions if len(bodies.entity) and len(walls.entity) else 0):
-            for sign, bounds in ((-1.0, lower), (1.0, upper)):
-                inner = sign * walls.centre[:, axis] - walls.half[:, axis]
-                outer = sign * walls.centre[:, axis] + walls.half[:, axis]
-                beyond = inner >= (sign * bodies.centre[:, axis]).max()
-                outermost = outer >= outer.max() - ROUNDING * np.abs(outer).max()
-                if _covered(bodies, walls.where(beyond & outermost), axis) >= COVERED:
-                    bounds[axis] = sign * outer.max()
-        return cls(lower, upper)
-
     def outside(self, positions: Floats) -> int:
         """The number of finite ``positions`` (n, d) outside."""
         return int(np.any((positions < self.lower) | (positions > self.upper), axis=1).sum())
+
+
+def walls_around(world: World) -> Enclosure:
+    """The enclosure of the dynamic bodies by the static boxes of ``world`` in its present state."""
+    dimensions = dimensions_of(world)
+    found = Enclosure(np.full(dimensions, -np.inf), np.full(dimensions, np.inf))
+    shapes = shapes_of(world, SOLID)
+    bodies, walls = shapes.where(~shapes.static), shapes.where(shapes.static & ~shapes.round & ~shapes.sensor)
+    for axis in range(dimensions if len(bodies.entity) and len(walls.entity) else 0):
+        for sign, bounds in zip((-1.0, 1.0), found, strict=True):
+            inner = sign * walls.centre[:, axis] - walls.half[:, axis]
+            outer = sign * walls.centre[:, axis] + walls.half[:, axis]
+            beyond = inner >= (sign * bodies.centre[:, axis]).max()
+            outermost = outer >= outer.max() - ROUNDING * np.abs(outer).max()
+            if _covered(bodies, walls.where(beyond & outermost), axis) >= COVERED:
+                bounds[axis] = sign * outer.max()
+    return found
 
 
 def _covered(bodies: Shapes, walls: Shapes, axis: int) -> float:

@@ -18,9 +18,9 @@ from ...framework.compilation import log
 from ...framework.schedule.profile_report import Stats, Totals
 from ...plugins.joints import Joints
 from .body_shapes import QUIET, SOLID, dimensions_of
-from .engine import CaromEngine
-from .observation import Observer
+from .observer import Observer
 from .paths import Recorder, Traces
+from .timing import timed
 
 TRACED_BODIES = 200  # in a picture
 KEPT = 1e-3  # of the energy: one that has never changed by more is kept
@@ -87,140 +87,7 @@ class Run:
     profile: Stats | None = None
 
 
-class Meter:
-    """Takes the steps of a world, times them, and looks at it between them, outside the measured time."""
-
-    def __init__(self, world: World, every: int, path_every: int, step_by_step: bool) -> None:
-        self.world, self.every, self.path_every = world, every, path_every
-        self.step_seconds: list[float] = []
-        self.contact_counts: list[int] = []
-        self.deepest, self.deepest_step = 0.0, None
-        self.momenta: list[NDArray[np.float64]] = []
-        self.momentum_scale = 0.0
-        self.measured = Totals()  # of the steps in step_seconds
-        self._kernels_seen = _kernels()
-        started = time.perf_counter()
-        self.recorder = Recorder(world, step_by_step)
-        self.recorder.record()
-        self.engine = CaromEngine(world)
-        self.observer = Observer(self.engine, math.inf)
-        self._note_momentum()
-        self.compile_seconds = time.perf_counter() - started if _kernels() != self._kernels_seen else 0.0
-        self._kernels_seen = _kernels()
-
-    @QUIET
-    def _note_momentum(self) -> None:
-        self.momenta.append(np.array(self.world.momentum(), float))
-        dynamic = self.world.bodies.dynamic
-        speed = np.linalg.norm(dynamic.linear_velocity, axis=1)
-        self.momentum_scale = max(self.momentum_scale, float(np.dot(np.asarray(dynamic.mass), speed)))
-
-    @QUIET
-    def sample(self) -> None:
-        """Sample energy and momentum, every few steps."""
-        self.observer.look()
-        self._note_momentum()
-
-    @QUIET
-    def step(self) -> None:
-        """Take one step, timed; then record what is needed after every step."""
-        world = self.world
-        totals, before = world.stats().totals, world.time
-        started = time.perf_counter()
-        world.step()
-        seconds = time.perf_counter() - started
-        if _kernels() != self._kernels_seen:  # this step compiled or loaded kernels: its time does not count
-            self._kernels_seen = _kernels()
-            self.compile_seconds += seconds
-        else:
-            self.step_seconds.append(seconds)
-            self.measured += world.stats().totals - totals
-        self.engine.take_in(before)
-        self.observer.count()
-        depth = np.asarray(world.contacts.depth)
-        self.contact_counts.append(len(depth))
-        if depth.max(initial=0.0) > self.deepest:
-            deepest = float(depth[self.engine.deep()].max(initial=0.0))
-            if deepest > self.deepest:
-                self.deepest, self.deepest_step = deepest, world.step_count
-        if world.step_count % self.path_every == 0:
-            self.recorder.record()
-        if world.step_count % self.every == 0:
-            self.sample()
-
-    @QUIET
-    def fill(self, report: RunReport) -> None:
-        """Write the observations into ``report``."""
-        world = self.world
-        report.compile_seconds = self.compile_seconds
-        report.steps, report.simulated_seconds = world.step_count, world.time
-        bodies = world.bodies
-        kinds = {kind: len(getattr(bodies, kind)) for kind in ("dynamic", "kinematic", "static")}
-        report.bodies = {"total": len(bodies), **kinds}
-        counts, impacts = self.contact_counts or [0], self.observer.seen.impacts
-        mean = round(float(np.mean(counts)), 3)
-        report.contacts = {"end": counts[-1], "mean": mean, "most": max(counts), "impacts": impacts}
-        if self.step_seconds:
-            report.step_milliseconds = 1e3 * float(np.median(self.step_seconds))
-            report.step_milliseconds_mean = 1e3 * float(np.mean(self.step_seconds))
-        means = self.stats().milliseconds
-        report.system_milliseconds = means if self.step_seconds else dict.fromkeys(means, math.nan)
-        kinetic, energies = np.array(self.observer.energies).T
-        largest = float(kinetic.max())
-        report.energy = _drift(energies, largest)  # the zero of a potential is arbitrary
-        report.energy_changes = self._energy_changes(energies, largest)
-        report.momentum = _drift(np.array(self.momenta), self.momentum_scale)
-        outer = kinds["static"] or kinds["kinematic"] or np.any(world.gravity) or world.force_systems
-        report.momentum_conserved = not outer
-        report.deepest_overlap, report.deepest_overlap_step = self.deepest, self.deepest_step
-        positions = np.asarray(bodies.dynamic.position)
-        finite = np.isfinite(positions).all(axis=1) & np.isfinite(bodies.dynamic.linear_velocity).all(axis=1)
-        if world.physics is not None:
-            finite &= ~world.physics.excluded()[bodies.dynamic.rows]
-        outside = self.engine.enclosure.outside(positions[finite])
-        report.escaped = {"outside": outside, "non_finite": int((~finite).sum())}
-        report.counters = dict(world.stats().counters)
-        report.faults = list(world.faults)
-        report.state_hash = world.state_hash()
-
-    def stats(self) -> Stats:
-        """Statistics of the steps that neither compiled nor loaded kernels."""
-        return Stats(self.measured, self.measured, self.world.stats().units)
-
-    def _energy_changes(self, energies: NDArray[np.float64], kinetic: float) -> list[str]:
-        """What in the present world may have added or removed energy; nothing if it was kept."""
-        noise = KEPT * max(kinetic, float(np.abs(energies).max()))
-        if np.ptp(energies) <= noise:
-            return []
-        world, bodies, dynamic = self.world, self.world.bodies, self.world.bodies.dynamic
-        # Of "max" a pair has at least a body's own restitution; an impact never adds any energy.
-        touched = dynamic if world.settings.restitution_mixing == "max" else bodies
-        met = self.observer.seen.impacts > 0 or max(self.contact_counts, default=0) > 0
-        fell = (np.maximum.accumulate(energies) - energies).max() > noise
-        own_forces = [force for force in world.force_systems if not hasattr(force, "potential_energy")]
-        reasons = {
-            "restitution below 1": met and fell and (_restitutions(touched) < 1).any(),
-            "damping": np.any(dynamic.linear_damping),
-            "forces": np.any(dynamic.constant_force) or np.any(dynamic.applied_force) or own_forces,
-            "systems of the game": any(not type(one).__module__.startswith("carom.systems.") for one in world.systems),
-            "kinematic bodies that move": np.any(bodies.kinematic.linear_velocity),
-            "joints that drive, spring or stop": any(
-                isinstance(plugin, Joints) and plugin.changes_energy for plugin in world.plugins
-            ),
-            "bodies that came or went": not self.engine.fixed,
-        }
-        return [reason for reason, holds in reasons.items() if holds]
-
-
-def _drift(values: NDArray[np.float64], scale: float) -> Drift:
-    """Of samples of a number, or of a vector (n, d), of which the length of the change counts."""
-    scale = scale or 1.0
-    departure = values - values[0]
-    apart = np.abs(departure) if departure.ndim == 1 else np.linalg.norm(departure, axis=1)
-    change = departure[-1] if departure.ndim == 1 else apart[-1]
-    return Drift(values[0].tolist(), values[-1].tolist(), float(change / scale), float(apart.max() / scale), scale)
-
-
+@QUIET
 def run(
     world: World, steps: int, *, scene: str = "", seed: int = 0, after_step: Callable[[int], None] | None = None,
     profile: bool = False,
@@ -230,29 +97,115 @@ def run(
     ``profile``: time each kernel too, which makes each call slightly slower.
     """
     report = RunReport(scene, seed, dimensions_of(world), plain_settings(world))
-    compiled, loaded = _kernels()
-    started = time.perf_counter()
+    compiled, loaded, started = len(log.compiled), log.loaded, time.perf_counter()
     every = max(1, math.ceil(steps / SAMPLES))
     moving = len(world.bodies.dynamic) + len(world.bodies.kinematic)
     path_every = max(1, min(every, math.ceil(steps * max(moving, 1) / PATH_POINTS)))
-    meter = Meter(world, every, path_every, steps <= FEW_STEPS and moving <= FEW_BODIES)
+    recorder = Recorder(world, steps <= FEW_STEPS and moving <= FEW_BODIES)
+    recorder.record()
+    seconds, valid, watch = timed(lambda: Observer(world, clock=time.perf_counter), time.perf_counter)
+    momenta, contacts, measured = [_momentum(world)], [0] * (not steps), Totals()
     with world.profile() if profile else contextlib.nullcontext():
         for done in range(1, steps + 1):
-            meter.step()
+            totals = world.stats().totals
+            if watch.step(world.settings.dt):
+                measured += world.stats().totals - totals
+            depth = np.asarray(world.contacts.depth)
+            contacts.append(len(depth))
+            if depth.max(initial=0.0) > report.deepest_overlap:
+                deepest = float(watch.overlaps()[2].max(initial=0.0))
+                if deepest > report.deepest_overlap:
+                    report.deepest_overlap, report.deepest_overlap_step = deepest, world.step_count
+            if done % path_every == 0 or done == steps:
+                recorder.record()
+            if done % every == 0 or done == steps:
+                watch.look()
+                momenta.append(_momentum(world))
             if after_step is not None:
                 after_step(done)
-    if world.step_count % meter.every:
-        meter.sample()
-    if world.step_count % meter.path_every:
-        meter.recorder.record()
     report.wall_seconds = time.perf_counter() - started
-    report.kernels_compiled, report.kernels_loaded = _kernels()[0] - compiled, _kernels()[1] - loaded
-    meter.fill(report)
-    stats = meter.stats() if profile else None
-    if stats is not None:
+    report.compile_seconds = watch.compile_seconds + (0.0 if valid else seconds)
+    report.kernels_compiled, report.kernels_loaded = len(log.compiled) - compiled, log.loaded - loaded
+    impacts, mean = watch.seen.impacts, round(float(np.mean(contacts)), 3)
+    report.contacts = {"end": contacts[-1], "mean": mean, "most": max(contacts), "impacts": impacts}
+    stats = Stats(measured, measured, world.stats().units)
+    report.system_milliseconds = stats.milliseconds
+    if watch.step_seconds:
+        report.step_milliseconds = 1e3 * float(np.median(watch.step_seconds))
+        report.step_milliseconds_mean = 1e3 * float(np.mean(watch.step_seconds))
+    else:
+        report.system_milliseconds = dict.fromkeys(stats.milliseconds, math.nan)
+    kinetic, energies = np.array(watch.energies).T
+    report.energy = _drift(energies, float(kinetic.max()))  # the zero of a potential is arbitrary
+    met = impacts > 0 or max(contacts) > 0
+    report.energy_changes = _energy_changes(world, energies, float(kinetic.max()), met, watch.seen.fixed)
+    vectors, scales = zip(*momenta, strict=True)
+    report.momentum = _drift(np.array(vectors), max(scales))
+    _note_end(report, world, watch)
+    if profile:
         kernels = [dataclasses.asdict(row) for row in stats.kernels]
         report.profile = {"steps": stats.steps, "nanoseconds": stats.nanoseconds, "kernels": kernels}
-    return Run(report, meter.recorder.traces().farthest(TRACED_BODIES), world, stats)
+    return Run(report, recorder.traces().farthest(TRACED_BODIES), world, stats if profile else None)
+
+
+def _note_end(report: RunReport, world: World, watch: Observer) -> None:
+    """What is known from the world's final state."""
+    report.steps, report.simulated_seconds = world.step_count, world.time
+    bodies = world.bodies
+    kinds = {kind: len(getattr(bodies, kind)) for kind in ("dynamic", "kinematic", "static")}
+    report.bodies = {"total": len(bodies), **kinds}
+    outer = kinds["static"] or kinds["kinematic"] or np.any(world.gravity) or world.force_systems
+    report.momentum_conserved = not outer
+    positions = np.asarray(bodies.dynamic.position)
+    finite = np.isfinite(positions).all(axis=1) & np.isfinite(bodies.dynamic.linear_velocity).all(axis=1)
+    if world.physics is not None:
+        finite &= ~world.physics.excluded()[bodies.dynamic.rows]
+    report.escaped = {"outside": watch.walls.outside(positions[finite]), "non_finite": int((~finite).sum())}
+    report.counters = dict(world.stats().counters)
+    report.faults = list(world.faults)
+    report.state_hash = world.state_hash()
+
+
+def _momentum(world: World) -> tuple[NDArray[np.float64], float]:
+    """The momentum (d,), and the sum of mass times speed."""
+    dynamic = world.bodies.dynamic
+    speed = np.linalg.norm(dynamic.linear_velocity, axis=1)
+    return np.array(world.momentum(), float), float(np.dot(np.asarray(dynamic.mass), speed))
+
+
+def _energy_changes(
+    world: World, energies: NDArray[np.float64], kinetic: float, met: bool, fixed: bool
+) -> list[str]:
+    """What in the present world may have added or removed energy; nothing if it was kept."""
+    noise = KEPT * max(kinetic, float(np.abs(energies).max()))
+    if np.ptp(energies) <= noise:
+        return []
+    bodies, dynamic = world.bodies, world.bodies.dynamic
+    # Of "max" a pair has at least a body's own restitution; an impact never adds any energy.
+    touched = dynamic if world.settings.restitution_mixing == "max" else bodies
+    fell = (np.maximum.accumulate(energies) - energies).max() > noise
+    own_forces = [force for force in world.force_systems if not hasattr(force, "potential_energy")]
+    reasons = {
+        "restitution below 1": met and fell and (_restitutions(touched) < 1).any(),
+        "damping": np.any(dynamic.linear_damping),
+        "forces": np.any(dynamic.constant_force) or np.any(dynamic.applied_force) or own_forces,
+        "systems of the game": any(not type(one).__module__.startswith("carom.systems.") for one in world.systems),
+        "kinematic bodies that move": np.any(bodies.kinematic.linear_velocity),
+        "joints that drive, spring or stop": any(
+            isinstance(plugin, Joints) and plugin.changes_energy for plugin in world.plugins
+        ),
+        "bodies that came or went": not fixed,
+    }
+    return [reason for reason, holds in reasons.items() if holds]
+
+
+def _drift(values: NDArray[np.float64], scale: float) -> Drift:
+    """Of samples of a number, or of a vector (n, d), of which the length of the change counts."""
+    scale = scale or 1.0
+    departure = values - values[0]
+    apart = np.abs(departure) if departure.ndim == 1 else np.linalg.norm(departure, axis=1)
+    change = departure[-1] if departure.ndim == 1 else apart[-1]
+    return Drift(values[0].tolist(), values[-1].tolist(), float(change / scale), float(apart.max() / scale), scale)
 
 
 def plain_settings(world: World) -> dict[str, Any]:
@@ -270,7 +223,3 @@ def _restitutions(bodies: Any) -> NDArray[np.float64]:
         if has.any():  # else there may be no such columns
             found.append(getattr(bodies, collider.prefix[:-1]).restitution[has])
     return np.concatenate([np.zeros(0), *found])
-
-
-def _kernels() -> tuple[int, int]:
-    return len(log.compiled), log.loaded

@@ -37,12 +37,12 @@ def no_garbage_collection() -> Iterator[None]:
             gc.enable()
 
 
-def timed(work: Callable[[], Any]) -> tuple[float, bool, Any]:
+def timed(work: Callable[[], Any], clock: Callable[[], float] = now) -> tuple[float, bool, Any]:
     """Seconds that ``work`` took, whether they are valid (no kernel was compiled or loaded), and its result."""
     waited = log.waited
-    started = now()
+    started = clock()
     result = work()
-    seconds = now() - started
+    seconds = clock() - started
     return seconds, log.waited == waited, result
 
 

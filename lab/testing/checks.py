@@ -283,9 +283,9 @@ def assert_no_overlap(world: World, sizes: float = 0.01) -> None:
 
     As the contacts of the last step have it.
     """
-    for one, other, depth in zip(*overlaps_of(world), strict=True):
-        assert depth <= sizes, (
-            f"step {world.step_count}: {one} and {other} overlap by {depth:.3g} of the smaller one's size, "
+    for one, other, depth, size in zip(*overlaps_of(world), strict=True):
+        assert depth <= sizes * size, (
+            f"step {world.step_count}: {one} and {other} overlap by {depth / size:.3g} of the smaller one's size, "
             f"limit {sizes:.3g}"
         )
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..cli.usage_errors import Problem, did_you_mean
-from ..measure.observation import BLEW_UP, NOT_FINITE, TUNNELLED, RunResult, mean_of
+from ..measure.observer import BLEW_UP, NOT_FINITE, TUNNELLED, RunResult, mean_of
 from ..reporting.text import metres
 from .grid import STILL, Facts
 
@@ -216,7 +216,6 @@ NORMS: Mapping[str, Norm] = {
         limit=lambda seen, right: right.tolerance / seen.size if seen.fixed else math.inf,
         words=lambda value, seen, _: f"bodies sink {metres(value * seen.size)} into each other",
     ),
-    "overlap_mean": _own("overlap_mean", "overlap per body in the second half, in sizes of the smaller body"),
     "speed": _own(
         "speed", "largest speed in the end, in sizes of the smallest body per second",
         limit=lambda seen, right: SPEED if seen.fixed and _rests(right) else math.inf,
@@ -230,7 +229,7 @@ NORMS: Mapping[str, Norm] = {
 
 
 def _rests(right: RunResult) -> bool:
-    return right.met and right.speed <= STILL
+    return bool(right.struck) and right.speed <= STILL
 
 
 def game_norm(name: str, place: bool = False, chaotic: bool = False) -> Norm:
@@ -299,7 +298,7 @@ def failure_of(seen: RunResult, right: RunResult, chaotic: bool) -> str | None:
     if seen.reach > FAR * max(right.reach, right.size):
         return BLEW_UP
     same = seen.fixed and right.fixed and not right.values  # a game tells itself what went wrong
-    if same and any(should and not did for did, should in zip(seen.struck, right.struck, strict=False)):
+    if same and {*right.struck} & {*right.entities} - {*seen.struck}:
         return TUNNELLED
     return None
 

@@ -21,8 +21,8 @@ from ..cli.loading import stdout_kept_clean
 from ..cli.usage_errors import Problem
 from ..inputs import forget_asked, times_asked
 from ..jobs import Jobs
-from ..measure.engine import CaromEngine
-from ..measure.observation import ESCAPED, STOPPED, RunResult, observe
+from ..measure.body_shapes import size_of, sizes_of
+from ..measure.observer import ESCAPED, STOPPED, RunResult, observe
 from ..measure.timing import faults_in_results, timed
 from .subject import Subject
 
@@ -75,7 +75,7 @@ class Task:
         """The world at its start."""
         world = self.subject.world(self.settings, self.seed)
         if self.nudged:
-            nudge(world, self.nudged * CaromEngine(world).size, self.seed)
+            nudge(world, self.nudged * size_of(world, sizes_of(world)), self.seed)
         return world
 
 
@@ -84,14 +84,14 @@ def perform(task: Task) -> RunResult:
     """What the run shows; of one that an error ends that it has failed, and why."""
     try:
         loaded = task.subject.loaded
-        with closing(CaromEngine(task.world())) as engine, loaded.attribute_errors(), stdout_kept_clean():
+        with closing(task.world()) as world, loaded.attribute_errors(), stdout_kept_clean():
             seen = observe(
-                engine, task.seconds, task.settings.dt, task.phase, task.whole, task.walled, task.inputs,
+                world, task.seconds, task.settings.dt, task.phase, task.whole, task.walled, task.inputs,
                 loaded.values_of,
             )  # fmt: skip
-            if seen.failure and engine.world.physics is not None:
-                engine.world.physics.report_faults("")  # of what no step has looked at yet
-                seen.detail = "; ".join(engine.world.faults[:1])
+            if seen.failure and world.physics is not None:
+                world.physics.report_faults("")  # of what no step has looked at yet
+                seen.detail = "; ".join(world.faults[:1])
             return seen
     except Problem as problem:
         return RunResult(np.zeros((0, 2)), failure=STOPPED, detail=problem.message, seconds=task.seconds)
@@ -211,7 +211,7 @@ def survey(subject: Subject, seconds: float, jobs: Jobs) -> Facts:
         first = tried(task)
     if not first.reach and not first.counts["solver_loops"]:
         raise Problem(f"{subject.name}: no body moves within {seconds:g} s: nothing to measure")
-    contacts = any(first.struck) or first.met
+    contacts = bool(first.struck)
     least = SEEN if first.created else NUDGE
     other = tried(dataclasses.replace(task, nudged=least, walled=False))
     apart = np.inf

@@ -18,9 +18,8 @@ from typing import Any
 from ...framework import Settings
 from ..cli.usage_errors import Problem
 from ..jobs import Jobs
-from ..measure.engine import work_of
 from ..measure.machine import machine
-from ..measure.observation import RunResult
+from ..measure.observer import RunResult, work_of
 from ..plain import jsonable
 from ..reporting.progress import NO_PROGRESS, Progress
 from ..reporting.text import number

@@ -19,7 +19,7 @@ from carom.framework import ForceSystem, Settings, System, World
 from carom.lab import Trade, trade
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.jobs import Jobs
-from carom.lab.measure.observation import RunResult, mean_of, step_lengths
+from carom.lab.measure.observer import RunResult, mean_of, step_lengths
 from carom.lab.trading.answer import answer
 from carom.lab.trading.errors import NEVER, NORMS, Figure, figures_of, game_norm, norms_for, other_touches, reference_of
 from carom.lab.trading.grid import Facts, grid, perform, survey, tasks_of

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from carom.framework import World
-from carom.lab.measure.body_shapes import Floats, dynamic_by_id
-from carom.lab.measure.observation import RunResult
+from carom.lab.measure.body_shapes import Floats, state_by_id
+from carom.lab.measure.observer import RunResult
 from carom.lab.testing.predict import bounce_times, collide, free_flight, impact_time, orbit_speed, spring
 
 SAMPLES = 2000  # of a path, to find the largest displacement
@@ -23,16 +23,17 @@ def _seen(path: Path, seconds: float, world: World, struck: bool, times: list[fl
     places = np.array([path(t) for t in np.linspace(0.0, seconds, SAMPLES)])
     energy = world.kinetic_energy() + world.potential_energy()
     found.setdefault("energy_scale", world.kinetic_energy())
+    entities = sorted(world.bodies.dynamic.entity.tolist())
     return RunResult(
-        path(seconds), entities=sorted(world.bodies.dynamic.entity.tolist()),
+        path(seconds), entities=entities,
         reach=float(np.linalg.norm(places - start, axis=2).max()), energy=energy, energy_start=energy,
-        impacts=len(times), times=times, struck=[struck] * len(start), seconds=seconds, **found,
+        impacts=len(times), times=times, struck=entities * struck, seconds=seconds, **found,
     )  # fmt: skip
 
 
 def flight(world: World, seconds: float) -> RunResult:
     """Parabolas without contacts; the apex is v^2 / 2g."""
-    x, v, _ = dynamic_by_id(world)
+    _, x, v, _ = state_by_id(world)
     gravity = np.asarray(world.gravity, float)
     size = float(np.linalg.norm(gravity))
     rise = float((-(v @ gravity)).max() / size) if size else 0.0  # m/s, upwards
@@ -42,7 +43,7 @@ def flight(world: World, seconds: float) -> RunResult:
 
 def swinging(world: World, seconds: float) -> RunResult:
     """The undamped spring of the scene: x(t) = x0 cos(w t); at the centre all energy is kinetic."""
-    x, v, mass = dynamic_by_id(world)
+    _, x, v, mass = state_by_id(world)
     stiffness = world.force_systems[0].stiffness  # type: ignore[attr-defined]
     total = world.kinetic_energy() + world.potential_energy()
     return _seen(lambda t: spring(t, stiffness, mass[0], x, v)[0], seconds, world, False, [], energy_scale=total)
@@ -50,7 +51,7 @@ def swinging(world: World, seconds: float) -> RunResult:
 
 def kepler(world: World, seconds: float) -> RunResult:
     """An ellipse around the origin, GM = 1, from the perihelion on the x axis, by Kepler's equation M = E - e sin E."""
-    x, v, _ = dynamic_by_id(world)
+    _, x, v, _ = state_by_id(world)
     near, speed = float(x[0, 0]), float(v[0, 1])
     axis = 1 / (2 / near - speed**2)
     e = 1 - near / axis
@@ -68,7 +69,7 @@ def kepler(world: World, seconds: float) -> RunResult:
 
 def bounces(world: World, seconds: float) -> RunResult:
     """Elastic balls dropped from rest: each flight is the previous one mirrored in time."""
-    x, _, mass = dynamic_by_id(world)
+    _, x, _, mass = state_by_id(world)
     g = -float(np.asarray(world.gravity)[1])
     radius = 0.1
     fall = math.sqrt(2 * (float(x[0, 1]) - radius) / g)
@@ -85,7 +86,7 @@ def bounces(world: World, seconds: float) -> RunResult:
 
 def one_impact(world: World, seconds: float) -> RunResult:
     """Two equal elastic discs of radius 1/2, as in the scene: straight lines with one corner each."""
-    x, v, mass = dynamic_by_id(world)
+    _, x, v, mass = state_by_id(world)
     when = impact_time(x[0], v[0], x[1], v[1], 1.0)
     touch = x + when * v
     normal = touch[1] - touch[0]
