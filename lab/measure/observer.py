@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ...framework import World
-from .body_shapes import QUIET, Floats, overlaps_of, sensor_entities, size_of, sizes_of, state_by_id, walls_around
+from .body_shapes import Floats, overlaps_of, sensor_entities, size_of, sizes_of, state_by_id, walls_around
 from .timing import now, timed
 
 # Failures of runs; STOPPED: ended by an error.
@@ -29,7 +29,6 @@ EARLY = 0.2  # fraction of the run after which statistics begin
 MOST_TIMES = 200  # impacts whose times are kept
 MOST_TOUCHES = 400  # pairs whose first contact is kept
 SAMPLES = 200  # of the overlaps
-LOOKS = 2000  # at the state of a run, at most: a look may cost more than a step
 NEAR = 0.05  # of a step: an end of a step that close to a change of the inputs moves there
 
 
@@ -240,32 +239,6 @@ class Observer:
 
 def _longest(vectors: Floats) -> float:
     return float(np.sqrt((vectors * vectors).sum(axis=1)).max(initial=0.0))
-
-
-@QUIET
-def observe(
-    world: World, seconds: float, dt: float, phase: float = 1.0, whole_steps: bool = False, walled: bool = True,
-    inputs: Sequence[float] = (), values: Callable[[World], dict[str, list[float]]] | None = None,
-) -> RunResult:  # fmt: skip
-    """Run ``world`` for ``seconds``; phase: the first step's length in steps, above 0 up to 1.
-
-    whole_steps: leave out the last partial step, because a change of the step length disturbs contacts at rest. walled:
-    see :class:`Observer`. inputs: when they change, s; there a step ends. values: what a game compares, read at the
-    end.
-    """
-    watch = Observer(world, seconds, walled)
-    steps = step_lengths(seconds, dt, phase, whole_steps, inputs)
-    every = -(-len(steps) // LOOKS)
-    for done, step in enumerate(steps, 1):
-        watch.step(step)
-        if done % every == 0 or done == len(steps):
-            watch.look()
-        if watch.seen.failure:
-            break
-    seen = watch.finished()
-    if values is not None and seen.failure is None:
-        seen.values = values(world)
-    return seen
 
 
 def mean_of(seens: Sequence[RunResult], names: Iterable[str]) -> RunResult:

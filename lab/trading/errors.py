@@ -58,6 +58,15 @@ class Norm(NamedTuple):
     mean: bool = False
     needs: str = ""
 
+    def noticed_from(self, name: str, seen: RunResult, right: RunResult) -> float:
+        """The limit; infinite where bodies came and went, or cannot be compared, for all but what a game compares."""
+        if name not in right.values:
+            doubtful = name != "position" and right.doubt > right.tolerance
+            places = any(len(value) > 1 for value in right.values.values())  # the game itself says which ones count
+            if not seen.fixed or (self.by_body and (doubtful or places)):
+                return math.inf
+        return self.limit(seen, right)
+
 
 # -- what is measured -----------------------------------------------------------------------------------------------
 
@@ -113,26 +122,6 @@ def _reach(seen: RunResult, right: RunResult) -> float:
     return right.reach or seen.reach or 1.0
 
 
-def _names_places(right: RunResult) -> bool:
-    """True for a game that says itself which places count."""
-    return any(len(value) > 1 for value in right.values.values())
-
-
-def _reliable(right: RunResult) -> float:
-    """How far a body may be elsewhere, as far as that is known."""
-    return max(right.tolerance, 2 * right.doubt)
-
-
-def _judged(limit: Measure) -> Measure:
-    """That limit where bodies can be compared; else nothing is noticed."""
-
-    def found(seen: RunResult, right: RunResult) -> float:
-        known = seen.fixed and not _names_places(right) and right.doubt <= right.tolerance
-        return limit(seen, right) if known else math.inf
-
-    return found
-
-
 def _where_any(limit: float) -> Measure:
     """That limit if both runs have impacts: what hardly bounces may come to rest without one."""
     return lambda seen, right: limit if seen.times and right.times else math.inf
@@ -170,8 +159,7 @@ NORMS: Mapping[str, Norm] = {
     "position": Norm(
         "largest distance of a body from where it should be in the end; 1 is the longest way of a body from its start",
         lambda seen, right: float(distances(seen, right)[0].max(initial=0.0)), _reach,
-        lambda seen, right: math.inf if _names_places(right) or not seen.fixed else _reliable(right),
-        _ends, by_body=True,
+        lambda seen, right: max(right.tolerance, 2 * right.doubt), _ends, by_body=True,
     ),
     "energy": Norm(
         "largest departure of the energy on the way (in the end, where it is not conserved); 1 is the energy at the "
@@ -181,13 +169,13 @@ NORMS: Mapping[str, Norm] = {
     "energy_gain": Norm(
         "energy gained in a minute, where it is conserved (a loss looks like drag); 1 as for energy",
         lambda seen, right: max(seen.energy - seen.energy_start, 0.0) * 60 / seen.seconds, _energy_scale,
-        lambda seen, right: SHARE * _energy_scale(seen, right) if conserves(right) and seen.fixed else math.inf,
+        lambda seen, right: SHARE * _energy_scale(seen, right) if conserves(right) else math.inf,
         lambda value, seen, right: f"the energy grows by {100 * value / _energy_scale(seen, right):.2g} % a minute",
         mean=True,
     ),
     "apex": _relative(
         "apex", "height of the highest point reached, at steps; 1 is the right height", by_body=True,
-        limit=_judged(lambda seen, right: right.tolerance),
+        limit=lambda seen, right: right.tolerance,
         words=lambda value, *_: f"the highest point is {metres(value)} {'higher' if value > 0 else 'lower'}",
     ),
     "impact_time": Norm(
@@ -197,28 +185,28 @@ NORMS: Mapping[str, Norm] = {
     "first_contact": Norm(
         "error of the first impact's time; 1 is the whole run",
         lambda seen, right: (seen.times or [right.seconds])[0] - (right.times or [right.seconds])[0],
-        lambda seen, right: right.seconds, _judged(_where_any(LATE)),
+        lambda seen, right: right.seconds, _where_any(LATE),
         lambda value, *_: f"the first contact is {1e3 * abs(value):.3g} ms {'late' if value > 0 else 'early'}",
         by_body=True, needs="times",
     ),
     "count": _relative(
-        "impacts", "number of impacts; 1 is the right number", by_body=True, limit=_judged(_where_any(0.5)),
+        "impacts", "number of impacts; 1 is the right number", by_body=True, limit=_where_any(0.5),
         words=lambda value, *_: f"{abs(value)} impacts {'more' if value > 0 else 'fewer'}",
     ),
     "order": Norm(
         "pairs that first touch in another order, or in one of the runs only; 1 is as many as should touch",
         lambda seen, right: len(other_touches(seen, right)), lambda seen, right: max(len(right.touches), 1),
-        _judged(lambda seen, right: math.inf if _rests(right) else 0.5), _touching, by_body=True, needs="touches",
+        lambda seen, right: math.inf if _rests(right) else 0.5, _touching, by_body=True, needs="touches",
     ),
     "energy_square": _own("energy_square", "mean square of the departure of the energy, in J²: relative to nothing"),
     "overlap": _own(
         "overlap", "deepest overlap in the second half, in sizes of the smaller body",
-        limit=lambda seen, right: right.tolerance / seen.size if seen.fixed else math.inf,
+        limit=lambda seen, right: right.tolerance / seen.size,
         words=lambda value, seen, _: f"bodies sink {metres(value * seen.size)} into each other",
     ),
     "speed": _own(
         "speed", "largest speed in the end, in sizes of the smallest body per second",
-        limit=lambda seen, right: SPEED if seen.fixed and _rests(right) else math.inf,
+        limit=lambda seen, right: SPEED if _rests(right) else math.inf,
         words=lambda value, seen, _: f"what rests still moves at {metres(value * seen.size)} per second",
     ),
     "drift": _own("drift", "largest distance that a body gets in the second half, in sizes of the smallest body"),
@@ -260,7 +248,7 @@ def game_norm(name: str, place: bool = False, chaotic: bool = False) -> Norm:
     return Norm(text, lambda seen, right: difference(seen, right, name), scale, limit, words, place, chaotic)
 
 
-def norms_for(name: str, facts: Facts, asked: Sequence[str]) -> tuple[dict[str, Norm], tuple[str, ...]]:
+def norms_for(facts: Facts, asked: Sequence[str]) -> tuple[dict[str, Norm], tuple[str, ...]]:
     """All norms of a scene, and the names of those that are shown, the first counts; Problem for one that there is not,
     or that would measure chance."""
     values = facts.trial.values
@@ -277,8 +265,8 @@ def norms_for(name: str, facts: Facts, asked: Sequence[str]) -> tuple[dict[str, 
     found = tuple(one for one in chosen if one in known)
     if not found or (asked and found != chosen):
         raise Problem(
-            f"{name} is chaotic: {facts.why}, so places would measure chance: take a shorter time, statistics "
-            "(pressure, rate, kinetic: they need contacts), or let compared give numbers too: counts, times or scores"
+            f"{facts.task.subject.name} is chaotic: {facts.why}, so places would measure chance: take a shorter time, "
+            "statistics (pressure, rate, kinetic: they need contacts), or let compared give numbers too"
         )
     return known, found
 
@@ -304,12 +292,12 @@ def failure_of(seen: RunResult, right: RunResult, chaotic: bool) -> str | None:
 
 
 def reference_of(
-    name: str, facts: Facts, norms: Mapping[str, Norm], shown: Sequence[str], seens: Sequence[RunResult],
-    tolerance: float | None = None,
-) -> tuple[RunResult, dict[str, float]]:  # fmt: skip
+    facts: Facts, norms: Mapping[str, Norm], shown: Sequence[str], seens: Sequence[RunResult]
+) -> tuple[RunResult, dict[str, float]]:
     """What is right, and its own error by norm. seens: of a chaotic scene runs of several seeds; else two runs with the
-    finest steps, extrapolated to a step of 0 (Richardson), and two of another method. tolerance: how far a body may be
-    elsewhere, m (default: a share of its size). Problem if they have failed, and if all norms are 0 throughout."""
+    finest steps, extrapolated to a step of 0 (Richardson), and two of another method. Problem if they have failed, and
+    if all norms are 0 throughout."""
+    name = facts.task.subject.name
     for seen in seens:
         if seen.failure:
             raise Problem(f"{name} has no reference: its run {seen.failure}{seen.detail and f': {seen.detail}'}")
@@ -318,7 +306,7 @@ def reference_of(
     else:
         right = _extrapolated(seens[0], seens[1], facts.order)
         right = dataclasses.replace(right, doubt=_own_error(NORMS["position"].measure, right, *seens[1:]))
-    right = dataclasses.replace(right, tolerance=SHARE * right.size if tolerance is None else tolerance)
+    right = dataclasses.replace(right, tolerance=SHARE * right.size)
     idle = [one for one in shown if norms[one].needs and not getattr(right, norms[one].needs)]
     if len(idle) == len(shown):
         usable = [one for one, norm in norms.items() if not norm.needs or getattr(right, norm.needs)]
@@ -371,7 +359,7 @@ def figures_of(
         else:
             worst = int(np.argmax(np.abs(values)))
             seen, value = seens[worst], values[worst]
-        limit, scale = max(limit, norm.limit(seen, right)), norm.scale(seen, right)
+        limit, scale = max(limit, norm.noticed_from(name, seen, right)), norm.scale(seen, right)
         times = abs(value) / limit if limit and math.isfinite(value) else NEVER * (value != 0)
         times *= not norm.mean or len(values) > 1 or chaotic  # the mean over the start phases is not known from one
         error = (abs(value) + more) / scale if math.isfinite(value) else 1.0

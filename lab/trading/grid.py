@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
@@ -21,8 +21,8 @@ from ..cli.loading import stdout_kept_clean
 from ..cli.usage_errors import Problem
 from ..inputs import forget_asked, times_asked
 from ..jobs import Jobs
-from ..measure.body_shapes import size_of, sizes_of
-from ..measure.observer import ESCAPED, STOPPED, RunResult, observe
+from ..measure.body_shapes import QUIET, size_of, sizes_of
+from ..measure.observer import ESCAPED, STOPPED, Observer, RunResult, step_lengths
 from ..measure.timing import faults_in_results, timed
 from .subject import Subject
 
@@ -34,6 +34,7 @@ STILL = 0.01  # sizes per second: slower bodies are at rest
 LONGEST = 1 / 30  # s: longer steps are tried only if the scene has one, or if asked for
 STEPS = (8, 4, 2, 1, 1 / 2, 1 / 4)  # of the scene's own
 FEWEST_STEPS = 3  # of a run
+LOOKS = 2000  # at the state of a run, at most: a look may cost more than a step
 DENSE = 0.5  # changes of the inputs per step: longer steps would be split too often to be judged
 METHODS = ("semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")  # explicit Euler is tried only if asked for
 SUBSTEPS = (1, 4, 16)
@@ -79,17 +80,26 @@ class Task:
         return world
 
 
+@QUIET
 @faults_in_results()
 def perform(task: Task) -> RunResult:
     """What the run shows; of one that an error ends that it has failed, and why."""
     try:
         loaded = task.subject.loaded
         with closing(task.world()) as world, loaded.attribute_errors(), stdout_kept_clean():
-            seen = observe(
-                world, task.seconds, task.settings.dt, task.phase, task.whole, task.walled, task.inputs,
-                loaded.values_of,
-            )  # fmt: skip
-            if seen.failure and world.physics is not None:
+            watch = Observer(world, task.seconds, task.walled)
+            steps = step_lengths(task.seconds, task.settings.dt, task.phase, task.whole, task.inputs)
+            every = -(-len(steps) // LOOKS)
+            for done, step in enumerate(steps, 1):
+                watch.step(step)
+                if done % every == 0 or done == len(steps):
+                    watch.look()
+                if watch.seen.failure:
+                    break
+            seen = watch.finished()
+            if not seen.failure:
+                seen.values = loaded.values_of(world)
+            elif world.physics is not None:
                 world.physics.report_faults("")  # of what no step has looked at yet
                 seen.detail = "; ".join(world.faults[:1])
             return seen
@@ -137,24 +147,22 @@ def milliseconds(task: Task) -> float | None:
 class Facts:
     """What the trial runs have shown.
 
-    settings: those that the scene recommends; seeded: seeds change its start; walled: walls hold all bodies
+    settings: those that the scene recommends; task, trial: a run with about these, and what it has shown
+    seeded: seeds change its start; force_systems, free: there are such; nothing but contacts acts on bodies
     contacts: solid bodies touch; rests: in the end all is at rest on something
     chaotic: two almost equal starts diverge; why: in words
-    inputs: times at which the recorded inputs change that the game plays back, s
     """
 
     settings: Settings
+    task: Task
     trial: RunResult
-    seconds: float
     seeded: bool
-    walled: bool
     force_systems: bool
     free: bool
     contacts: bool
     rests: bool
     chaotic: bool
     why: str
-    inputs: tuple[float, ...]
 
     @property
     def exact(self) -> Settings:
@@ -181,19 +189,17 @@ class Facts:
 
 def survey(subject: Subject, seconds: float, jobs: Jobs) -> Facts:
     """Two trial runs; Problem for a scene that cannot be measured."""
-    with closing(subject.world(None)) as recommended:
+    with closing(subject.world(None)) as recommended, subject.loaded.attribute_errors(), stdout_kept_clean():
         settings, start = recommended.settings, recommended.state_hash()
         dynamic = recommended.bodies.dynamic
         if not len(dynamic):
             raise Problem(f"{subject.name}: there is no body that moves by itself: nothing to measure")
         forces = bool(recommended.force_systems), bool(np.any(recommended.gravity) and np.any(dynamic.gravity_scale))
         free = not (any(forces) or np.any(dynamic.constant_force) or np.any(dynamic.linear_damping))
+        forget_asked()
+        recommended.step()
     seeded = _is_seeded(subject, settings, start)
     swept = settings.replace(collision="event_driven" if settings.collision == "event_driven" else "continuous")
-    forget_asked()
-    other = subject.world(swept.replace(dt=settings.dt / 2, substeps=settings.substeps + 1))
-    with closing(other), subject.loaded.attribute_errors(), stdout_kept_clean():
-        other.step()
     task = Task(subject, swept, seconds, subject.seed, inputs=times_asked(seconds))
 
     def tried(task: Task) -> RunResult:
@@ -220,9 +226,8 @@ def survey(subject: Subject, seconds: float, jobs: Jobs) -> Facts:
     rests = contacts and first.counts["solver_loops"] > 0 and first.speed <= STILL and not first.values
     chaotic = apart > (1.0 if first.created else CHAOS * NUDGE)
     grown = f"two starts {least:g} of a body apart end {apart:.1e} of it apart"
-    return Facts(
-        settings, first, seconds, seeded, task.walled, forces[0], free, contacts, rests, chaotic, grown, task.inputs
-    )  # fmt: skip
+    task = dataclasses.replace(task, step=1e-3 * (first.milliseconds or 0.0) * settings.dt)
+    return Facts(settings, task, first, seeded, forces[0], free, contacts, rests, chaotic, grown)
 
 
 def _is_seeded(subject: Subject, settings: Settings, start: str) -> bool:
@@ -246,8 +251,8 @@ def _is_seeded(subject: Subject, settings: Settings, start: str) -> bool:
 def grid(facts: Facts, vary: Mapping[str, Sequence[Any]]) -> tuple[Settings, ...]:
     """Every setting that makes a difference, and the scene's own, the longest steps first. vary: other values of these
     fields. Problem for a run without room for any step."""
-    own, many = facts.settings, max(len(facts.inputs), 1)
-    most = max(own.dt, min(LONGEST * (1 + 1e-9), DENSE * facts.seconds / many))
+    own, seconds, many = facts.settings, facts.task.seconds, max(len(facts.task.inputs), 1)
+    most = max(own.dt, min(LONGEST * (1 + 1e-9), DENSE * seconds / many))
     methods = METHODS if facts.force_systems else METHODS[:2]
     if facts.rests or facts.free or facts.chaotic:  # the solver, or chance, determines the result
         methods = (own.integrator,)
@@ -259,11 +264,11 @@ def grid(facts: Facts, vary: Mapping[str, Sequence[Any]]) -> tuple[Settings, ...
         "substeps": sorted({own.substeps, *SUBSTEPS}) if facts.rests else (own.substeps,),
         **vary,
     }
-    longest = facts.seconds / FEWEST_STEPS
+    longest = seconds / FEWEST_STEPS
     fitting = sorted({dt for dt in values["dt"] if dt <= longest}, reverse=True)
     if not fitting:
         raise Problem(
-            f"a run of {facts.seconds:g} s has no room for steps of {min(values['dt']):g} s: at most {longest:g} s"
+            f"a run of {seconds:g} s has no room for steps of {min(values['dt']):g} s: at most {longest:g} s"
         )
     cells = [own.replace(dt=dt) for dt in fitting]
     for name in list(values)[1:]:
@@ -274,13 +279,10 @@ def grid(facts: Facts, vary: Mapping[str, Sequence[Any]]) -> tuple[Settings, ...
     return tuple(dict.fromkeys([*cells, own] if own.dt <= longest and "dt" not in vary else cells))
 
 
-def tasks_of(subject: Subject, facts: Facts, settings: Settings, repeats: Sequence[int]) -> list[Task]:
+def tasks_of(facts: Facts, settings: Settings, repeats: Iterable[int]) -> list[Task]:
     """The runs of a setting: start phases, spread evenly however many there are (van der Corput's sequence, in the
     order of the Gray code: 1, 1/2, 1/4, 3/4, ...), or seeds of a chaotic scene."""
-    first = Task(
-        subject, settings, facts.seconds, subject.seed, inputs=facts.inputs, walled=facts.walled, whole=facts.rests,
-        step=1e-3 * (facts.trial.milliseconds or 0.0) * facts.settings.dt,
-    )  # fmt: skip
+    first = dataclasses.replace(facts.task, settings=settings, whole=facts.rests)
     if facts.chaotic:
         nudged = 0.0 if facts.seeded else max(1e3 * NUDGE, SEEN * (facts.trial.created > 0))
         return [dataclasses.replace(first, seed=first.seed + repeat, nudged=nudged) for repeat in repeats]

@@ -16,7 +16,6 @@ from ... import scenes
 from ...framework import Settings, World
 from ..cli.loading import Loaded, load
 from ..inputs import texts_read
-from ..plugins.command import plugin_named
 
 DEFAULT_SECONDS = 5.0  # if the subject does not define it
 
@@ -26,8 +25,6 @@ class Subject:
     """``target``: a scene's name or a file; or ``build``, a function build(settings, seed=0) -> World.
 
     options: keywords for the scene's build besides settings and seed
-    chosen, changes: instead of the recommended settings, and of some of their fields
-    plugins: names of those that are added
     """
 
     name: str
@@ -35,9 +32,6 @@ class Subject:
     build: Any = None
     options: tuple[tuple[str, Any], ...] = ()
     seed: int = 0
-    chosen: Settings | None = None
-    changes: tuple[tuple[str, Any], ...] = ()
-    plugins: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, target: Any, options: Mapping[str, Any] | None = None, seed: int = 0) -> Subject:
@@ -49,19 +43,15 @@ class Subject:
 
     def world(self, settings: Settings | None, seed: int | None = None) -> World:
         """A new world; Problem for errors in a user's file. settings None: the recommended ones."""
-        changes = dict(self.changes) if settings is None else {}
-        added = [plugin_named(name) for name in self.plugins]
-        return self.loaded.build(settings or self.chosen, changes, self.seed if seed is None else seed, added)
+        return self.loaded.build(settings, {}, self.seed if seed is None else seed)
 
     @property
     def loaded(self) -> Loaded:
         """What builds the world, with the options."""
-        if self.build is not None:
-            build = functools.partial(self.build, **dict(self.options))
-            return Loaded(self.name, build, compared=getattr(self.build, "compared", None))
-        loaded = load_once(self.target)
-        if not self.options:
-            return loaded
+        if self.build is None:
+            loaded = load_once(self.target)
+        else:
+            loaded = Loaded(self.name, self.build, compared=getattr(self.build, "compared", None))
         return dataclasses.replace(loaded, function=functools.partial(loaded.function, **dict(self.options)))
 
     @property
@@ -75,7 +65,7 @@ class Subject:
         results are not kept: what it closes over has no version."""
         if self.build is not None:
             return ""
-        text = repr((self.target, self.options, self.plugins, _version()))
+        text = repr((self.target, self.options, _version()))
         if self.target not in scenes.names():
             text += _text_around(load_once(self.target))
         return hashlib.sha256(text.encode()).hexdigest()[:12]
@@ -101,14 +91,12 @@ def _text_around(loaded: Loaded) -> str:
 
 
 def load_once(target: str) -> Loaded:
-    """Load a file; load it again only if it has changed."""
+    """Load a scene or a file; load it again only if it has changed."""
     path = Path(target)
-    if target in scenes.names() or not path.is_file():
-        return load(target)
-    return _load_file(str(path.resolve()), target, path.stat().st_mtime_ns)
+    return _load(target, str(path.resolve()), path.stat().st_mtime_ns if path.is_file() else 0)
 
 
 @functools.lru_cache(maxsize=32)
-def _load_file(place: str, target: str, changed: int) -> Loaded:
+def _load(target: str, place: str, changed: int) -> Loaded:
     del place, changed  # in the cache key only: distinguish files of one name, and versions of one file
     return load(target)

@@ -160,7 +160,7 @@ def trade(
     jobs, found = Jobs(workers, folder, progress, cluster), []
     for subject in subjects:
         try:
-            found.append(measured(
+            found.append(_measured(
                 subject, jobs, norms, vary, seconds, repeats, max_error, max_cost, absolute, timing, thorough
             ))  # fmt: skip
         except Problem as problem:
@@ -170,20 +170,17 @@ def trade(
     return Trade(machine(), command, found)
 
 
-def measured(
-    subject: Subject, jobs: Jobs, norms: Sequence[str] = (), vary: Mapping[str, Sequence[Any]] | None = None,
-    seconds: float | None = None, repeats: int | None = None, max_error: float | None = None,
-    max_cost: float | None = None, absolute: bool = False, timing: bool = False, thorough: bool = False,
-    tolerance: float | None = None,
+def _measured(
+    subject: Subject, jobs: Jobs, norms: Sequence[str], vary: Mapping[str, Sequence[Any]], seconds: float | None,
+    repeats: int | None, max_error: float | None, max_cost: float | None, absolute: bool, timing: bool, thorough: bool,
 ) -> SceneTrade:  # fmt: skip
     """One scene. Each setting runs once, with much smaller steps than its own only if no other will do; what would be
-    the answer runs as often as it takes to know, until it still is the answer. tolerance: see ``reference_of``."""
-    vary = vary or {}
+    the answer runs as often as it takes to know, until it still is the answer."""
     with closing(subject.world(None)) as world:
         for name, value in ((name, value) for name, values in vary.items() for value in values):
             subject.world(world.settings.replace(**{name: value})).close()  # raises for unknown names
     facts = survey(subject, seconds or subject.seconds, jobs)
-    known, shown = norms_for(subject.name, facts, norms)
+    known, shown = norms_for(facts, norms)
     cells, own = grid(facts, vary), facts.settings
     usual = SEEDS if facts.chaotic else APEX_PHASES if "apex" in norms else 1 if facts.rests else PHASES
     repeats = repeats or usual
@@ -191,13 +188,13 @@ def measured(
     fine, runs = (own.dt / 2, max(repeats // 2, 2)) if facts.chaotic else (min(cell.dt for cell in cells) / 2, 1)
     methods = (facts.exact,) if facts.chaotic else (facts.exact, facts.other)
     exact = [method.replace(dt=dt) for method in methods for dt in (fine, fine / 2)]
-    tasks = [task for cell in exact for task in tasks_of(subject, facts, cell, range(runs))]
+    tasks = [task for cell in exact for task in tasks_of(facts, cell, range(runs))]
     found = jobs.all(perform, tasks, f"{subject.name}: reference")
-    right, agreement = reference_of(subject.name, facts, known, shown, found, tolerance)
+    right, agreement = reference_of(facts, known, shown, found)
     scale, method = known[next(iter(agreement))].scale(right, right), facts.exact
     case = SceneTrade(
         subject.name, facts.chaotic, facts.why, {name: known[name].text for name in agreement}, tuple(right.values),
-        facts.seconds, f"{method.collision if facts.contacts else method.integrator}, steps of {number(fine)} and "
+        facts.task.seconds, f"{method.collision if facts.contacts else method.integrator}, steps of {number(fine)} and "
         f"{number(fine / 2)} s", agreement, scale, right.size, right.doubt,
         math.inf if max_error is None else max_error / (scale if absolute else 1.0),
         math.inf if max_cost is None else 60 * max_cost,
@@ -207,14 +204,15 @@ def measured(
 
     def run(some: Sequence[Settings], count: int) -> None:
         new = [(cell, range(len(seens.setdefault(cell, [])), count)) for cell in some]
-        tasks = [(cell, task) for cell, numbers in new for task in tasks_of(subject, facts, cell, numbers)]
+        tasks = [(cell, task) for cell, numbers in new for task in tasks_of(facts, cell, numbers)]
         what = f"{subject.name}: {len(some)} settings, {count} {'seeds' if facts.chaotic else 'start phases'}"
         for (cell, _), seen in zip(tasks, jobs.all(perform, [task for _, task in tasks], what), strict=True):
             seens[cell].append(seen)
 
     later = [] if thorough or "dt" in vary else sorted({cell.dt for cell in cells if cell.dt < FIRST * own.dt})
     first = [cell for cell in cells if cell.dt not in later]
-    run([*first, *[own] * (own not in first and FEWEST_STEPS * own.dt <= facts.seconds)], repeats if thorough else 1)
+    fits = own not in first and FEWEST_STEPS * own.dt <= facts.task.seconds
+    run([*first, *[own] * fits], repeats if thorough else 1)
     while True:
         case.points = [
             _point(cell, cell in cells, found, right, known, facts.chaotic, times.get(cell))
@@ -230,12 +228,12 @@ def measured(
             run([cell for cell in cells if cell.dt == later[-1]], 1)
             later.pop()
         elif timing and (untimed := {point.settings for point in (*answers, case.more) if point} - times.keys()):
-            times |= {cell: milliseconds(tasks_of(subject, facts, cell, [0])[0]) for cell in untimed}
+            times |= {cell: milliseconds(tasks_of(facts, cell, [0])[0]) for cell in untimed}
         else:
             break
-    if facts.inputs and not facts.chaotic:
+    if facts.task.inputs and not facts.chaotic:
         for cell in dict.fromkeys(point.settings for point in answers):
-            case.inputs[cell.dt] = _inputs_late(subject, facts, cell, repeats, jobs)
+            case.inputs[cell.dt] = _inputs_late(facts, cell, repeats, jobs)
     return case
 
 
@@ -254,17 +252,17 @@ def _point(
     )  # fmt: skip
 
 
-def _inputs_late(subject: Subject, facts: Facts, cell: Settings, repeats: int, jobs: Jobs) -> list[str]:
+def _inputs_late(facts: Facts, cell: Settings, repeats: int, jobs: Jobs) -> list[str]:
     """What is noticed of inputs that act in whole steps, as in the game, beside the same runs in which they act in
     time."""
-    exact = tasks_of(subject, facts, cell, range(repeats))
+    exact = tasks_of(facts, cell, range(repeats))
     late = [dataclasses.replace(task, inputs=()) for task in exact]
-    seens = jobs.all(perform, [*exact, *late], f"{subject.name}: inputs in whole steps")
+    seens = jobs.all(perform, [*exact, *late], f"{facts.task.subject.name}: inputs in whole steps")
     worst: dict[str, Figure] = {}
     for right, seen in zip(seens[:repeats], seens[repeats:], strict=True):
         if not (right.failure or seen.failure):
             right = dataclasses.replace(right, tolerance=SHARE * right.size)
-            for name, figure in figures_of([seen], right, norms_for(subject.name, facts, ())[0]).items():
+            for name, figure in figures_of([seen], right, norms_for(facts, ())[0]).items():
                 worst[name] = max(worst.get(name, figure), figure, key=lambda figure: figure.times)
     return [figure.text for figure in sorted(worst.values(), key=lambda figure: -figure.times) if figure.times > 1]
 

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import pickle
-from contextlib import closing
 from pathlib import Path
 
 import helpers_cli
 import pytest
 from helpers_cli import refusal, report_of
-
-from carom.lab.trading.subject import Subject
 
 carom = helpers_cli.carom  # fixture
 
@@ -121,10 +117,3 @@ def test_the_command_refuses_in_one_line(carom, arguments, message):
     assert message in refusal(carom("limits", *arguments))
 
 
-def test_a_scene_with_options_is_measured_in_other_processes_too():
-    asked = pickle.loads(pickle.dumps(Subject("gas2d", "gas2d", changes=(("substeps", 3),), plugins=("springs",))))
-    with closing(asked.world(None)) as world:
-        assert world.settings.substeps == 3
-        assert any(plugin.name == "springs" for plugin in world.plugins)
-    with closing(asked.world(world.settings.replace(substeps=2))) as other:
-        assert other.settings.substeps == 2

@@ -69,7 +69,7 @@ def test_errors_against_the_own_reference_are_those_against_the_closed_form(name
     )
     with subject.world(cell) as world:
         right = FORMS[name](world, seconds)
-    (task,) = tasks_of(subject, facts, cell, [0])
+    (task,) = tasks_of(facts, cell, [0])
     true = figures_of([perform(task)], dataclasses.replace(right, tolerance=1.0), NORMS)
     for norm in ("position", "energy"):
         found = errors(case, norm)[cell.integrator, cell.collision, cell.dt]
@@ -164,17 +164,17 @@ def test_what_rests_is_judged_by_what_it_sinks(tmp_path):
 def test_two_methods_that_disagree_are_no_reference_for_places():
     """What one of them has elsewhere is not noticed, and the answer says so."""
     facts = facts_of("oblique", 3.0)
-    norms, shown = norms_for("oblique", facts, ())
+    norms, shown = norms_for(facts, ())
     one = seen(fixed=True, impacts=1, times=[0.5])
     other = dataclasses.replace(one, position=np.array([[0.0, 0.3]]))
-    right, agreement = reference_of("oblique", facts, norms, shown, [one, one, other, other])
+    right, agreement = reference_of(facts, norms, shown, [one, one, other, other])
     assert right.doubt == pytest.approx(0.3)
     assert agreement["position"] == pytest.approx(0.3 / 4.0)
     assert figures_of([other], right, norms)["position"].times <= 0.5
-    right, agreement = reference_of("oblique", facts, norms, shown, [other, one, one, one])
+    right, agreement = reference_of(facts, norms, shown, [other, one, one, one])
     assert right.doubt == pytest.approx(0.1)  # second order: a third of what the step changes
     near = dataclasses.replace(one, position=np.array([[0.0, 0.15]]))
-    right, agreement = reference_of("oblique", facts, norms, shown, [one, one, other, near])
+    right, agreement = reference_of(facts, norms, shown, [one, one, other, near])
     assert right.doubt == 0.0  # the other method is on its way there
     own = point(1 / 60, 100.0)
     case = SceneTrade("a", norms={"position": ""}, points=[own], own=own, chosen=own, doubt=0.3)
@@ -374,12 +374,11 @@ def test_what_matters_in_a_scene(name, seconds, chaotic, rests):
 
 
 def test_start_phases_are_spread_evenly_and_few_of_them_reach_far():
-    subject = Subject.of("jump")
     facts = facts_of("jump")
     for count in (1, 2, 4, 64):
-        phases = [task.phase for task in tasks_of(subject, facts, facts.settings, range(count))]
+        phases = [task.phase for task in tasks_of(facts, facts.settings, range(count))]
         assert sorted(phases) == [(k + 1) / count for k in range(count)]
-    assert len({task.key for task in tasks_of(subject, facts, facts.settings, range(8))}) == 8
+    assert len({task.key for task in tasks_of(facts, facts.settings, range(8))}) == 8
 
 
 def test_steps_end_where_inputs_change():
@@ -395,7 +394,7 @@ def test_a_ball_that_rolls_off_a_platform_has_not_escaped():
         world.create_entity(Transform((0, 0.5)), RigidBody(linear_velocity=(4, 0)), SphereCollider(0.5))
         return world
 
-    assert not facts_of(build, 2.0).walled
+    assert not facts_of(build, 2.0).task.walled
 
 
 def stars(settings, seed=0):

@@ -78,7 +78,7 @@ def test_json_alone_goes_to_stdout_and_nothing_runs_twice(carom, monkeypatch):
     found = json.loads(first.stdout)
     assert found["command"] == f"carom trade jump {' '.join(SHORT)} --json"
     assert found["scenes"][0]["chosen"]["line"] == 'Settings(dt=1/30, integrator="velocity_verlet")'
-    monkeypatch.setattr(grid, "observe", None)  # no task runs
+    monkeypatch.setattr(grid, "Observer", None)  # no task runs
     assert carom("jump", *SHORT, "--json").stdout == first.stdout
 
 

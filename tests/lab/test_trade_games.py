@@ -187,7 +187,7 @@ def test_steps_are_not_tried_that_inputs_would_cut_into_pieces():
         return world
 
     facts = survey(Subject.of(watched), 1.0, Jobs(1))
-    assert len(facts.inputs) == 59
+    assert len(facts.task.inputs) == 59
     assert max(cell.dt for cell in grid(facts, {})) == facts.settings.dt
 
 
