@@ -14,8 +14,7 @@ from carom.framework import World
 from carom.lab import testing as kit
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.jobs import Jobs
-from carom.lab.measure.machine import machine
-from carom.lab.measure.timing import faults_in_results, no_garbage_collection, timed
+from carom.lab.measure.timing import faults_in_results, machine, no_garbage_collection, timed
 from carom.lab.reporting.progress import NO_PROGRESS, Progress
 
 WARM_UP_STEPS = 2

@@ -15,11 +15,10 @@ from rich.console import Console
 from ...framework import Settings
 from ...framework.schedule.profile_report import Stats
 from ..measure.run import Drift, RunReport, run
-from ..plain import jsonable
 from ..plugins.command import plugin_named
 from ..reporting.output import drawing_if_there, drawing_module
 from ..reporting.progress import Progress
-from ..reporting.text import NOTHING, TextTable, counted, number, values_text
+from ..reporting.text import NOTHING, TextTable, counted, jsonable, number, values_text
 from .loading import load, stdout_kept_clean
 from .options import NOT_NEGATIVE, Corners, View, json_option, traceback_option, world_options, writable_folder
 from .usage_errors import Problem

@@ -14,10 +14,10 @@ from ...framework import Settings, World
 from ..cli.loading import Loaded, load, stdout_kept_clean
 from ..cli.options import NOT_NEGATIVE, json_option, traceback_option, world_options
 from ..cli.usage_errors import Problem
-from ..plain import jsonable
+from ..measure.body_shapes import apart, state_by_id
 from ..plugins.command import plugin_named
 from ..reporting.progress import Progress
-from ..reporting.text import metres, number, values_text
+from ..reporting.text import jsonable, metres, number, values_text
 from .step_length import StepLimits, step_limits
 
 LOOKS = 20  # times that a running scene is examined
@@ -88,11 +88,8 @@ def _run(loaded: Loaded, world: World, seconds: float, bar: Progress) -> list[tu
 
 def _difference(loaded: Loaded, one: World, other: World) -> dict[str, Any]:
     """Of two runs: the dynamic body whose ends are farthest apart, m, and what a game compares."""
-    places = [dict(zip(world.bodies.dynamic.entity.tolist(), np.array(world.bodies.dynamic.position), strict=True))
-              for world in (one, other)]  # fmt: skip
-    ways = {entity: float(np.linalg.norm(place - places[1][entity])) for entity, place in places[0].items()
-            if entity in places[1]}  # fmt: skip
-    entity = max(ways, key=lambda each: ways[each], default=None)
+    ways, ids = apart(*(state_by_id(world)[:2] for world in (one, other)))
+    farthest, entity = max(zip(ways.tolist(), ids.tolist(), strict=True), default=(None, None))
     values = [loaded.values_of(world) for world in (one, other)]
     compared = {name: [value, values[1].get(name, [np.nan])] for name, value in values[0].items()}
-    return {"entity": entity, "farthest": None if entity is None else ways[entity], "compared": compared}
+    return {"entity": entity, "farthest": farthest, "compared": compared}

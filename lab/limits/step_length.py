@@ -14,7 +14,7 @@ import numpy as np
 
 from ...components import Collider
 from ...framework import CaromError, NoPhysicsError, World
-from ..plain import jsonable
+from ..reporting.text import jsonable
 from .stability import stability_limits
 from .stiffness import modes_of, unmeasured
 

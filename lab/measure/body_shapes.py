@@ -139,6 +139,13 @@ def state_by_id(world: World) -> tuple[NDArray[np.int64], Floats, Floats, Floats
     return dynamic.entity[order], dynamic.position[order], dynamic.linear_velocity[order], dynamic.mass[order]
 
 
+def apart(one: tuple[Any, Floats], other: tuple[Any, Floats]) -> tuple[Floats, NDArray[np.int64]]:
+    """Of two states, each ids and positions: how far the bodies are apart that both have, (n,), and their ids."""
+    ids, a, b = np.intersect1d(one[0], other[0], return_indices=True)
+    ways = one[1][a] - other[1][b]
+    return np.sqrt((ways * ways).reshape(len(ids), -1).sum(axis=1)), ids
+
+
 def sensor_entities(world: World) -> NDArray[np.int64]:
     """The ids of entities with a sensor collider."""
     bodies = world.bodies

@@ -1,11 +1,14 @@
-"""Numbers, counts and tables as the reports of the laboratory write them."""
+"""Numbers, counts, tables and records as the reports of the laboratory write them."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 NOTHING = "-"
 
@@ -91,3 +94,16 @@ class TextTable:
 def as_markdown(tables: list[TextTable], remarks: list[str]) -> str:
     """The tables, then the remarks, as Markdown."""
     return "\n\n".join([*(table.markdown() for table in tables), *remarks])
+
+
+def jsonable(value: Any) -> Any:
+    """Records as plain data, with None instead of numbers that JSON cannot represent: infinity and NaN."""
+    if isinstance(value, Mapping):
+        return {key: jsonable(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [jsonable(item) for item in value]
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return jsonable(dataclasses.asdict(value))
+    if isinstance(value, np.ndarray):
+        return jsonable(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value

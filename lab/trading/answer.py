@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..measure.machine import machine_line
+from ..measure.timing import machine_line
 from ..reporting.text import NOTHING, TextTable, compact, metres, number
 from .errors import NEVER, SHARE
 from .trade import FIELDS, Point, SceneTrade, Trade, seconds_text

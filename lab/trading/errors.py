@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..cli.usage_errors import Problem, did_you_mean
+from ..measure.body_shapes import apart
 from ..measure.observer import BLEW_UP, NOT_FINITE, TUNNELLED, RunResult, mean_of
 from ..reporting.text import metres
 from .grid import STILL, Facts
@@ -72,10 +73,8 @@ class Norm(NamedTuple):
 
 
 def distances(seen: RunResult, right: RunResult) -> tuple[np.ndarray, np.ndarray]:
-    """How far each body that both runs have ends from where it should, (n,), and their ids, by order of creation."""
-    ids, a, b = np.intersect1d(seen.entities, right.entities, return_indices=True)
-    apart = seen.position[a] - right.position[b]
-    return np.sqrt((apart * apart).reshape(len(ids), -1).sum(axis=1)), ids
+    """How far each body that both runs have ends from where it should, (n,), and their ids."""
+    return apart((seen.entities, seen.position), (right.entities, right.position))
 
 
 def other_touches(seen: RunResult, right: RunResult) -> list[tuple[int, int, str]]:
@@ -142,8 +141,8 @@ def _own(field: str, text: str, **more: Any) -> Norm:
 
 
 def _ends(value: float, seen: RunResult, right: RunResult) -> str:
-    apart, ids = distances(seen, right)
-    return f"entity {ids[int(np.argmax(apart))]} ends {metres(value)} from where it should"
+    ways, ids = distances(seen, right)
+    return f"entity {ids[int(np.argmax(ways))]} ends {metres(value)} from where it should"
 
 
 def _touching(value: float, seen: RunResult, right: RunResult) -> str:
@@ -327,9 +326,9 @@ def _own_error(
     measure: Measure, right: RunResult, finest: RunResult, other: RunResult, other_finest: RunResult
 ) -> float:
     """What the extrapolation has changed; or how far another method is, if its own step does not explain that."""
-    apart = abs(measure(other_finest, right))
-    explained = apart <= EXPLAINED * abs(measure(other, other_finest))
-    return float(max(abs(measure(finest, right)), 0.0 if explained else apart))
+    off = abs(measure(other_finest, right))
+    explained = off <= EXPLAINED * abs(measure(other, other_finest))
+    return float(max(abs(measure(finest, right)), 0.0 if explained else off))
 
 
 def _extrapolated(fine: RunResult, finest: RunResult, order: int) -> RunResult:

@@ -21,7 +21,7 @@ from ..cli.loading import stdout_kept_clean
 from ..cli.usage_errors import Problem
 from ..inputs import forget_asked, times_asked
 from ..jobs import Jobs
-from ..measure.body_shapes import QUIET, size_of, sizes_of
+from ..measure.body_shapes import QUIET, apart, size_of, sizes_of
 from ..measure.observer import ESCAPED, STOPPED, Observer, RunResult, step_lengths
 from ..measure.timing import faults_in_results, timed
 from .subject import Subject
@@ -220,14 +220,15 @@ def survey(subject: Subject, seconds: float, jobs: Jobs) -> Facts:
     contacts = bool(first.struck)
     least = SEEN if first.created else NUDGE
     other = tried(dataclasses.replace(task, nudged=least, walled=False))
-    apart = np.inf
+    grown = np.inf
     if other.entities == first.entities:
-        apart = float(np.linalg.norm(other.position - first.position, axis=1).max(initial=0.0)) / first.size
+        ways, _ = apart((other.entities, other.position), (first.entities, first.position))
+        grown = float(ways.max(initial=0.0)) / first.size
     rests = contacts and first.counts["solver_loops"] > 0 and first.speed <= STILL and not first.values
-    chaotic = apart > (1.0 if first.created else CHAOS * NUDGE)
-    grown = f"two starts {least:g} of a body apart end {apart:.1e} of it apart"
+    chaotic = grown > (1.0 if first.created else CHAOS * NUDGE)
+    why = f"two starts {least:g} of a body apart end {grown:.1e} of it apart"
     task = dataclasses.replace(task, step=1e-3 * (first.milliseconds or 0.0) * settings.dt)
-    return Facts(settings, task, first, seeded, forces[0], free, contacts, rests, chaotic, grown)
+    return Facts(settings, task, first, seeded, forces[0], free, contacts, rests, chaotic, why)
 
 
 def _is_seeded(subject: Subject, settings: Settings, start: str) -> bool:

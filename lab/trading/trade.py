@@ -18,11 +18,10 @@ from typing import Any
 from ...framework import Settings
 from ..cli.usage_errors import Problem
 from ..jobs import Jobs
-from ..measure.machine import machine
 from ..measure.observer import RunResult, work_of
-from ..plain import jsonable
+from ..measure.timing import machine
 from ..reporting.progress import NO_PROGRESS, Progress
-from ..reporting.text import number
+from ..reporting.text import jsonable, number
 from .errors import SHARE, TRUSTED, Figure, Norm, failure_of, figures_of, norms_for, reference_of
 from .grid import FEWEST_STEPS, FIELDS, PHASES, SEEDS, Facts, grid, milliseconds, perform, survey, tasks_of
 from .subject import Subject
@@ -319,8 +318,9 @@ def settings_line(settings: Settings) -> str:
     """The shortest ``Settings(...)`` with identical values, bit for bit: those of the default are left out."""
     values = {each.name: getattr(settings, each.name) for each in dataclasses.fields(Settings)}
     changed = {name: value for name, value in values.items() if value != getattr(Settings(), name)}
-    parts = [f"{name}={seconds_text(value) if name == 'dt' else quoted(value)}" for name, value in changed.items()]
-    return f"Settings({', '.join(parts)})"
+    texts = {name: json.dumps(value) if isinstance(value, str) else repr(value) for name, value in changed.items()}
+    texts |= {"dt": seconds_text(settings.dt)} if "dt" in texts else {}
+    return f"Settings({', '.join(f'{name}={text}' for name, text in texts.items())})"
 
 
 def seconds_text(dt: float) -> str:
@@ -329,8 +329,3 @@ def seconds_text(dt: float) -> str:
     text = f"{fraction.numerator}/{fraction.denominator}"
     same = fraction.numerator and fraction.numerator / fraction.denominator == dt
     return text if same and fraction.denominator > 1 and len(text) <= min(len(repr(dt)), 8) else repr(float(dt))
-
-
-def quoted(value: object) -> str:
-    """The Python repr, with the quotation marks used in the documentation."""
-    return json.dumps(value) if isinstance(value, str) else repr(value)

@@ -16,8 +16,7 @@ import click
 import numpy as np
 
 from carom.lab.cli.usage_errors import Problem
-from carom.lab.measure.machine import machine_line
-from carom.lab.measure.timing import timed
+from carom.lab.measure.timing import machine_line, timed
 from carom.lab.reporting.text import NOTHING, TextTable, compact, span
 
 from ..runner import Axis, Result, Sample, ratios
