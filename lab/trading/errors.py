@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -128,11 +129,11 @@ def _where_any(limit: float) -> Measure:
 
 def _relative(field: str, text: str, **more: Any) -> Norm:
     """A quantity whose right value is 1."""
-
-    def scale(seen: RunResult, right: RunResult) -> float:
-        return abs(getattr(right, field)) or abs(getattr(seen, field)) or 1.0
-
-    return Norm(text, lambda seen, right: getattr(seen, field) - getattr(right, field), scale, needs=field, **more)
+    value = operator.attrgetter(field)
+    return Norm(
+        text, lambda seen, right: value(seen) - value(right),
+        lambda seen, right: abs(value(right)) or abs(value(seen)) or 1.0, needs=field, **more,
+    )  # fmt: skip
 
 
 def _own(field: str, text: str, **more: Any) -> Norm:

@@ -23,7 +23,7 @@ from ..measure.timing import machine
 from ..reporting.progress import NO_PROGRESS, Progress
 from ..reporting.text import jsonable, number
 from .errors import SHARE, TRUSTED, Figure, Norm, failure_of, figures_of, norms_for, reference_of
-from .grid import FEWEST_STEPS, FIELDS, PHASES, SEEDS, Facts, grid, milliseconds, perform, survey, tasks_of
+from .grid import FEWEST_STEPS, FIELDS, PHASES, SEEDS, Facts, Task, grid, milliseconds, perform, survey, tasks_of
 from .subject import Subject
 
 HARDLY = 1.25  # times the cost: within it, costs are the same
@@ -232,7 +232,7 @@ def _measured(
             break
     if facts.task.inputs and not facts.chaotic:
         for cell in dict.fromkeys(point.settings for point in answers):
-            case.inputs[cell.dt] = _inputs_late(facts, cell, repeats, jobs)
+            case.inputs[cell.dt] = _inputs_late(facts, known, tasks_of(facts, cell, range(repeats)), jobs)
     return case
 
 
@@ -251,17 +251,16 @@ def _point(
     )  # fmt: skip
 
 
-def _inputs_late(facts: Facts, cell: Settings, repeats: int, jobs: Jobs) -> list[str]:
+def _inputs_late(facts: Facts, norms: Mapping[str, Norm], exact: list[Task], jobs: Jobs) -> list[str]:
     """What is noticed of inputs that act in whole steps, as in the game, beside the same runs in which they act in
     time."""
-    exact = tasks_of(facts, cell, range(repeats))
     late = [dataclasses.replace(task, inputs=()) for task in exact]
     seens = jobs.all(perform, [*exact, *late], f"{facts.task.subject.name}: inputs in whole steps")
     worst: dict[str, Figure] = {}
-    for right, seen in zip(seens[:repeats], seens[repeats:], strict=True):
+    for right, seen in zip(seens[: len(exact)], seens[len(exact) :], strict=True):
         if not (right.failure or seen.failure):
             right = dataclasses.replace(right, tolerance=SHARE * right.size)
-            for name, figure in figures_of([seen], right, norms_for(facts, ())[0]).items():
+            for name, figure in figures_of([seen], right, norms).items():
                 worst[name] = max(worst.get(name, figure), figure, key=lambda figure: figure.times)
     return [figure.text for figure in sorted(worst.values(), key=lambda figure: -figure.times) if figure.times > 1]
 

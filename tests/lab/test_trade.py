@@ -99,21 +99,6 @@ def test_the_steps_that_keep_the_energy_of_an_orbit_within_a_hundredth(method, m
 
 
 @pytest.mark.slow
-def test_what_a_bouncing_ball_of_a_file_shows(tmp_path):
-    """A ball without loss: between two bounces, t from the last apex, y = h - g t^2 / 2."""
-    case = case_of(scene_file(tmp_path, BALL), repeats=2, thorough=True, vary={"dt": (1 / 30, 1 / 60)})
-    assert (case.scene, case.chaotic, case.seconds, case.norm) == ("mine.py", False, 1.7, "position")
-    assert case.agreement["position"] < 1e-9
-    found = errors(case, "position")
-    assert found["velocity_verlet", "continuous", 1 / 30] < 1e-9
-    assert found["semi_implicit_euler", "event_driven", 1 / 30] < 1e-9  # its flight is its own
-    assert found["semi_implicit_euler", "continuous", 1 / 60] > 1e-3
-    assert case.chosen is not None
-    assert case.chosen.settings.dt == 1 / 30
-    assert case.chosen.severity <= 1
-
-
-@pytest.mark.slow
 def test_a_bullet_through_a_wall_is_a_failure(tmp_path):
     """3.3 m a step through a wall 0.1 m thick: discrete collisions miss it in most start phases, others in none."""
     case = case_of(scene_file(tmp_path, BULLET), repeats=8, thorough=True, vary={"dt": (1 / 15, 1 / 480)})
