@@ -14,10 +14,7 @@ from typing import Any
 import click
 
 from ...framework import Settings
-from ...framework.settings import COLLISION_MODES
 from .usage_errors import Problem, one_line
-
-WORDS = "carom.words"  # key for the words of a command line: see KeepsWords
 
 Option = Callable[[Any], Any]
 Corners = tuple[tuple[float, ...], tuple[float, ...]]
@@ -26,14 +23,6 @@ Corners = tuple[tuple[float, ...], tuple[float, ...]]
 def together(*options: Option) -> Option:
     """Several options as one decorator; the help shows them in this order."""
     return lambda function: functools.reduce(lambda made, option: option(made), reversed(options), function)
-
-
-class KeepsWords(click.Command):
-    """A command that stores the words it was called with in ``context.meta[WORDS]``."""
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        ctx.meta[WORDS] = list(args)
-        return super().parse_args(ctx, args)
 
 
 # -- types of values --------------------------------------------------------------------------------------
@@ -154,9 +143,6 @@ world_options = together(
 # -- results ----------------------------------------------------------------------------------------------
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else.")
-shown_options = together(
-    json_option, click.option("--markdown", "as_markdown", is_flag=True, help="Print the tables as Markdown.")
-)
 
 
 def out_option(help_text: str, default: Path | None = None) -> Option:
@@ -174,50 +160,3 @@ def writable_folder(folder: Path, value: Path | None = None, option: str = "--ou
         raise Problem(f"{option} {value or folder}: {error.strerror or error}") from error
     if not os.access(folder, os.W_OK | os.X_OK):
         raise Problem(f"{option} {value or folder}: no permission to write there")
-
-
-# -- what is measured, and by how many processes -----------------------------------------------------------
-
-
-def _keywords(context: click.Context, option: click.Parameter, pairs: tuple[tuple[str, Any], ...]) -> dict[str, Any]:
-    for name in {"settings", "seed"} & dict(pairs).keys():
-        raise Problem(f"--option cannot set {name}: the command does")
-    return dict(pairs)
-
-
-case_options = together(
-    click.option(
-        "--norm", "norms", multiple=True, metavar="NAME",
-        help="What the error is the error of; repeatable, the first counts (default: what suits the scene).",
-    ),
-    click.option("--seconds", type=POSITIVE, metavar="S", help="Simulated time of each run."),
-    click.option("--repeats", type=COUNT, metavar="N", help="Runs of each setting: start phases or seeds."),
-    click.option(
-        "--dt", "steps", type=Listed(POSITIVE), metavar="S,S",
-        help="The steps, as in 1/60,1/120 (default: what suits the scene).",
-    ),
-    click.option(
-        "--option", "options", type=Assignment(), multiple=True, metavar="NAME=VALUE", callback=_keywords,
-        help="A keyword of the scene's build, as in n=100; repeatable.",
-    ),
-    seed_option,
-)  # fmt: skip
-only_options = together(
-    click.option(
-        "--integrators", type=Listed(click.STRING), metavar="NAME,NAME",
-        help="Only these (default: all that differ in the scene; so for the next two).",
-    ),
-    click.option(
-        "--collisions", type=Listed(click.Choice(COLLISION_MODES)), metavar="NAME,NAME",
-        help=f"Only these of {', '.join(COLLISION_MODES)}.",
-    ),
-    click.option("--substeps", type=Listed(COUNT), metavar="N,N", help="Only these of the solver."),
-)  # fmt: skip
-runs_options = together(
-    click.option("--workers", type=COUNT, metavar="N", help="Processes (default: one a core)."),
-    click.option("--cluster", metavar="ADDRESS", help="Run on the workers of this dask.distributed scheduler."),
-    click.option(
-        "--runs", "kept", type=click.Path(path_type=Path, file_okay=False), metavar="FOLDER",
-        default=Path("out/runs"), show_default=True, help="Finished runs are kept here, and used again.",
-    ),
-)  # fmt: skip

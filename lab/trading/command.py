@@ -9,17 +9,16 @@ from typing import Any
 import click
 from rich.console import Console
 
+from ...framework.settings import COLLISION_MODES
 from ..cli.group import STOPPED
 from ..cli.options import (
+    COUNT,
     POSITIVE,
-    WORDS,
-    KeepsWords,
-    case_options,
-    only_options,
+    Assignment,
+    Listed,
+    json_option,
     out_option,
-    runs_options,
-    shown_options,
-    together,
+    seed_option,
     traceback_option,
     writable_folder,
 )
@@ -27,26 +26,66 @@ from ..cli.usage_errors import Problem
 from ..reporting.output import Output, drawing_if_there
 from ..reporting.progress import Progress
 from .answer import answer, remarks, table
+from .grid import FIELDS
 from .trade import trade
+
+WORDS = "carom.words"  # key for the words of the command line
+
+
+class KeepsWords(click.Command):
+    """A command that stores the words it was called with in ``context.meta[WORDS]``."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        ctx.meta[WORDS] = list(args)
+        return super().parse_args(ctx, args)
+
+
+def _keywords(context: click.Context, option: click.Parameter, pairs: tuple[tuple[str, Any], ...]) -> dict[str, Any]:
+    for name in {"settings", "seed"} & dict(pairs).keys():
+        raise Problem(f"--option cannot set {name}: the command does")
+    return dict(pairs)
 
 
 @click.command("trade", cls=KeepsWords, short_help="What speed costs in accuracy, and which settings to use.")
 @click.argument("scenes", metavar="SCENE|FILE.py...", nargs=-1, required=True)
-@together(
-    click.option(
-        "--max-error", type=POSITIVE, metavar="E",
-        help="The cheapest settings that keep this error, a part of what the norm is relative to.",
-    ),
-    click.option("--absolute", is_flag=True, help="--max-error is in the scene's own units."),
-    click.option(
-        "--max-cost", type=POSITIVE, metavar="MS",
-        help="The best settings that take at most these milliseconds a frame of 1/60 s.",
-    ),
-    case_options, only_options, runs_options,
-    click.option("--no-timing", is_flag=True, help="Counts only; nothing is timed."),
+@click.option(
+    "--max-error", type=POSITIVE, metavar="E",
+    help="The cheapest settings that keep this error, a part of what the norm is relative to.",
 )  # fmt: skip
+@click.option("--absolute", is_flag=True, help="--max-error is in the scene's own units.")
+@click.option(
+    "--max-cost", type=POSITIVE, metavar="MS",
+    help="The best settings that take at most these milliseconds a frame of 1/60 s.",
+)  # fmt: skip
+@click.option(
+    "--norm", "norms", multiple=True, metavar="NAME",
+    help="What the error is the error of; repeatable, the first counts (default: what suits the scene).",
+)  # fmt: skip
+@click.option("--seconds", type=POSITIVE, metavar="S", help="Simulated time of each run.")
+@click.option("--repeats", type=COUNT, metavar="N", help="Runs of each setting: start phases or seeds.")
+@click.option(
+    "--option", "options", type=Assignment(), multiple=True, metavar="NAME=VALUE", callback=_keywords,
+    help="A keyword of the scene's build, as in n=100; repeatable.",
+)  # fmt: skip
+@seed_option
+@click.option("--dt", type=Listed(POSITIVE), metavar="S,S", help="Only these steps, as in 1/60,1/120; all fields of "
+              "settings have all values that differ in the scene by default.")  # fmt: skip
+@click.option("--integrators", "integrator", type=Listed(click.STRING), metavar="NAME,NAME", help="Only these.")
+@click.option(
+    "--collisions", "collision", type=Listed(click.Choice(COLLISION_MODES)), metavar="NAME,NAME",
+    help=f"Only these of {', '.join(COLLISION_MODES)}.",
+)  # fmt: skip
+@click.option("--substeps", type=Listed(COUNT), metavar="N,N", help="Only these of the solver.")
+@click.option("--workers", type=COUNT, metavar="N", help="Processes (default: one a core).")
+@click.option("--cluster", metavar="ADDRESS", help="Run on the workers of this dask.distributed scheduler.")
+@click.option(
+    "--runs", "kept", type=click.Path(path_type=Path, file_okay=False), metavar="FOLDER", default=Path("out/runs"),
+    show_default=True, help="Finished runs are kept here, and used again.",
+)  # fmt: skip
+@click.option("--no-timing", is_flag=True, help="Counts only; nothing is timed.")
 @out_option("Where the charts go.", Path("out/trade"))
-@shown_options
+@json_option
+@click.option("--markdown", "as_markdown", is_flag=True, help="Print the tables as Markdown.")
 @traceback_option
 @click.pass_context
 def trade_command(
@@ -68,8 +107,7 @@ def trade_command(
     output = Output(as_json, as_markdown)
     writable_folder(out)
     writable_folder(kept, option="--runs")
-    fields = {"dt": "steps", "integrator": "integrators", "collision": "collisions", "substeps": "substeps"}
-    vary = {field: values for field, name in fields.items() if (values := given.pop(name))}
+    vary = {field: values for field in FIELDS if (values := given.pop(field))}
     command = shlex.join(["carom", "trade", *context.meta[WORDS]])
     with Progress(Console(stderr=True)) as bar:
         try:
