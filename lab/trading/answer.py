@@ -123,15 +123,13 @@ def table(case: SceneTrade, norm: str = "") -> TextTable:
             figure = point.figures.get(norm)
             error = NOTHING if figure is None else compact(figure.error)
             error += DOUBTED * (figure is not None and not case.trusts(norm, figure.error))
-            worst = next((f"{name} {_times(figure.times)}" for name, figure in point.noticed), "")
+            worst = ""
+            for name, noticed in point.noticed[:1]:
+                worst = f"{name} x {compact(noticed.times, 2)}" if noticed.times < NEVER else name
             step, runs = seconds_text(point.settings.dt), str(point.repeats)
             rows.append((label, step, runs, error, compact(point.work), point.failed or worst, mark.get(id(point), "")))
     title = f"{case.scene}: worst error of all runs ({norm}), work per simulated second"
     return TextTable(title, ("method", "step, s", "runs", "error", "work", "noticed", ""), rows, left=(5, 6))
-
-
-def _times(times: float) -> str:
-    return f"x {compact(times, 2)}" if times < NEVER else ""
 
 
 def remarks(trade: Trade) -> list[str]:

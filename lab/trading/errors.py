@@ -304,7 +304,7 @@ def reference_of(
     if facts.chaotic:
         right = mean_of(seens, [one for one, norm in NORMS.items() if norm.mean and norm.needs])
     else:
-        right = _extrapolated(seens[0], seens[1], facts.order)
+        right = _extrapolated(seens[0], seens[1], 4 if facts.exact.integrator == "yoshida4" else 2)
         right = dataclasses.replace(right, doubt=_own_error(NORMS["position"].measure, right, *seens[1:]))
     right = dataclasses.replace(right, tolerance=SHARE * right.size)
     idle = [one for one in shown if norms[one].needs and not getattr(right, norms[one].needs)]

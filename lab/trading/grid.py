@@ -181,11 +181,6 @@ class Facts:
             return self.exact.replace(collision="continuous")
         return self.exact.replace(integrator="rk4" if self.force_systems else "velocity_verlet")
 
-    @property
-    def order(self) -> int:
-        """Of the reference's method."""
-        return 4 if self.exact.integrator == "yoshida4" else 2
-
 
 def survey(subject: Subject, seconds: float, jobs: Jobs) -> Facts:
     """Two trial runs; Problem for a scene that cannot be measured."""
