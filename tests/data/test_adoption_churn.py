@@ -64,27 +64,31 @@ def test_entities_created_inside_a_step_join_at_the_next(world):
     assert world.component_for_entity(made[0], Transform).x == 6.0
 
 
-def test_components_changed_inside_a_step_count_from_the_next(world):
+@pytest.mark.parametrize(("kind", "speed", "places"), [("dynamic", 120.0, [1.0, 3.0]), ("static", 60.0, [1.0, 1.0])])
+def test_components_changed_inside_a_step_count_from_the_next(world, kind, speed, places):
     e = ball(world, 0.0, 60.0)
 
     def change():
-        world.add_component(e, RigidBody(linear_velocity=(120.0, 0.0)))
+        if kind == "static":
+            world.component_for_entity(e, RigidBody).kind = kind
+        else:
+            world.add_component(e, RigidBody(linear_velocity=(speed, 0.0)))
 
     world.add_system(Once(change))
-    world.step()
-    assert world.bodies.position[0, 0] == 1.0
-    world.step()
-    assert world.bodies.position[0, 0] == 3.0
+    for place in places:
+        world.step()
+        assert world.bodies.position[0, 0] == place
     assert matches_esper(world)
 
 
+@pytest.mark.usefixtures("invariants")
 def test_any_sequence_of_changes_leads_to_what_esper_has():
-    """Random operations, with plain esper and through the facade; every row is checked after each round."""
+    """Random operations, with plain esper, through the facade and in bulk, looked at in some rounds."""
     rng = np.random.default_rng(7)
     world = make_world()
     make = {
         Transform: lambda: Transform(rng.normal(size=2) * 100),
-        RigidBody: lambda: RigidBody(rng.random() + 0.1, kind=("dynamic", "kinematic", "static")[rng.integers(3)]),
+        RigidBody: lambda: RigidBody(rng.random() + 0.1, kind=kind_of()),
         SphereCollider: lambda: SphereCollider(2 + rng.random()),  # holds the box, if one has both
         AABBCollider: lambda: AABBCollider(rng.random(2), layer=2),
         Charge: lambda: Charge(rng.normal()),
@@ -92,34 +96,48 @@ def test_any_sequence_of_changes_leads_to_what_esper_has():
     types = list(make)
     alive: list[int] = []
     spare: list[Component] = []  # handles that have been used before
-    for _ in range(60):
-        for _ in range(int(rng.integers(1, 12))):
-            action = rng.integers(6)
-            if action <= 1 or not alive:
-                chosen = [Transform, *(c for c in types[1:] if rng.random() < 0.5)]
-                parts = [make[c]() for c in chosen]
-                if action == 0:
-                    alive.append(world.create_entity(*parts))
-                else:
-                    with world:
-                        alive.append(esper.create_entity(*parts))
-                continue
-            e = int(rng.choice(alive))
-            component = types[int(rng.integers(1, len(types)))]
-            if action == 2:
-                alive.remove(e)
-                world.delete_entity(e, immediate=bool(rng.integers(2)))
-            elif action == 3 and world.has_component(e, component):
-                spare.append(world.remove_component(e, component))
-            elif action == 4:
-                world.add_component(e, make[component]())
-            elif action == 5:
-                again = [h for h in spare if type(h) is component]
-                if again:
-                    spare.remove(again[0])
-                    world.add_component(e, again[0])
-        world.step()
-        assert matches_esper(world)
+
+    def kind_of():
+        return ("dynamic", "kinematic", "static")[rng.integers(3)]
+
+    def create(verbs):
+        chosen = [Transform, *(c for c in types[1:] if rng.random() < 0.5)]
+        alive.append(verbs.create_entity(*[make[c]() for c in chosen]))
+
+    def create_many(verbs):
+        n = int(rng.integers(1, 5))
+        places = Transform.many(rng.normal(size=(n, 2)) * 100)
+        mass, kinds = rng.random(n) + 0.1, [kind_of() for _ in range(n)]
+        bodies = RigidBody.many(mass=mass, kind=kinds), SphereCollider.many(2 + rng.random(n))
+        alive.extend(world.create_entities(n, places, *bodies[int(rng.integers(2)) :]))
+
+    def change(verbs):
+        e = int(rng.choice(alive))
+        component = types[int(rng.integers(1, len(types)))]
+        action = int(rng.integers(5))
+        if action == 0:
+            alive.remove(e)
+            verbs.delete_entity(e, immediate=bool(rng.integers(2)))
+        elif action == 1 and world.has_component(e, component):
+            spare.append(verbs.remove_component(e, component))
+        elif action == 2:
+            verbs.add_component(e, make[component]())
+        elif action == 3:
+            again = [h for h in spare if type(h) is component]
+            if again:
+                spare.remove(again[0])
+                verbs.add_component(e, again[0])
+        elif world.has_component(e, RigidBody):
+            world.component_for_entity(e, RigidBody).kind = kind_of()
+
+    for number in range(100):
+        with world:
+            for _ in range(int(rng.integers(1, 12))):
+                verbs = (esper, world)[int(rng.integers(2))]
+                (create, create_many, change, change, change)[int(rng.integers(5)) if alive else 1](verbs)
+            esper.process(world.settings.dt) if rng.integers(2) else world.step()
+        if number % 3 == 2:  # which makes objects of all that came in bulk
+            assert matches_esper(world)
 
 
 @pytest.mark.slow
