@@ -10,7 +10,7 @@ import pytest
 from worlds import make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import Component, ForceSystem, Phase, StepError, System
+from carom.framework import Component, ForceSystem
 from carom.framework.data.columns import column
 
 COUNT = 30
@@ -163,34 +163,6 @@ def test_a_snapshot_from_before_has_the_defaults(dimensions):
     world.restore(after)
     assert world.state_hash() == changed
     assert (world.bodies.constant_force[4] == 5.0).all()
-
-
-@pytest.mark.parametrize("dimensions", [2, 3])
-def test_a_failed_step_takes_back_what_was_written_in_it(dimensions):
-    class Fail(System):
-        phase = Phase.NARROW
-        on = True
-
-        def process(self, dt):
-            if self.on:
-                self.world.bodies.constant_force[3] = 7.0
-                self.world.bodies.sphere_collider.friction[3] = 0.5
-                self.world.bodies.ccd[3] = True
-                raise RuntimeError("on purpose")
-
-    world, _ = crowd(dimensions)
-    twin, _ = crowd(dimensions)
-    fail = Fail()
-    world.add_system(fail)
-    hashed = world.state_hash()
-    with pytest.raises(StepError, match="on purpose"):
-        world.step()
-    assert world.state_hash() == hashed
-    fail.on = False
-    for _ in range(30):
-        world.step()
-        twin.step()
-    assert world.state_hash() == twin.state_hash()
 
 
 @pytest.mark.parametrize("dimensions", [2, 3])

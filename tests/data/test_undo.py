@@ -1,93 +1,144 @@
-"""Undoing a step in which only carom's own systems have run: their stages keep what they overwrite."""
+"""A step that fails leaves no trace, whoever fails in it and wherever; what forces leave behind when it does not."""
 
 from __future__ import annotations
 
-import numpy as np
+import itertools
+
+import esper
 import pytest
+from helpers_determinism import Charge, state
 from helpers_steps import both_ways  # noqa: F401  every test with each
 from worlds import ball, floor, make_world
 
 from carom.components import RigidBody, Transform
-from carom.framework import Phase, StepError, System
+from carom.framework import ForceSystem, Phase, StepError, System
 from carom.framework.schedule.stages import PythonPart
 from carom.systems import ContactEvents, ForceAccumulation, Integration, Response
 
-KEPT = ("position", "previous_position", "linear_velocity", "step_force", "applied_force", "applied_frame")
+OF_ONE_STEP = ("force", "inverse_mass", "begin.", "end.", "impacts.")  # made anew in every step
 
 
-def fail_after(patch, world, kind):
-    """From now on that built-in system raises at the end of its work."""
-    system = next(s for s in world.systems if isinstance(s, kind))
-    parts = system.parts()
+class Health:
+    """The game's own: not ours to put back."""
 
-    def no_more(dt):
-        raise RuntimeError("no more")
-
-    patch.setattr(system, "_parts", lambda: [*parts, PythonPart(system.name, no_more)])
-    world.settings = world.settings.replace(max_steps_per_advance=7)  # parts are looked at again
+    points = 100
 
 
-def busy_world(colliders):
+class Fails:
+    """Writes into every column, also those that have had no memory, then raises."""
+
+    world = None
+
+    def act(self, *_):
+        bodies = self.world.bodies
+        for name in bodies.column_names():
+            view = getattr(bodies, name)
+            if view.flags.writeable and view.dtype == float:
+                view += 1.0
+            elif view.flags.writeable and view.dtype == bool:
+                view[:] = ~view
+        for _, health in self.world.get_component(Health):
+            health.points -= 1
+        raise RuntimeError("out of luck")
+
+
+class FailingSystem(System, Fails):
+    process = Fails.act
+
+
+class FailingForce(ForceSystem, Fails):
+    add_forces = Fails.act
+
+
+class FailingProcessor(esper.Processor, Fails):
+    process = Fails.act
+
+
+def busy_world(colliders, limited):
+    """A world with all kinds of state, about to have an impact, after a few steps."""
     world = make_world(gravity=9.81)
     if colliders:
         floor(world, restitution=0.5)
-        ball(world, (0.0, 0.6), (0.3, -2.0), restitution=0.7)  # about to have an impact
+        ball(world, (0.0, 0.6), (0.3, -2.0), restitution=0.7)
         ball(world, (0.2, 4.0), (-0.1, 0.0), restitution=0.2)
-    world.create_entity(Transform((5, 5)), RigidBody(2.0, (1, 0), max_linear_speed=0.5))  # beyond its limit
+        ball(world, (9.0, 0.499))  # it rests
     world.create_entity(Transform((-5, 5)), RigidBody(kind="kinematic", linear_velocity=(0.1, 0.2)))
-    pushed = world.create_entity(Transform((9, 5)), RigidBody(2.0, (1, 0)))
-    world.component_for_entity(pushed, RigidBody).apply_force((3.0, 0.0))
+    pushed = world.create_entity(Transform((5, 5)), RigidBody(2.0, (1, 0)), Charge(2.0), Health())
+    for _ in range(3):
+        world.step()
+    for _, body in world.get_component(RigidBody):
+        body.linear_velocity = 4.0 * body.linear_velocity
+        body.step_force = (1.0, 2.0)  # as left by a user system
+        body.apply_force((0.5, 0.25))
+    if limited:
+        world.component_for_entity(pushed, RigidBody).max_linear_speed = 0.5  # it is beyond that
     return world
 
 
-def columns(world):
-    return {name: np.array(getattr(world.bodies, name)) for name in KEPT}
+def make_fail(patch, world, kind):
+    """From now on that fails in each step: what the error names, and what was added for it."""
+    if isinstance(kind, type):
+        system = next(s for s in world.systems if isinstance(s, kind))
+        parts = system.parts()
+
+        def no_more(dt):
+            raise RuntimeError("out of luck")
+
+        patch.setattr(system, "_parts", lambda: [*parts, PythonPart(system.name, no_more)])
+        world.settings = world.settings.replace(max_steps_per_advance=7)  # parts are looked at again
+        return system.name, None
+    if kind == "handler":
+        fails = Fails()
+        fails.world = world
+        world.on("contact_stay", fails.act)
+        return "contact_stay", None
+    made = {"force system": FailingForce, "processor": FailingProcessor}.get(kind, FailingSystem)
+    made = type(made.__name__, (made,), {"phase": Phase[kind]} if made is FailingSystem else {})()
+    world.add_system(made)
+    made.world = world
+    return type(made).__name__, made
 
 
-@pytest.mark.parametrize("colliders", [True, False])
-@pytest.mark.parametrize("limited", [True, False])
-@pytest.mark.parametrize("system", [ForceAccumulation, Integration, Response, ContactEvents])
-def test_a_step_of_built_in_systems_that_fails_leaves_no_trace(monkeypatch, system, limited, colliders):
-    with monkeypatch.context() as patch, busy_world(colliders) as world:
-        for _ in range(3):
-            world.step()
-        for _, body in world.get_component(RigidBody):
-            if not limited:
-                body.max_linear_speed = None
-            body.linear_velocity = 4.0 * body.linear_velocity  # beyond the limit, where there is one
-            body.step_force = (1.0, 2.0)  # as left by a user system
-            body.apply_force((0.5, 0.25))
-        before, steps, hashed = columns(world), world.step_count, world.state_hash()
-        twin = world.snapshot()
-        fail_after(patch, world, system)
-        with pytest.raises(StepError, match="no more"):
-            world.step()
-        after = columns(world)
-        for name in KEPT:
-            np.testing.assert_array_equal(after[name], before[name], err_msg=name)
-        assert world.step_count == steps
-        assert world.state_hash() == hashed
-        patch.undo()
+WITH_COLLIDERS = [*(phase.name for phase in Phase), "force system", "processor", "handler"]
+BUILT_IN = [ForceAccumulation, Integration, Response, ContactEvents]
+CASES = [
+    *itertools.product(WITH_COLLIDERS, [True], [True], [None]),
+    *itertools.product(BUILT_IN, [True, False], [True, False], [None]),
+    *itertools.product([Response, "END"], [True], [False], [Integration]),
+    ("END", True, True, Response),
+]
+CASES_AND_WAYS = zip(CASES, itertools.cycle(("step", "advance", "esper.process")), strict=False)
+
+
+@pytest.mark.parametrize(("kind", "colliders", "limited", "without", "how"), [(*c, w) for c, w in CASES_AND_WAYS])
+def test_a_step_that_fails_leaves_no_trace(monkeypatch, kind, colliders, limited, without, how):
+    """Without a built-in system too, which else would keep what the others overwrite."""
+    worlds = [busy_world(colliders, limited) for _ in range(2)]
+    if without:
+        for each in worlds:
+            each.remove_processor(without)
+    world, twin = worlds
+    with monkeypatch.context() as patch:
+        digest = world.state_hash()
+        name, added = make_fail(patch, world, kind)
+        go = {"step": lambda dt: world.step(), "advance": world.advance, "esper.process": esper.process}[how]
+        with pytest.raises(StepError, match=f"{name}.*RuntimeError: out of luck") as caught, world:
+            go(world.settings.dt)
+    assert isinstance(caught.value.__cause__, RuntimeError)
+    assert world.state_hash() == digest
+    before, after = state(twin), state(world)
+    assert [key for key in before if before[key] != after[key] and not key.startswith(OF_ONE_STEP)] == []
+    assert (world.time, world.step_count) == (twin.time, twin.step_count)
+    if added:
+        assert all(health.points == 99 for _, health in world.get_component(Health))
+        world.remove_system(added)
+    elif kind == "handler":
+        return
+    for _ in range(5):
         world.step()
-        straight = world.state_hash()
-        world.restore(twin)
-        world.step()
-        assert world.state_hash() == straight
-
-
-def test_without_the_built_in_integration_all_is_kept(monkeypatch):
-    """Everything must be saved: the response overwrites the positions of overlapping bodies."""
-    with make_world(gravity=9.81) as world:
-        floor(world)
-        ball(world, (0.0, 0.45), (0.0, -1.0))
-        world.remove_system(next(s for s in world.systems if isinstance(s, Integration)))
-        before = columns(world)
-        fail_after(monkeypatch, world, Response)
-        with pytest.raises(StepError, match="no more"):
-            world.step()
-        after = columns(world)
-        for name in KEPT:
-            np.testing.assert_array_equal(after[name], before[name], err_msg=name)
+        twin.step()
+    assert world.state_hash() == twin.state_hash()  # as if nothing had happened
+    assert state(world) == state(twin)
 
 
 class PushLate(System):

@@ -21,7 +21,7 @@ for _ in mixed_scene(world, Facade(world)): pass
 from carom.framework.compilation import log
 print(world.state_hash(), len(log.compiled), log.loaded)
 """
-POISON = "import runpy; runpy.run_module('tests.helpers_poison', run_name='__main__')"
+POISON = "import runpy; runpy.run_module('world.helpers_poison', run_name='__main__')"
 EXTREMES = "contacts/test_caught.py", "impacts/test_continuous_extremes.py", "world/test_extremes.py"
 LAWS = "laws/test_bounded.py", "laws/test_containment.py::test_nothing_leaves_a_room_at_any_speed"
 TESTS = """

@@ -7,7 +7,7 @@ import pytest
 from worlds import make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import Phase, StepError, System
+from carom.framework import Phase, System
 from carom.systems import ContactEvents, ForceAccumulation, Response
 
 pytestmark = pytest.mark.plain
@@ -86,33 +86,6 @@ def test_disabled_contacts_neither_begin_nor_last():
     for _ in range(60):
         world.step()
     assert heard == [3]
-
-
-def test_a_step_that_fails_afterwards_takes_the_contacts_back():
-    world = game(balls=1)
-    world.remove_processor(Response)
-    world.add_system(PushApart())
-
-    class Fails(System):
-        fails = False
-
-        def process(self, dt):
-            if self.fails:
-                raise RuntimeError("no")
-
-    fails = Fails()
-    world.add_system(fails)
-    for _ in range(40):
-        world.step()
-    before = world.state_hash(), world.contacts.point.tolist()
-    assert len(before[1]) == 1
-    fails.fails = True
-    with pytest.raises(StepError):
-        world.step()
-    assert (world.state_hash(), world.contacts.point.tolist()) == before
-    fails.fails = False
-    world.step()
-    assert len(world.contacts.begin) == 0
 
 
 @pytest.mark.compiled

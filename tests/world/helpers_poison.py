@@ -1,8 +1,8 @@
 """Values that cannot be, written into columns: which columns there are, and what the other bodies do.
 
-``python -m tests.helpers_poison`` writes such values into every column of every body of small worlds; it is meant
-for the checked build (CAROM_CHECK=1), which raises where a kernel leaves its arrays. With ``7 all``: every value, into
-the columns of every seventh body; with ``7 2D``: two values of each, without the worlds in 3D.
+``PYTHONPATH=tests python -m world.helpers_poison`` writes such values into every column of every body of small worlds;
+it is meant for the checked build (CAROM_CHECK=1), which raises where a kernel leaves its arrays. With ``7 all``: every
+value, into the columns of every seventh body; with ``7 2D``: two values of each, without the worlds in 3D.
 """
 
 from __future__ import annotations
