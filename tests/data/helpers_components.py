@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-from worlds import ball, make_world
-
 from carom.framework import Component, column
 
 NAN, INF = math.nan, math.inf
@@ -27,12 +25,3 @@ class Everything(Component):
     mode = column("idle", choices=("idle", "busy", "gone"))
     push = column(0.0, item="vector")
     facing = column(0.0, item="rotation")
-
-
-def full(d=2):
-    """A world with one body that has all components."""
-    world = make_world(d)
-    e = ball(world, 0.0)
-    world.add_component(e, Everything(5.0, push=(1.0, 2.0, 3.0)[:d]))
-    assert len(world.bodies) == 1
-    return world, e, world.component_for_entity(e, Everything)

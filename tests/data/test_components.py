@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import copy
+import pickle
 
 import esper
 import numpy as np
 import pytest
-from data.helpers_components import Charge, Everything, full
+from data.helpers_components import Charge, Everything
 from worlds import ball, make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import CaromError, Component, ForceSystem, NoPhysicsError, Phase, System, World, column
-from carom.plugins.capsule import CapsuleCollider
-from carom.plugins.capsule import plugin as capsule
+from carom.plugins.convex_polygon import ConvexPolygonCollider
 
 pytestmark = pytest.mark.plain
 
@@ -40,22 +40,6 @@ def test_constructors_say_what_they_take():
             column(0.0, **wrong)
 
 
-def test_classes_without_slots_may_keep_more_than_columns():
-    class Player(Component):
-        score = column(0, dtype=int)
-
-        def __init__(self, name):
-            super().__init__()
-            self.name = name
-
-    world = make_world()
-    e = world.create_entity(Transform((0, 0)), RigidBody(), Player("Ada"))
-    world.step()
-    player = world.component_for_entity(e, Player)
-    player.score += 1
-    assert (player.name, world.bodies.player.score.tolist(), player.copy().name) == ("Ada", [1], "Ada")
-
-
 def test_names_that_would_hide_others_are_refused_and_nothing_is_disturbed():
     world = make_world()
     e = ball(world, 0.0)
@@ -73,134 +57,147 @@ def test_names_that_would_hide_others_are_refused_and_nothing_is_disturbed():
     assert world.bodies.charge.value.tolist() == [1.0]
 
 
-def test_columns_of_ones_own_have_a_namespace():
-    world = make_world()
-    charged, plain = ball(world, 0.0), ball(world, 5.0)
-    world.add_component(charged, Charge(2.5))
-    bodies = world.bodies
-    assert bodies.charge.value.tolist() == [2.5, 0.0]
-    assert bodies.has(Charge).tolist() == [True, False]
-    assert bodies.dynamic.charge.value.tolist() == [2.5, 0.0]
-    assert bodies.row_of(plain) == 1
-    with pytest.raises(AttributeError, match="no column 'colour'"):
-        _ = bodies.colour
-    with pytest.raises(AttributeError, match="charge"):
-        _ = bodies.charge.colour
-    assert "charge" in dir(bodies)
-    assert not bodies.has(Everything).any()
-
-
-def test_assigning_to_a_column_writes_into_it():
-    world = make_world()
-    e = ball(world, 0.0)
-    world.add_component(e, Charge(2.0))
-    bodies = world.bodies
-    bodies.linear_velocity = (1.0, 2.0)
-    bodies.mass += 1.0
-    bodies.charge.value *= 3.0
-    assert world.component_for_entity(e, RigidBody).linear_velocity.tolist() == [1.0, 2.0]
-    assert world.component_for_entity(e, RigidBody).mass == 2.0
-    assert world.component_for_entity(e, Charge).value == 6.0
-    for x in range(100):  # the array has been reallocated: ``bodies`` must not hold the old one
-        ball(world, x + 5.0)
-    assert len(world.bodies.mass) == len(bodies.mass) == 101
-    with pytest.raises(AttributeError):
-        bodies.speed = 1.0
-    with pytest.raises(AttributeError):
-        bodies.charge = 1.0
-    for name in ("entity", "kind"):
-        with pytest.raises(ValueError, match="read-only"):
-            setattr(bodies, name, 0)
-
-
-def test_the_kinds_are_contiguous_slices():
+def test_columns_of_bodies_by_name_and_by_kind():
+    """Those of a component of one's own have a namespace; those of a kind are slices; writing goes into the array."""
     world = make_world()
     kinds = ["static", "dynamic", "kinematic", "dynamic", "static", "kinematic"]
     ids = [ball(world, 3.0 * x, kind=kind) for x, kind in enumerate(kinds)]
+    world.add_component(ids[1], Charge(2.0))
     bodies = world.bodies
     for kind in ("dynamic", "kinematic", "static"):
         part = getattr(bodies, kind)
         assert part.entity.tolist() == [e for e, k in zip(ids, kinds, strict=True) if k == kind]
-        assert len(part) == 2
+        assert part.has(Charge).tolist() == [e == ids[1] for e in part.entity.tolist()]
         assert np.shares_memory(part.mass, bodies.mass)
         assert part.mass.flags.c_contiguous
+    assert not bodies.has(Everything).any()
+    assert "charge" in dir(bodies)
+    bodies.linear_velocity = (1.0, 2.0)
+    bodies.mass += 1.0
+    bodies.charge.value *= 3.0
+    assert world.component_for_entity(ids[3], RigidBody).linear_velocity.tolist() == [1.0, 2.0]
+    assert world.component_for_entity(ids[3], RigidBody).mass == 2.0
+    assert bodies.dynamic.charge.value.tolist() == [6.0, 0.0]
+    for x in range(100):  # the array has been reallocated: ``bodies`` must not hold the old one
+        ball(world, 3.0 * x + 50.0)
+    assert len(world.bodies.mass) == len(bodies.mass) == 106
+    for name in ("speed", "charge"):
+        with pytest.raises(AttributeError):
+            setattr(bodies, name, 1.0)
+    for name in ("entity", "kind"):
+        with pytest.raises(ValueError, match="read-only"):
+            setattr(bodies, name, 0)
+    for columns, message in ((bodies, "no column 'colour'"), (bodies.charge, "charge")):
+        with pytest.raises(AttributeError, match=message):
+            _ = columns.colour
 
 
-def test_unbound_components_hold_what_they_were_given():
-    transform = Transform((1, 2), rotation=0.5)
-    body = RigidBody(2, (3, 4), constant_force=(0, -1), gravity_scale=0, linear_damping=0.1, kind="kinematic")
-    sphere = SphereCollider(0.5, offset=(0.1, 0), restitution=0.8, friction=0.3, sensor=True, layer=2, mask=6, group=-3)
-    assert transform.position.tolist() == [1.0, 2.0]
-    assert (transform.x, transform.y, transform.rotation, transform.entity) == (1.0, 2.0, 0.5, None)
-    with pytest.raises(IndexError):
-        _ = transform.z
-    assert (body.mass, body.gravity_scale, body.linear_damping, body.kind) == (2.0, 0.0, 0.1, "kinematic")
-    assert (body.linear_velocity.tolist(), body.max_linear_speed) == ([3.0, 4.0], None)
-    assert (sphere.radius, sphere.restitution, sphere.friction, sphere.sensor) == (0.5, 0.8, 0.3, True)
-    assert (sphere.layer, sphere.mask, sphere.group) == (2, 6, -3)
-    assert (SphereCollider(1).mask, SphereCollider(1).group) == (-1, 0)
-    assert SphereCollider(1).friction is None
-    transform.y = 7
-    body.mass = 3.5
-    assert (transform.position.tolist(), body.mass) == ([1.0, 7.0], 3.5)
-    assert repr(transform) == "Transform(position=[1.0, 7.0], rotation=0.5)"
+def values_of(handle):
+    return {name: np.array(getattr(handle, name)).tolist() for name in handle.columns}
 
 
-def test_what_is_given_is_copied():
-    place = np.array([1.0, 2.0])
-    transform = Transform(place)
-    place[:] = 9.0
-    assert transform.position.tolist() == [1.0, 2.0]
-
-
-def test_adoption_keeps_the_values_and_binds_the_handle():
-    for d in (2, 3):
-        world, e, everything = full(d)
-        assert everything is world.component_for_entity(e, Everything)
-        assert everything.entity == e
-        got = {name: getattr(everything, name) for name in Everything.columns}
-        assert got.pop("push").tolist() == [1.0, 2.0, 3.0][:d]
-        facing = got.pop("facing")
-        assert facing == 0.0 if d == 2 else facing.tolist() == [1.0, 0.0, 0.0, 0.0]
-        assert got == {
-            "plain": 5.0, "count": 3, "on": False, "size": 1.0, "level": 0.0, "limit": None, "mode": "idle",
-        }  # fmt: skip
-
-
-def test_setters_write_through_to_the_columns():
-    world, _, everything = full()
-    everything.count, everything.on, everything.mode = 7, True, "busy"
-    everything.limit, everything.push = 2.5, (3, 4)
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("adopted", [False, True])
+def test_a_component_holds_what_it_was_given_and_what_was_written_since(d, adopted):
+    """Before it is bound and after; what is given is copied; columns and handles are two views of the same numbers."""
+    world, push = make_world(d), np.array((1.0, 2.0, 3.0)[:d])
+    everything = Everything(5.0, push=push)
+    e = ball(world, 0.0)
+    world.add_component(e, everything)
+    push[:] = 9.0
+    if adopted:
+        assert len(world.bodies) == 1
+    assert world.component_for_entity(e, Everything) is everything
+    assert everything.entity == (e if adopted else None)
+    expected = {
+        "plain": 5.0, "count": 3, "on": False, "size": 1.0, "level": 0.0, "limit": None, "mode": "idle",
+        "push": [1.0, 2.0, 3.0][:d], "facing": 0.0 if d == 2 else [1.0, 0.0, 0.0, 0.0],
+    }  # fmt: skip
+    assert values_of(everything) == expected
+    changes = {"count": 7, "on": True, "limit": 2.5, "mode": "busy", "push": (4.0,) * d, "level": -1.5}
+    for name, value in changes.items():
+        setattr(everything, name, value)
+    everything.push[0] = 3.0
+    assert values_of(everything) == expected | changes | {"push": [3.0, 4.0, 4.0][:d]}
     columns = world.bodies.everything
-    assert columns.count.tolist() == [7]
+    assert [columns.count.tolist(), columns.on.tolist(), columns.limit.tolist()] == [[7], [True], [2.5]]
+    assert columns.push.tolist() == [everything.push.tolist()]
     assert columns.count.dtype == np.int64
-    assert columns.on.tolist() == [True]
-    assert columns.limit.tolist() == [2.5]
-    assert columns.push.tolist() == [[3.0, 4.0]]
-    assert (everything.count, everything.on, everything.mode) == (7, True, "busy")
     everything.limit = None
     assert everything.limit is None
     assert np.isnan(columns.limit[0])
+    columns.push[0, 1] = 6.0
+    assert everything.push[1] == 6.0
 
 
-def test_vectors_are_views_of_the_row_both_ways():
+def test_coordinates_have_names():
+    transform = Transform((1, 2), rotation=0.5)
+    transform.y = 7
+    assert (transform.x, transform.y, transform.position.tolist()) == (1.0, 7.0, [1.0, 7.0])
+    assert repr(transform) == "Transform(position=[1.0, 7.0], rotation=0.5)"
+    with pytest.raises(IndexError):
+        _ = transform.z
+
+
+class Player(Component):
+    """Without slots: it may keep more than columns."""
+
+    score = column(0, dtype=int)
+    size = column(0.0, item="vector")
+
+    def __init__(self, name):
+        super().__init__(size=1.0)
+        self.names, self.itself = [name], self
+
+
+def pickled(handle):
+    return pickle.loads(pickle.dumps(handle))
+
+
+@pytest.mark.parametrize("do", [Component.copy, copy.copy, copy.deepcopy, pickled])
+def test_copies_are_unbound_and_share_no_column(do):
+    """A deep one shares nothing else either."""
     world = make_world()
-    e = ball(world, 0.0)
-    transform = world.component_for_entity(e, Transform)
-    column_of_all = world.bodies.position
-    transform.position[0] = 3.0
-    assert column_of_all[0, 0] == 3.0
-    column_of_all[0, 1] = 4.0
-    assert (transform.x, transform.y) == (3.0, 4.0)
-    transform.x = 5.0
-    assert column_of_all.tolist() == [[5.0, 4.0]]
+    e = world.create_entity(Transform((0, 0)), RigidBody(), Player("Ada"))
+    world.step()
+    player, body = world.component_for_entity(e, Player), world.component_for_entity(e, RigidBody)
+    player.score += 2
+    body.apply_force((1.0, 0.0))
+    twin = do(player)
+    assert (twin.entity, player.entity) == (None, e)
+    assert repr(twin) == repr(player)
+    twin.size[0], player.score = 99.0, 3
+    player.names.append("Bo")
+    assert (player.size.tolist(), twin.score, world.bodies.player.score.tolist()) == ([1.0, 1.0], 2, [3])
+    if do in (copy.deepcopy, pickled):
+        assert twin.names == ["Ada"]
+        assert twin.itself is twin
+    assert do(body).applied_force.tolist() == [1.0, 0.0]
+    shape = ((0.0, 0.0), (1.0, 0.0), (0.5, 0.8))
+    polygon = do(ConvexPolygonCollider(shape, friction=0.5))
+    assert (polygon.vertices.tolist(), polygon.friction) == ([list(corner) for corner in shape], 0.5)
 
 
-def test_one_number_stands_for_a_whole_vector():
-    world = make_world(3)
-    e = world.create_entity(Transform((2, 2, 2)), RigidBody(linear_velocity=1.5))
-    assert world.component_for_entity(e, RigidBody).linear_velocity.tolist() == [1.5, 1.5, 1.5]
-    assert world.bodies.linear_velocity.tolist() == [[1.5, 1.5, 1.5]]
+@pytest.mark.parametrize("where", ["fresh", "adopted", "another world"])
+def test_a_component_used_twice_is_an_error_that_says_copy(where):
+    world, there = make_world(), make_world()
+    body = RigidBody()
+    first = (there if where == "another world" else world).create_entity(Transform((0, 0)), body)
+    if where != "fresh":
+        there.step()
+        world.step()
+    second = world.create_entity(Transform((1, 0)), body)
+    known = "another world" if where == "another world" else f"RigidBody .*{first} and {second}"
+    with pytest.raises(ValueError, match=rf"{known}.*copy\(\)"):
+        world.step()
+    if where == "another world":
+        assert body.entity == first
+        assert there.bodies.entity.tolist() == [first]
+        there.close()  # then it can be used
+    else:
+        world.add_component(second, body.copy())
+    world.step()
+    assert second in world.bodies.entity
 
 
 def test_static_bodies_are_read_only_but_for_assignment():
@@ -260,51 +257,6 @@ def test_handles_of_deleted_entities_keep_their_last_values():
     assert transform.position.tolist() == [1.0, 1.0]
 
 
-def test_copies_are_unbound_and_share_nothing():
-    world, e, everything = full()
-    for twin in (everything.copy(), copy.copy(everything), copy.deepcopy(everything)):
-        assert twin.entity is None
-        assert repr(twin) == repr(everything)
-        twin.push[0] = 99.0
-        twin.plain = 98.0
-        assert (everything.push[0], everything.plain) == (1.0, 5.0)
-    body = world.component_for_entity(e, RigidBody)
-    body.apply_force((1.0, 0.0))
-    assert body.copy().applied_force.tolist() == [1.0, 0.0]
-
-
-@pytest.mark.parametrize("adopted_before", [False, True])
-def test_a_prefab_used_twice_is_an_error_that_says_copy(adopted_before):
-    world = make_world()
-    body = RigidBody()
-    first = world.create_entity(Transform((0, 0)), body)
-    if adopted_before:
-        world.step()
-    second = world.create_entity(Transform((1, 0)), body)
-    with pytest.raises(ValueError, match=rf"RigidBody .*{first} and {second}.*copy\(\)"):
-        world.step()
-    world.add_component(second, body.copy())
-    world.step()
-    assert len(world.bodies) == 2
-
-
-def test_a_component_of_another_world_is_an_error_that_says_copy():
-    here, there = make_world(), make_world()
-    ball(here, 0.0)
-    there.step()
-    e = ball(there, 0.0)
-    there.step()
-    stolen = there.component_for_entity(e, RigidBody)
-    here.create_entity(Transform((5, 5)), stolen)
-    with pytest.raises(ValueError, match=r"another world.*copy\(\)"):
-        here.step()
-    assert stolen.entity == e
-    assert there.bodies.entity.tolist() == [e]
-    there.close()  # then it can be used
-    here.step()
-    assert len(here.bodies) == 2
-
-
 class Bullet(Component):
     expires: float = column(default=3.0)
 
@@ -354,22 +306,6 @@ def test_a_system_reads_columns_before_the_first_body_has_them():
     world.step()
     assert seen == [[], [1.0]]
     assert world.momentum()[0] == pytest.approx(world.settings.dt)
-
-
-def test_registering_changes_no_bit():
-    """A component and a collider that nobody has: the same hash after the same steps, before and after others come."""
-    worlds = [make_world(2, gravity=-9.81) for _ in range(2)]
-    for world in worlds:
-        world.add_plugin(capsule)
-    worlds[1].register(Bullet, CapsuleCollider)
-    for world in worlds:
-        ball(world, (0, 0), kind="static")
-        ball(world, (0.3, 2.0))
-        for k in range(60):
-            if k == 30:
-                world.add_component(ball(world, (0.1, 5.0)), Bullet())
-            world.step()
-    assert worlds[0].state_hash() == worlds[1].state_hash()
 
 
 def test_what_cannot_be_registered_is_refused():

@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import json
 import os
-import pickle
 import stat
 import subprocess
 import sys
@@ -20,7 +19,7 @@ from worlds import MODES, ball, make_world
 
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import CaromError, Component, Plugin, World, column
-from carom.plugins import Physics, convex_polygon
+from carom.plugins import Physics
 from carom.plugins.springs import Springs
 
 pytestmark = [pytest.mark.plain, pytest.mark.usefixtures("invariants")]
@@ -239,24 +238,6 @@ def test_an_error_of_a_plugin_is_not_taken_for_damage(tmp_path):
 def test_components_of_carom_are_not_left_out(tmp_path):
     with pytest.raises(TypeError, match="Bullet is a Component"):
         make_world().save(tmp_path / "w", leave_out=[Bullet])
-
-
-def test_components_are_pickled_with_their_values():
-    world = make_world()
-    e = ball(world, (1.0, 2.0))
-    world.step()
-    bound = world.component_for_entity(e, Transform)
-    twin = pickle.loads(pickle.dumps(bound))
-    assert twin.entity is None
-    twin.position = (5.0, 5.0)
-    assert bound.position.tolist() == [1.0, 2.0]
-    shape = ((0.0, 0.0), (1.0, 0.0), (0.5, 0.8))
-    polygon = pickle.loads(pickle.dumps(convex_polygon.ConvexPolygonCollider(shape, friction=0.5)))
-    assert (polygon.vertices.tolist(), polygon.friction) == ([list(corner) for corner in shape], 0.5)
-    marked = Bullet(3.0)
-    marked.owner = [marked]
-    twin = pickle.loads(pickle.dumps(marked))
-    assert (twin.expires, twin.owner) == (3.0, [twin])
 
 
 @pytest.mark.compiled

@@ -7,7 +7,6 @@ import pickle
 import runpy
 from pathlib import Path
 
-import esper
 import numpy as np
 import pytest
 from data.helpers_snapshots import Bullet, Tag, fill, log_events, make, springs_of
@@ -15,8 +14,8 @@ from helpers_determinism import Charge, settled
 from worlds import MODES, ball, make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import CaromError, Component, ForceSystem, System, World, column
-from carom.plugins import Physics, convex_polygon
+from carom.framework import CaromError, ForceSystem, System, World
+from carom.plugins import Physics
 from carom.plugins.springs import Springs
 
 pytestmark = pytest.mark.usefixtures("invariants")
@@ -110,22 +109,6 @@ def test_bodies_that_have_come_or_gone():
     assert stranger.position.tolist()[0] == 4.0
 
 
-def test_pending_deletions_are_as_they_were():
-    world = make_world()
-    a, b = ball(world, 0.0), ball(world, 9.0)
-    world.delete_entity(a)
-    snapshot = world.snapshot()
-    world.delete_entity(b)
-    world.restore(snapshot)
-    world.step()
-    assert world.get_entities() == [b]
-    world.restore(snapshot)
-    assert not world.entity_exists(a)
-    assert world.entity_exists(b)
-    world.step()
-    assert world.get_entities() == [b]
-
-
 def test_ordinary_objects_are_there_by_reference_and_ours_by_value():
     world = make_world()
     tag, bullet = Tag("here"), Bullet(1.0)
@@ -140,83 +123,6 @@ def test_ordinary_objects_are_there_by_reference_and_ours_by_value():
     assert tag.name == "there"
     assert world.component_for_entity(loose, Bullet).expires == 1.0
     assert bullet.expires == 1.0
-
-
-def test_bodies_in_bulk_before_and_after_somebody_has_looked_at_them():
-    world = make_world()
-    ids = world.create_entities(50, Transform.many(np.arange(100.0).reshape(50, 2)), RigidBody.many(), Bullet.many())
-    loose = world.create_entities(5, Bullet.many(expires=np.arange(5.0)))
-    before, digest = world.snapshot(), world.state_hash()
-    for entity in ids[::3]:
-        world.component_for_entity(entity, Transform).position = (0.0, 0.0)
-    world.component_for_entity(loose[2], Bullet).expires = 9.0
-    held = world.component_for_entity(ids[0], Transform)
-    world.delete_entity(ids[4], immediate=True)
-    world.delete_entity(loose[4], immediate=True)
-    world.create_entities(7, Transform.many(np.full((7, 2), 200.0)), RigidBody.many(), SphereCollider.many(radius=1.0))
-    after, changed = world.snapshot(), world.state_hash()
-    for _ in range(2):
-        world.restore(before)
-        assert world.state_hash() == digest
-        assert world.get_entities() == [*ids, *loose]
-        assert [world.component_for_entity(e, Bullet).expires for e in loose] == [0.0, 1.0, 2.0, 3.0, 4.0]
-        assert held.position.tolist() == [0.0, 1.0]
-        world.restore(after)
-        assert world.state_hash() == changed
-        assert len(world.get_entities()) == 60
-        assert world.component_for_entity(loose[2], Bullet).expires == 9.0
-
-
-def test_a_body_that_was_made_in_bulk_and_looked_at_comes_back_each_time():
-    world = make_world()
-    ids = world.create_entities(3, Transform.many(np.zeros((3, 2))), RigidBody.many())
-    world.snapshot()
-    world.component_for_entity(ids[1], Transform)
-    snapshot = world.snapshot()
-    for _ in range(2):
-        world.delete_entity(ids[1])
-        world.step()
-        world.restore(snapshot)
-        assert world.get_entities() == list(ids)
-
-
-
-def test_arrays_of_array_columns_outlive_what_had_them():
-    world = World(Physics(dimensions=2), convex_polygon.plugin)
-    shape = np.array([(0, 0), (1, 0), (0.5, 0.8)])
-    polygon = lambda k: convex_polygon.ConvexPolygonCollider(shape * (1 + 0.01 * k))  # noqa: E731
-    entities = [world.create_entity(Transform((3.0 * k, 0.0)), RigidBody(), polygon(k)) for k in range(5)]
-    snapshot, digest = world.snapshot(), world.state_hash()
-    pickled = pickle.dumps(snapshot)
-    for entity in entities:
-        world.delete_entity(entity, immediate=True)
-    for k in range(5, 300):  # the pool has to make room
-        world.delete_entity(world.create_entity(Transform((0.0, 0.0)), RigidBody(), polygon(k)), immediate=True)
-        world.bodies  # noqa: B018
-    for state in (snapshot, copy.deepcopy(snapshot), pickle.loads(pickled)):
-        world.restore(state)
-        assert world.state_hash() == digest
-        world.step()
-
-
-def test_a_world_that_has_been_emptied_since():
-    world = make_world()
-    a, tag = ball(world, 0.0), Tag("alone")
-    b = world.create_entity(tag)
-    ids = world.create_entities(3, Transform.many(np.eye(3, 2) * 9.0), SphereCollider.many(radius=1.0))
-    snapshot, digest = world.snapshot(), world.state_hash()
-    for entity in world.get_entities():
-        world.delete_entity(entity)
-    world.step()
-    for _ in range(2):
-        world.restore(snapshot)
-        assert world.state_hash() == digest
-        assert world.get_entities() == [a, b, *ids]
-        assert world.component_for_entity(b, Tag) is tag
-        world.step()
-        with world:
-            esper.clear_database()
-        ball(world, 3.0)
 
 
 def test_a_snapshot_of_another_kind_of_world_is_refused_and_nothing_is_disturbed():
@@ -254,28 +160,6 @@ def test_two_peers_with_delayed_inputs_end_with_the_same_world(capsys):
     assert min(peer.replayed for peer in late) > 8 * 25
     runpy.run_path(str(ROOT / "examples" / "rollback.py"), run_name="__main__")
     assert "both worlds" in capsys.readouterr().out
-
-
-class Pointed(Component):
-    size = column(default=1.0)
-
-    def __init__(self, **values):
-        super().__init__(**values)
-        self.names = ["a"]
-        self.itself = self
-
-
-def test_a_deep_copy_of_a_component_shares_nothing():
-    world = make_world()
-    one = Pointed(size=2.0)
-    world.add_component(ball(world, 0.0), one)
-    world.step()
-    shallow, deep = copy.copy(one), copy.deepcopy(one)
-    one.names.append("b")
-    one.size = 3.0
-    assert (shallow.names, deep.names) == (["a", "b"], ["a"])
-    assert (shallow.size, deep.size) == (2.0, 2.0)
-    assert deep.itself is deep
 
 
 class Wind(ForceSystem):
