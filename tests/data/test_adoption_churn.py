@@ -112,7 +112,8 @@ def test_any_sequence_of_changes_leads_to_what_esper_has():
         alive.extend(world.create_entities(n, places, *bodies[int(rng.integers(2)) :]))
 
     def change(verbs):
-        e = int(rng.choice(alive))
+        latest = min(int(rng.geometric(0.2)), len(alive))
+        e = int(rng.choice(alive) if rng.integers(2) else alive[-latest])
         component = types[int(rng.integers(1, len(types)))]
         action = int(rng.integers(5))
         if action == 0:
@@ -134,7 +135,7 @@ def test_any_sequence_of_changes_leads_to_what_esper_has():
         with world:
             for _ in range(int(rng.integers(1, 12))):
                 verbs = (esper, world)[int(rng.integers(2))]
-                (create, create_many, change, change, change)[int(rng.integers(5)) if alive else 1](verbs)
+                (create, create_many, change, change, change, change)[int(rng.integers(6)) if alive else 1](verbs)
             esper.process(world.settings.dt) if rng.integers(2) else world.step()
         if number % 3 == 2:  # which makes objects of all that came in bulk
             assert matches_esper(world)

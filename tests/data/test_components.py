@@ -5,14 +5,13 @@ from __future__ import annotations
 import copy
 import pickle
 
-import esper
 import numpy as np
 import pytest
 from data.helpers_components import Charge, Everything
 from worlds import ball, make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import CaromError, Component, ForceSystem, NoPhysicsError, Phase, System, World, column
+from carom.framework import Component, ForceSystem, NoPhysicsError, Phase, System, World, column
 from carom.plugins.convex_polygon import ConvexPolygonCollider
 
 pytestmark = pytest.mark.plain
@@ -319,17 +318,5 @@ def test_what_cannot_be_registered_is_refused():
         world.register(Mass)
     with pytest.raises(NoPhysicsError):
         World().register(Bullet)
-    errors = []
-
-    class Registers(System):
-        def process(self, dt):
-            with pytest.raises(CaromError) as caught:
-                self.world.register(Bullet)
-            errors.append(str(caught.value))
-
-    world.add_system(Registers())
-    with world:
-        esper.process(world.settings.dt)
-    assert errors == ["components can be registered between steps only, not inside one"]
     with pytest.raises(AttributeError, match="did you mean 'linear_velocity'"):
         _ = world.bodies.linear_velocty

@@ -13,7 +13,8 @@ from helpers_steps import both_ways  # noqa: F401  every test with each
 from worlds import METHODS, ball, floor, make_world
 
 from carom.components import RigidBody, Transform
-from carom.framework import CaromError, StepError, System, World
+from carom.framework import CaromError, Phase, StepError, System, World
+from carom.plugins.capsule import CapsuleCollider
 
 
 def busy_world(**settings):
@@ -288,28 +289,40 @@ def test_a_changed_step_takes_what_has_gathered():
     assert world.alpha == 0.0
 
 
-def test_nothing_of_this_can_be_done_inside_a_step():
-    """Settings, gravity, step and advance are refused there, and the clock is not affected."""
+BETWEEN_STEPS = {
+    "settings": lambda w: setattr(w, "settings", w.settings.replace(dt=1.0)),
+    "gravity": lambda w: setattr(w, "gravity", (0, 0)),
+    "step": lambda w: w.step(),
+    "advance": lambda w: w.advance(1.0),
+    "register": lambda w: w.register(CapsuleCollider),
+    "prepare": lambda w: w.prepare(),
+    "close": lambda w: w.close(),
+    "a phase": lambda w: w.run(Phase.FORCES),
+    "esper": lambda w: esper.process(w.settings.dt),
+}
+
+
+@pytest.mark.parametrize("what", BETWEEN_STEPS)
+def test_what_belongs_between_steps_is_refused_inside_one(what):
+    """In a step and in a phase that is run alone; the clock is not affected."""
+    refused = []
 
     class Meddler(System):
         def process(self, dt):
             before = world.clock.state()
-            with pytest.raises(CaromError, match="between steps"):
-                world.settings = world.settings.replace(dt=1.0)
-            with pytest.raises(CaromError, match="between steps"):
-                world.gravity = (0, 0)
-            with pytest.raises(CaromError, match="between steps"):
-                world.step()
-            with pytest.raises(CaromError, match="between steps"):
-                world.advance(1.0)
-            with pytest.raises(CaromError, match="inside"):
-                esper.process(dt)
+            with pytest.raises(CaromError, match="inside|between steps"):
+                BETWEEN_STEPS[what](world)
             assert world.clock.state() == before
+            refused.append(what)
 
     world = make_world()
     world.add_system(Meddler())
     world.step()
-    assert (world.step_count, world.time, world.alpha) == (1, 1 / 60, 0.0)
+    with world:
+        esper.process(world.settings.dt)
+    world.run(Phase.END)
+    assert len(refused) == 3
+    assert (world.step_count, world.time, world.alpha) == (2, 2 / 60, 0.0)
     assert world.stats().counters["dropped_steps"] == 0
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import esper
 import numpy as np
 import pytest
-from worlds import ball, floor, make_world
+from worlds import ball, floor, make_world, run
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Phase, Plugin, Settings, System, World
-from carom.framework.compilation import kernel, time_calls
+from carom.framework.compilation import kernel, time_calls, timing
 from carom.framework.jit.records.record import Record
 from carom.framework.jit.records.schema import Scalar
 from carom.framework.schedule.plan import PlannedKernel
@@ -174,25 +175,51 @@ def test_what_comes_later_is_in_the_plan_at_once():
     assert "evaluate_pairs" not in {call.kernel for call in world.plan().kernels}
 
 
-def test_a_plan_changes_nothing():
+def profiled(world):
+    """A step in a block that raises."""
+
+    def block():
+        with world.profile():
+            world.step()
+            assert timing()
+            raise ValueError("the game's own")
+
+    with pytest.raises(ValueError, match="the game's own"):
+        block()
+    assert not timing()
+
+
+LOOKS = {
+    "plan": lambda world: str(world.plan()),
+    "prepare": lambda world: world.prepare(AABBCollider),
+    "profile": profiled,
+    "register": lambda world: world.register(capsule.CapsuleCollider),
+    "state": lambda world: (world.snapshot(), world.state_hash(), world.kinetic_energy()),
+    "query": lambda world: world.query_sphere((0.0, 1.0), 3.0),
+    "print": lambda world: (repr(world), str(world.stats()), repr(world.bodies)),
+}
+
+
+@pytest.mark.parametrize("how", LOOKS)
+def test_who_only_looks_changes_nothing(how):
+    """No state, no counts, no faults, no esper context; and the step goes on with the same bits."""
     one, other = falling(restitution=0.5), falling(restitution=0.5)
+    for world in (one, other):
+        world.add_plugin(capsule.plugin)
+        run(world, 3)
+    contexts = esper.current_world, set(esper.list_worlds())
     for _ in range(STEPS):
-        one.plan()
-        one.step()
-        other.step()
-    assert one.state_hash() == other.state_hash()
-
-
-def test_only_handlers_are_called_for():
-    world, dispatched = falling(), []
-    world.events.dispatch_many = lambda name, rows: dispatched.append(name)
-    for _ in range(STEPS):
-        world.step()
-    assert not dispatched
-    world.on("contact_stay", lambda contact: None)
-    assert "handlers of contact_stay" in str(world.plan())
-    world.step()
-    assert dispatched == ["contact_stay"]
+        before, forces = one.state_hash(), one.bodies.force.copy()
+        LOOKS[how](one)
+        steps = int(how == "profile")
+        if not steps:
+            assert one.state_hash() == before
+            np.testing.assert_array_equal(one.bodies.force, forces)
+        run(one, 1)
+        run(other, 1 + steps)
+        assert (one.state_hash(), one.step_count, one.faults) == (other.state_hash(), other.step_count, [])
+    assert one.stats().counters == other.stats().counters
+    assert (esper.current_world, set(esper.list_worlds())) == contexts
 
 
 def test_forces_are_not_summed_where_none_acts():

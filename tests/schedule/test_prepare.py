@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import esper
-import numpy as np
 import pytest
 from helpers_processes import output_of
-from worlds import ball, floor, make_world, run
+from worlds import ball, make_world
 
-from carom.components import AABBCollider, Collider, RigidBody, SphereCollider, Transform
-from carom.framework import CaromError, ForceSystem, Plugin, System, UnhandledPairError, World, column
+from carom.components import Collider, RigidBody, SphereCollider, Transform
+from carom.framework import ForceSystem, Plugin, System, UnhandledPairError, World, column
 from carom.framework.compilation import log
 from carom.plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
 from carom.plugins.springs import Springs
@@ -186,25 +184,6 @@ def test_the_game_of_the_readme_waits_for_nothing_after_its_first_frame():
     output_of(README_LOOP, readme)
 
 
-def test_prepare_changes_nothing_that_can_be_seen():
-    worlds = make_world(gravity=9.81), make_world(gravity=9.81)
-    for world in worlds:
-        floor(world)
-        ball(world, (0, 2), restitution=0.5)
-        run(world, 3)
-    before, force = worlds[0].state_hash(), worlds[0].bodies.force.copy()
-    context, kept = esper.current_world, set(esper.list_worlds())
-    worlds[0].prepare(AABBCollider)
-    assert worlds[0].state_hash() == before
-    np.testing.assert_array_equal(worlds[0].bodies.force, force)
-    assert (worlds[0].step_count, len(worlds[0].bodies), worlds[0].faults) == (3, 2, [])
-    assert (esper.current_world, set(esper.list_worlds())) == (context, kept)
-    for world in worlds:
-        run(world, 60)
-    assert worlds[0].state_hash() == worlds[1].state_hash()
-    assert worlds[0].stats().counters == worlds[1].stats().counters
-
-
 def test_worlds_with_every_plugin_can_be_prepared_and_no_system_is_made_or_run():
     """Springs are an object of one world, and so are systems of the game: prepare makes no second ones."""
     made, updates = [], []
@@ -266,11 +245,3 @@ def test_what_cannot_be_prepared():
     with pytest.raises(UnhandledPairError, match="StrangeCollider"):
         world.prepare(StrangeCollider)
     world.step()  # and nothing of it is left
-
-    class InMidStep(System):
-        def process(self, dt):
-            self.world.prepare()
-
-    world.add_system(InMidStep())
-    with pytest.raises(CaromError, match="between steps"):
-        world.step()

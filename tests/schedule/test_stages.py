@@ -9,7 +9,7 @@ import pytest
 from helpers_processes import run_python
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import System, World
+from carom.framework import World
 from carom.framework.jit.records.record import make_record
 from carom.framework.schedule.stages import Program, Stage
 from carom.plugins import Physics
@@ -65,20 +65,6 @@ def falling(*systems):
     for system in systems:
         world.add_system(system)
     return world
-
-
-class Idle(System):
-    def process(self, dt):
-        """Nothing: that it is there splits the step into several calls."""
-
-
-def test_a_system_between_the_stages_changes_no_bit():
-    worlds = falling(), falling(Idle())
-    for _ in range(60):
-        for world in worlds:
-            world.step()
-    assert worlds[0].state_hash() == worlds[1].state_hash()
-    assert len(worlds[0].contacts) == 1
 
 
 def test_without_its_system_the_events_end_and_the_rest_goes_on():
