@@ -310,7 +310,7 @@ def test_what_belongs_between_steps_is_refused_inside_one(what):
     class Meddler(System):
         def process(self, dt):
             before = world.clock.state()
-            with pytest.raises(CaromError, match="inside|between steps"):
+            with pytest.raises(CaromError, match=r"inside|between steps"):
                 BETWEEN_STEPS[what](world)
             assert world.clock.state() == before
             refused.append(what)
