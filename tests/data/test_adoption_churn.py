@@ -137,6 +137,7 @@ def test_any_sequence_of_changes_leads_to_what_esper_has():
                 verbs = (esper, world)[int(rng.integers(2))]
                 (create, create_many, change, change, change, change)[int(rng.integers(6)) if alive else 1](verbs)
             esper.process(world.settings.dt) if rng.integers(2) else world.step()
+        assert sorted(world.get_entities()) == sorted(alive)
         if number % 3 == 2:  # which makes objects of all that came in bulk
             assert matches_esper(world)
 
