@@ -9,10 +9,18 @@ from pathlib import Path
 import pytest
 from helpers_processes import start_python
 
-HELPERS = """
+FILES = {
+    "helpers.py": """
+import enum
+import numpy as np
+import deeper
 from carom.framework.compilation import part
 
+TABLE = np.array([0.0, 1.0])
 FACTOR = 2.0
+
+class Level(enum.IntEnum):
+    TOP = 0
 
 @part
 def scaled(x):
@@ -21,7 +29,9 @@ def scaled(x):
 @part
 def helper(x):
     return scaled(x) + 1.0
-"""
+""",
+    "deeper.py": "SHIFT = 0.0\n",
+}
 MAIN = """
 import sys
 sys.path.insert(0, {folder!r})
@@ -29,12 +39,13 @@ import numpy as np
 from carom.framework.compilation import kernel, log
 from carom.framework.jit.hash import deep_hash
 sys.dont_write_bytecode = True  # of a file that is edited within its second
+import helpers
 from helpers import helper
 
 def make(shift):
     @kernel
     def total(values):
-        result = shift
+        result = shift + helpers.TABLE[0] + helpers.Level.TOP.value + helpers.deeper.SHIFT
         for value in values:
             result += helper(value)
         return result
@@ -46,17 +57,18 @@ print(total(np.arange(3.0)), other(np.arange(3.0)), len(log.compiled), log.loade
 
 
 class Program:
-    """Two files, one calling the other's functions, run in processes of their own."""
+    """Files of which one calls what the others have, run in processes of their own."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.cache = folder / "cache"
-        self.helpers = HELPERS
+        self.sources = dict(FILES)
         self.stderr = ""  # of the last run
         self.main = MAIN.format(folder=str(folder))
 
     def start(self, **more):
-        (self.folder / "helpers.py").write_text(self.helpers)
+        for name, text in self.sources.items():
+            (self.folder / name).write_text(text)
         return start_python(self.main, cwd=self.folder, **{"CAROM_CACHE_DIR": str(self.cache), **more})
 
     def run(self, **more) -> tuple[float, float, int, int, str]:
@@ -122,67 +134,24 @@ def test_loading_reads_nothing_of_numbas_own_functions_and_a_loaded_kernel_compi
 
 
 EDITS = [
-    ("FACTOR * x", "FACTOR * x * x", 13.0),  # two calls deep, in another file
-    ("FACTOR = 2.0", "FACTOR = 3.0", 12.0),  # a constant there
-    ("+ 1.0", "+ 2.0", 12.0),
+    ("helpers.py", "FACTOR * x", "FACTOR * x * x", 13.0),  # two calls deep, in another file
+    ("helpers.py", "FACTOR = 2.0", "FACTOR = 3.0", 12.0),  # a constant there
+    ("helpers.py", "[0.0,", "[100.0,", 109.0),  # an array of a module
+    ("helpers.py", "TOP = 0", "TOP = 9", 18.0),  # an enumeration
+    ("deeper.py", "SHIFT = 0.0", "SHIFT = 4.0", 13.0),  # a module of a module
 ]
 
 
-def test_an_edit_in_a_function_of_another_file_is_noticed(compiled):
-    for old, new, expected in EDITS:
-        compiled.helpers = HELPERS.replace(old, new)
+def test_an_edit_of_what_a_kernel_calls_or_reads_in_another_file_is_noticed(compiled):
+    """Undone it finds the old one; one of a comment compiles nothing, and a switch of numba everything."""
+    for file, old, new, expected in EDITS:
+        compiled.sources = {**FILES, file: FILES[file].replace(old, new)}
         assert compiled.run()[:3] == (expected, expected + 100.0, 2)
-    compiled.helpers = HELPERS
-    assert compiled.run()[:3] == (9.0, 109.0, 0)  # undoing the edit finds the old one
-
-
-NAMED = """
-import enum
-import numpy as np
-import deeper
-
-TABLE = np.array([1.0, 2.0, 3.0])
-
-class Level(enum.IntEnum):
-    TOP = 7
-"""
-READS = """
-import sys
-sys.path.insert(0, {folder!r})
-from carom.framework.compilation import kernel, log
-sys.dont_write_bytecode = True
-import helpers
-
-@kernel
-def read(x):
-    return helpers.TABLE[0] + helpers.Level.TOP.value + helpers.deeper.FACTOR * x
-
-print(read(1.0), 0.0, len(log.compiled), log.loaded, "-")
-"""
-
-
-READ_EDITS = [
-    ("helpers.py", "[1.0,", "[100.0,", 110.0),  # an array of a module
-    ("helpers.py", "TOP = 7", "TOP = 9", 13.0),  # an enumeration
-    ("deeper.py", "FACTOR = 3.0", "FACTOR = 4.0", 12.0),  # a module of a module
-]
-
-
-def test_an_edit_of_what_a_kernel_reads_from_a_module_is_noticed(program):
-    """The reproduction: an edited array helpers.TABLE was not noticed, and the next process ran the former code."""
-    program.main = READS.format(folder=str(program.folder))
-    deeper = program.folder / "deeper.py"
-
-    def run_with(file="", old="", new=""):
-        program.helpers = NAMED.replace(old, new) if file == "helpers.py" else NAMED
-        text = "FACTOR = 3.0\n"
-        deeper.write_text(text.replace(old, new) if file == "deeper.py" else text)
-        return program.run()[:4]
-
-    assert run_with() == (11.0, 0.0, 1, 0)
-    assert run_with() == (11.0, 0.0, 0, 1)
-    for file, old, new, expected in READ_EDITS:
-        assert run_with(file, old, new) == (expected, 0.0, 1, 0)
+    compiled.sources = {name: f"# a remark\n{text}" for name, text in FILES.items()}
+    assert compiled.run()[:3] == (9.0, 109.0, 0)
+    for switch in ({"NUMBA_BOUNDSCHECK": "1"}, {"NUMBA_OPT": "1"}):
+        assert compiled.run(**switch)[:4] == (9.0, 109.0, 2, 0)
+    assert compiled.run()[:4] == (9.0, 109.0, 0, 2)
 
 
 FIELDS = """
@@ -210,12 +179,6 @@ def test_named_tuples_of_one_name_with_swapped_fields_are_two_types(program):
     assert program.run()[:3] == (2.0, 21.0, 2)
 
 
-def test_switches_of_numba_make_other_files(compiled):
-    for switch in ({"NUMBA_BOUNDSCHECK": "1"}, {"NUMBA_DEBUGINFO": "1"}, {"NUMBA_OPT": "1"}):
-        assert compiled.run(**switch)[:4] == (9.0, 109.0, 2, 0)
-    assert compiled.run()[:4] == (9.0, 109.0, 0, 2)
-
-
 @pytest.mark.skipif(os.name != "posix", reason="permissions of files")
 def test_a_folder_that_others_may_write_to_is_refused_before_it_is_read(compiled):
     for mode in (0o770, 0o707):
@@ -233,11 +196,6 @@ def test_a_variable_that_names_a_file_is_told_in_one_line(program):
     home = {"HOME": str(program.folder / "home"), "XDG_CACHE_HOME": ""}
     assert program.run(**home)[:2] == (9.0, 109.0)
     assert program.stderr.splitlines()[0].startswith(f"carom: compiled kernels are not kept in {program.cache}: ")
-
-
-def test_an_edit_of_a_comment_compiles_nothing(compiled):
-    compiled.helpers = "# a remark\n" + compiled.helpers
-    assert compiled.run()[2] == 0
 
 
 def flipped(content: bytes) -> bytes:
