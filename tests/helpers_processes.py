@@ -116,11 +116,21 @@ def run_carom(*arguments, **more) -> subprocess.CompletedProcess[str]:
     return run_python(RUN_CAROM, *arguments, **more)
 
 
+def _link_or_copy(source: str, target: str) -> None:
+    """Files of kernels are replaced, never written into: a link does, and takes no part of their half a gigabyte."""
+    try:
+        os.link(source, target)
+    except OSError:  # on another disk
+        shutil.copyfile(source, target)
+
+
 def copied_cache(folder: Path, *without: str) -> dict[str, str]:
     """A copy of the tests' kernel cache without the kernels of these names: the environment of processes to use it."""
-    names = [f"{name}-*.kernel" for name in without]
+    ignored = shutil.ignore_patterns("*.unfinished", "hypothesis", *(f"{name}-*.kernel" for name in without))
     os.makedirs(os.environ["CAROM_CACHE_DIR"], 0o700, exist_ok=True)
-    shutil.copytree(os.environ["CAROM_CACHE_DIR"], folder, ignore=shutil.ignore_patterns("*.unfinished", *names))
+    shutil.copytree(
+        os.environ["CAROM_CACHE_DIR"], folder, ignore=ignored, copy_function=_link_or_copy, dirs_exist_ok=True
+    )
     return {"CAROM_CACHE_DIR": str(folder)}
 
 

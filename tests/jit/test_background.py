@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-import shutil
 
 import pytest
-from helpers_processes import output_of
+from helpers_processes import copied_cache, output_of
 
 from carom.framework.jit.link_all import CAN_FORK
 
@@ -101,9 +100,8 @@ def test_it_ends_with_the_program(tmp_path):
 
 @pytest.mark.slow
 def test_what_queries_need_is_compiled_while_the_game_runs(tmp_path):
-    kept = os.environ["CAROM_CACHE_DIR"]
-    run(WORLD + "world.prepare()\n", kept)
-    shutil.copytree(kept, tmp_path, dirs_exist_ok=True, ignore=shutil.ignore_patterns("find_hits-*"))
+    run(WORLD + "world.prepare()\n", os.environ["CAROM_CACHE_DIR"])
+    copied_cache(tmp_path, "find_hits")
     assert run(WORLD, tmp_path) == ["['find_hits'] True", "2 True 1"]
     for path in tmp_path.glob("find_hits-*"):
         path.unlink()
