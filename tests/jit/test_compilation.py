@@ -16,13 +16,18 @@ from carom.framework.jit import source
 from carom.framework.jit.hash import deep_hash
 
 
-def test_a_disk_that_fills_up_costs_speed_and_not_the_run(monkeypatch, tmp_path, caplog):
+@pytest.mark.parametrize(
+    ("module", "call", "reason"),
+    [("tempfile", "mkstemp", "no space left on device"), ("os", "replace", "connection to the disk lost")],
+)
+def test_a_disk_that_fails_costs_speed_and_not_the_run(monkeypatch, tmp_path, caplog, module, call, reason):
+    """It is told once, and nothing is left behind."""
     monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path))
 
-    def full(*args, **kwargs):
-        raise OSError("no space left on device")
+    def fails(*args, **kwargs):
+        raise OSError(reason)
 
-    monkeypatch.setattr(kernel_cache.tempfile, "mkstemp", full)
+    monkeypatch.setattr(getattr(kernel_cache, module), call, fails)
 
     @kernel
     def twice(x):
@@ -32,24 +37,8 @@ def test_a_disk_that_fills_up_costs_speed_and_not_the_run(monkeypatch, tmp_path,
     assert twice(4) == 8.0
     assert not list(tmp_path.iterdir())
     assert [r.getMessage() for r in caplog.records if "cannot be kept" in r.getMessage()] == [
-        f"carom: kernels cannot be kept in {tmp_path}, the next run compiles again: no space left on device"
+        f"carom: kernels cannot be kept in {tmp_path}, the next run compiles again: {reason}"
     ]
-
-
-def test_a_write_that_breaks_off_leaves_nothing_behind(monkeypatch, tmp_path):
-    monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path))
-
-    def broken(*args):
-        raise OSError("connection to the disk lost")
-
-    monkeypatch.setattr(kernel_cache.os, "replace", broken)
-
-    @kernel
-    def halved(x):
-        return 0.5 * x
-
-    assert halved(4.0) == 2.0
-    assert not list(tmp_path.iterdir())
 
 
 def test_the_garbage_collector_is_as_it_was_after_compiling_and_after_failing(monkeypatch, tmp_path):

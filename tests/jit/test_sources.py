@@ -1,4 +1,6 @@
-"""Sources: no circle of imports, kernels take few arguments and are short, names have one meaning, columns a unit."""
+"""Sources: no circle of imports, kernels take few arguments and are short, names have one meaning, columns a unit,
+faults a row in the docs.
+"""
 
 from __future__ import annotations
 
@@ -55,18 +57,21 @@ def name_of(decorator):
     return getattr(decorator, "attr", getattr(decorator, "id", None))
 
 
-def kernels():
-    """(place, positional arguments, lines) of all compiled functions: by their decorators, or that they take state."""
+def nodes(kind: type[ast.AST]) -> Iterator[tuple[str, ast.AST]]:
+    """(place, node) of all nodes of that kind in the engine's sources."""
     for folder in FOLDERS:
         for path in sorted((ROOT / folder).rglob("*.py")):
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-                if not isinstance(node, ast.FunctionDef):
-                    continue
-                arguments = [argument.arg for argument in (*node.args.posonlyargs, *node.args.args)]
-                decorated = any(name_of(decorator) in DECORATORS for decorator in node.decorator_list)
-                if decorated or arguments[:1] == ["state"]:
-                    place = f"{path.relative_to(ROOT)}:{node.lineno} {node.name}"
-                    yield place, len(arguments), node.end_lineno - node.lineno + 1
+                if isinstance(node, kind):
+                    yield f"{path.relative_to(ROOT)}:{node.lineno}", node
+
+
+def kernels():
+    """(place, positional arguments, lines) of all compiled functions: by their decorators, or that they take state."""
+    for place, node in nodes(ast.FunctionDef):
+        arguments = [argument.arg for argument in (*node.args.posonlyargs, *node.args.args)]
+        if arguments[:1] == ["state"] or any(name_of(decorator) in DECORATORS for decorator in node.decorator_list):
+            yield f"{place} {node.name}", len(arguments), node.end_lineno - node.lineno + 1
 
 
 def test_kernels_take_few_arguments_and_are_short():
@@ -111,3 +116,22 @@ def test_columns_and_numbers_of_the_records_carry_their_unit():
             elif field.dtype == "float64" and not field.unit:
                 bare.add(f"{schema.name}.{name}")
     assert bare == SEVERAL_UNITS
+
+
+def text_of(node):
+    """A text with dots where it has values; None if it is made elsewhere."""
+    if isinstance(node, ast.Constant):
+        return node.value
+    if isinstance(node, ast.JoinedStr):
+        return "".join(part.value if isinstance(part, ast.Constant) else "..." for part in node.values)
+    return None
+
+
+def test_every_fault_stands_in_the_table_of_the_docs():
+    found = {place: text_of(call.args[0]) for place, call in nodes(ast.Call) if name_of(call) == "report_fault"}
+    assert None not in found.values(), f"write the text where it is reported: {found}"
+    page = (ROOT / "docs" / "faults.md").read_text(encoding="utf-8")
+    table = page.split("<!-- faults -->")[1].split("<!-- end of faults -->")[0]
+    rows = [line for line in table.splitlines() if line.startswith("| `")]
+    assert all(len(row.strip("| ").split(" | ")) == 3 for row in rows)
+    assert set(found.values()) == {row.split("`")[1] for row in rows}

@@ -61,6 +61,7 @@ def test_verbs_do_not_change_the_current_context():
 
 def test_the_default_context_can_be_taken_over_and_is_given_back():
     esper.create_entity(Name("from before"))
+    before = esper.create_entity(Transform((0.0, 0.0)), RigidBody(linear_velocity=(6.0, 0.0)))
     world = World(Physics(dimensions=2), name="default")
     try:
         assert [name.text for _, name in world.get_component(Name)] == ["from before"]
@@ -69,23 +70,14 @@ def test_the_default_context_can_be_taken_over_and_is_given_back():
         e = esper.create_entity(Transform((1.0, 2.0)), RigidBody(linear_velocity=(60.0, 0.0)))
         esper.process(world.settings.dt)
         assert world.component_for_entity(e, Transform).x == 2.0
+        assert world.component_for_entity(before, Transform).x == 0.1
+        assert world.bodies.entity.tolist() == [before, e]
     finally:
         world.close()
     assert "default" in esper.list_worlds()
     esper.create_entity(Transform((0.0, 0.0)))  # plain esper again
     esper.process("anything")
     esper.clear_database()
-
-
-def test_bodies_that_were_there_before_the_world_are_adopted():
-    e = esper.create_entity(Transform((0.0, 0.0)), RigidBody(linear_velocity=(6.0, 0.0)))
-    world = World(Physics(dimensions=2), settings=Settings(dt=0.5), name="default")
-    try:
-        world.step()
-        assert world.bodies.position.tolist() == [[3.0, 0.0]]
-        assert world.bodies.entity.tolist() == [e]
-    finally:
-        world.close()
 
 
 def test_closing_gives_the_context_back_and_ends_the_world():
