@@ -107,29 +107,22 @@ def with_index(game, name, text):
     return folder
 
 
-def test_kernels_made_with_another_version_are_left_alone_and_told_in_one_line(game):
-    folders, reasons = [], []
+def test_what_was_made_with_another_version_or_is_damaged_is_left_alone_and_told_in_one_line(game):
+    reasons = {}
     for name in made_with():
         index = json.loads((game.shipped / INDEX).read_text())
-        reasons.append(f"they were made with {name} another, here {index['made_with'][name]}")
+        reason = f"they were made with {name} another, here {index['made_with'][name]}"
         index["made_with"][name] = "another"
-        folders.append(with_index(game, f"other {name}", json.dumps(index)))
-    result, compiled, loaded, lines = game.run(shipped=folders)
+        reasons[with_index(game, f"other {name}", json.dumps(index))] = reason
+    assert len(reasons) > 3
+    for k, text in enumerate((None, "", "{", "[]", '{"made_with": {}}')):
+        reasons[with_index(game, f"damaged {k}", text)] = "index.json is missing or damaged"
+    result, compiled, loaded, lines = game.run(shipped=list(reasons))
     assert (result, compiled, loaded) == (5.0, 1, 0)
-    told = [f"carom: the kernels in {folder} are not used, {why}" for folder, why in zip(folders, reasons, strict=True)]
-    assert len(told) == len(made_with()) > 3
-    assert lines[: len(told)] == told
-    assert not [line for line in lines[len(told) :] if "are not used" in line]
-
-
-def test_a_damaged_index_is_told_in_one_line(game):
-    texts = [None, "", "{", "[]", '{"made_with": {}}']
-    folders = [with_index(game, f"damaged {k}", text) for k, text in enumerate(texts)]
-    result, compiled, loaded, lines = game.run(shipped=folders)
-    assert (result, compiled, loaded) == (5.0, 1, 0)
-    for folder in folders:
-        (told,) = [line for line in lines if str(folder) in line]
-        assert "index.json is missing or damaged" in told
+    for folder, reason in reasons.items():
+        (told,) = [line for line in lines if f"{folder} " in line]
+        assert told.startswith(f"carom: the kernels in {folder} are not used")
+        assert reason in told
 
 
 def test_they_can_be_switched_off(game):
