@@ -20,7 +20,7 @@ DT = 1 / 60
 makers = pytest.mark.parametrize("maker", [ball, box])
 
 
-@pytest.mark.parametrize("ratio", [1e12, 1e-12, 1e15, 1e-15])
+@pytest.mark.parametrize("ratio", [1e15, 1e-15])
 @pytest.mark.parametrize("e", [0.5, 1.0])
 def test_c8_mass_ratios_between_walls(ratio, e):
     """A light body bounces between a heavy one and a wall: it never tunnels, and energy does not grow."""
