@@ -160,7 +160,7 @@ def future(world):
 @pytest.mark.parametrize("seed", range(9))
 def test_snapshots_of_a_random_history_bring_back_the_world_and_its_future(seed, tmp_path):
     game, kept = Game(seed), []
-    for _ in range(40):
+    for _ in range(20):
         choice = game.random.random()
         if choice < 0.75:
             game.random.choice(ACTIONS)(game)

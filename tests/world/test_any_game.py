@@ -426,7 +426,7 @@ def play(games, rules, **chosen):
 
 @pytest.mark.compiled
 def test_a_few_games():
-    play(8, 30)
+    play(4, 30)
 
 
 def play_for(steps):
