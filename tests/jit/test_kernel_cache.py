@@ -142,6 +142,7 @@ EDITS = [
 ]
 
 
+@pytest.mark.slow
 def test_an_edit_of_what_a_kernel_calls_or_reads_in_another_file_is_noticed(compiled):
     """Undone it finds the old one; one of a comment compiles nothing, and a switch of numba everything."""
     for file, old, new, expected in EDITS:

@@ -129,6 +129,7 @@ def test_they_can_be_switched_off(game):
     assert game.run(CAROM_PREBUILT="0")[:3] == (5.0, 1, 0)
 
 
+@pytest.mark.slow
 def test_the_command_takes_what_the_cache_holds_and_nothing_else(tmp_path):
     """The first time its own kernel compiles; the second time nothing does, and the same files are copied."""
     environment = copied_cache(tmp_path / "cache")

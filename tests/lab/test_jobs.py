@@ -87,6 +87,7 @@ def test_what_is_kept_is_not_performed_again(tmp_path):
     assert ran == ["a", "b", "", ""]
 
 
+@pytest.mark.slow
 def test_a_changed_file_or_question_is_measured_anew(carom, tmp_path):
     pytest.importorskip("joblib")
     scene_file(tmp_path, COUNTING)

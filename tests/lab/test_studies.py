@@ -167,6 +167,7 @@ def test_a_process_is_timed_and_one_that_fails_is_no_measurement():
 # -- accuracy ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_accuracy_finds_the_orders_of_the_methods_and_fills_a_page(studies, tmp_path, monkeypatch):
     """Against a reference of its own: first order for both Euler methods, 2 for velocity Verlet, 4 for the others."""
     monkeypatch.setitem(KNOWN, "spring", replace(KNOWN["spring"], steps=(1 / 60, 1 / 120, 1 / 240), seconds=1.3))

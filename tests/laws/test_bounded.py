@@ -70,6 +70,7 @@ def mixed_heap(seed, e, mode):
         return play(world, 60, limit=6.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "e", "mode"), cases(HEAPS, 5))
 def test_masses_of_1e_minus_12_and_1e12_in_one_island(seed, e, mode):
     """A light elastic body between a heavy one and a wall bounces pi/2 sqrt(M / m) = 1e12 times before these part: a

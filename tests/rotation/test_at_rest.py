@@ -145,6 +145,7 @@ def test_a_house_of_cards_stands(seed):
         assert world.kinetic_energy() < 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "lightest", "seconds", "left"), [
         (0, 0.1, 30, 0.1), *(pytest.param(*case, marks=pytest.mark.long) for case in (
