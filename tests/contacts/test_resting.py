@@ -7,8 +7,7 @@ import pytest
 from helpers_rest import SLOP, G, heights, overlaps, speed, tower
 from worlds import ball, box, floor, make_world, run
 
-from carom.framework import Phase, System
-from carom.framework.errors import StepError
+from carom.framework import Phase, StepError, System
 
 ROWS = 6
 

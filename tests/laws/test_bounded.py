@@ -12,7 +12,7 @@ from helpers_rest import G, tower
 from laws.helpers_laws import MODES, SWEPT, cases, seeds, walls
 from worlds import ball, box, floor, make_world
 
-from carom.framework.errors import StepError
+from carom.framework import StepError
 
 TOO_FAST = "so fast that discrete collisions may miss"
 MOST_ROUNDS = 1000  # searches of pairs that a step may take

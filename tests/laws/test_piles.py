@@ -14,7 +14,7 @@ from worlds import ball, box, make_world
 
 from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework.errors import StepError
+from carom.framework import StepError
 from carom.scenes import pile
 
 pytestmark = pytest.mark.early

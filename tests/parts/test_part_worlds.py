@@ -21,7 +21,7 @@ from carom import (
     World,
 )
 from carom.components.rigid_body import WEIGHTLESS
-from carom.framework.errors import StepError
+from carom.framework import StepError
 from carom.plugins import convex_polygon
 from carom.plugins.joints import Hinge, Joints, Weld
 from carom.plugins.parts import PartOf, Parts

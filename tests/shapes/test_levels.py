@@ -14,8 +14,7 @@ from worlds import EPS, ball, both_dimensions, box, floor, make_world, position,
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.components.colliders import Collider
-from carom.framework import Phase, Plugin, Settings, System, World, column
-from carom.framework.errors import UnhandledPairError
+from carom.framework import Phase, Plugin, Settings, System, UnhandledPairError, World, column
 from carom.framework.vectors import scale
 from carom.plugins import Physics
 
