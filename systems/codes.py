@@ -18,3 +18,4 @@ FIND_IN_PYTHON = 33  # candidate pairs from a tree, or from the broad phase of a
 ROTATE = 34  # axes of rotated bodies
 CHECK_COLUMNS, CHECK_FLIGHT = 35, 36  # name bodies that cannot be right, and take them out, or in again
 LOOK = 37  # code of the game may have changed what sleeps
+INDEX = 38  # grids and trees of where the bodies are now

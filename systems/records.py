@@ -13,7 +13,7 @@ from typing import Any
 from ..components import Collider, RigidBody
 from ..framework.jit.records.schema import Schema, Section, flag, flags, floats, integer, ints, number, vectors
 from ..framework.schedule.stages import PROGRAM_FIELDS
-from .broad_phase.records import GRID
+from .broad_phase.records import GRID, TREE
 from .contacts.solving.records import ARM_COLUMNS, RESTED, SOLVER, TURN_COLUMNS, WARM_START
 from .impacts.records import IMPACTS
 from .parts.records import PART_COLUMNS, PARTS
@@ -450,4 +450,6 @@ STATE = Schema(
     parts=PARTS,
     grid=GRID,  # of what moves
     static_grid=GRID,
+    tree=TREE,  # for queries: of what moves or sleeps and is in no grid,
+    static_tree=TREE,  # and of what does not
 )

@@ -52,6 +52,7 @@ class Scene:
         self.prepared: set[type[Any]] = set()  # colliders whose functions are kept ready
         self.read_by_plugins: set[str] = set()  # columns that stages of plugins read
         self.moments_asked = False  # whether one of them reads the shapes: second moments, supports
+        self.sweeps_asked = False  # and whether one casts them
         self.version = 0
         self.linked: LinkedShapes | None = None
         self.parameters: ParameterRecords | None = None

@@ -24,7 +24,7 @@ from .plugin_stages.kept import keep_written
 from .quarantine.columns import check_columns
 from .records import BODIES, COLLIDERS, STATE, TABLE_COLUMNS, all_rows
 from .sleeping.stages import update_sleep
-from .step_stages import KEEPS_FORCE, KEEPS_START, KEEPS_VELOCITY, close_step, keep_state, read_bodies
+from .step_stages import KEEPS_FORCE, KEEPS_START, KEEPS_VELOCITY, close_step, index_bodies, keep_state, read_bodies
 
 OPENING = (
     Stage(keep_state, "keeps what a failed step puts back", ("linear_velocity",), ("kept", "kept_velocity")),
@@ -43,6 +43,10 @@ OPENING = (
     ),
 )  # fmt: skip
 CLOSING = (
+    Stage(
+        index_bodies, "where the bodies are now, for stages of plugins that query", ("position", "rotation"),
+        ("lower", "upper", "grid", "static_grid", "tree", "static_tree"), "stages query",
+    ),
     Stage(
         update_sleep, "how long bodies have been at rest; islands fall asleep",
         ("pairs", "position", "linear_velocity"), ("sleep_state", "rest_steps", "linear_velocity"), "sleeping",
@@ -81,7 +85,7 @@ WITH_COLLIDERS = frozenset((
 ))  # fmt: skip
 CONDITIONS = (
     "", "dynamic bodies", *sorted(WITH_COLLIDERS), "bodies spin", "bodies spin, no joints", "joints", "parts",
-    "standard", "sleeping", "stages of plugins", "on demand",
+    "standard", "sleeping", "stages of plugins", "stages query", "on demand",
 )  # fmt: skip
 # What a failed step puts back, in this order: the bit of state.kept that says that the copy is made; the column, its
 # copy, and their rows.

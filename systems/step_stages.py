@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..framework.compilation import part
 from .ccd.search_bounds import DISCRETE
-from .codes import NEED_SWEEPS, OK, ROTATE
+from .codes import INDEX, NEED_SWEEPS, OK, ROTATE
 from .parts.stages import add_masses_of_parts
 from .shapes.attribution import NOTHING_TESTED
 
@@ -98,6 +98,11 @@ def read_bodies(state, dt):
     if state.rotation_stale or (rotated and (not state.rotated or state.several_levels or axes_are_old(state))):
         return ROTATE
     return OK
+
+
+def index_bodies(state, dt):
+    """Where the bodies are now, for stages of plugins that query: systems of the game may have moved them."""
+    return INDEX
 
 
 def close_step(state, dt):

@@ -251,9 +251,11 @@ def check_filter(plugin: Any, function: Any) -> None:
 
 
 def check_stage(
-    plugin: Any, function: Any, places: tuple[str, str], records: Any, columns: dict[str, Iterable[str]]
-) -> tuple[str, list[tuple[Any, ...]]]:
-    """The one name of a stage that is given, then records and columns as tuples; PluginError unless it can be one."""
+    plugin: Any, function: Any, places: tuple[str, str], given_records: tuple[Any, Any],
+    columns: dict[str, Iterable[str]],
+) -> tuple[str, list[tuple[Any, ...]]]:  # fmt: skip
+    """The one name of a stage that is given, then all its records and columns as tuples; PluginError unless it can be
+    one."""
     where = f"plugin {plugin.name}: stage {getattr(function, '__name__', function)!s}"
     if not inspect.isfunction(function) or not function.__name__.isidentifier():
         raise PluginError(f"{where}: register a plain function with a name; carom compiles it itself")
@@ -264,8 +266,12 @@ def check_stage(
     for what, names in columns.items():
         if isinstance(names, str) or not all(isinstance(name, str) for name in names):
             raise PluginError(f"{where}: {what} takes a tuple of names, got {names!r}")
-    if not isinstance(records, tuple) or not all(map(_is_record, records)):
-        raise PluginError(f"{where}: records takes a tuple of component types of your own and schemas, got {records!r}")
+    for what, given_types in zip(("records", "optional"), given_records, strict=True):
+        if not isinstance(given_types, tuple) or not all(map(_is_record, given_types)):
+            raise PluginError(
+                f"{where}: {what} takes a tuple of component types of your own and schemas, got {given_types!r}"
+            )
+    records = (*given_records[0], *given_records[1])
     names = (each.name if isinstance(each, Schema) else each.prefix.rstrip(".") for each in records)
     _check_arity(where, function, ("state", "dt", *names))
     if answers(function) != {False} and not (answers(function) == {True} and _has_rows(records)):

@@ -232,6 +232,7 @@ class Plugin:
     def stage(
         self, *, after: str = "", before: str = "", records: tuple[type[Component] | Schema, ...] = (),
         reads: Iterable[str] = (), writes: Iterable[str] = (), needed: str = "",
+        optional: tuple[type[Component], ...] = (),
     ) -> Callable[[Thing], Thing]:  # fmt: skip
         """Register ``function(state, dt, *records)``, a compiled stage of a step, next to a built-in one.
 
@@ -248,6 +249,8 @@ class Plugin:
             fails puts back the columns that are written
         needed
             what has to be true of the world for it to run, as of a built-in stage: "colliders" and the like
+        optional
+            component types whose records the function gets after the others, and without which it runs all the same
 
         ``state`` is what the built-in stages get. Bodies that take part in the step have the rows from ``state.first``
         on; the first ``state.dynamic`` rows are dynamic, ``state.moving`` move.
@@ -255,9 +258,9 @@ class Plugin:
 
         def register(function: Any) -> Any:
             columns = {"reads": reads, "writes": writes}
-            place, used = checks.check_stage(self, function, (after, before), records, columns)
+            place, used = checks.check_stage(self, function, (after, before), (records, optional), columns)
             why = " ".join((inspect.getdoc(function) or "").partition("\n\n")[0].split()).rstrip(".")
-            stage = PluginStage(part(function), place, bool(after), *used, needed, why, self.name)
+            stage = PluginStage(part(function), place, bool(after), *used, needed, why, self.name, optional)
             self._register(self.stages, stage.name, stage)
             return function
 

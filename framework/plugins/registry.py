@@ -104,6 +104,8 @@ class PluginStage:
         a built-in stage; whether this one runs after it, or before
     records
         what the function gets beside the state: the columns of component types, and records of the plugin's own
+    optional
+        those of the component types without which it runs all the same
     reads, writes, needed, why
         as of a built-in one
     """
@@ -117,6 +119,7 @@ class PluginStage:
     needed: str
     why: str
     plugin: str
+    optional: tuple[type[Component], ...] = ()
 
     @property
     def name(self) -> str:
@@ -125,6 +128,11 @@ class PluginStage:
     @property
     def components(self) -> tuple[type[Component], ...]:
         return tuple(each for each in self.records if not isinstance(each, Schema))
+
+    @property
+    def about(self) -> tuple[type[Component], ...]:
+        """The component types that some body must have all of."""
+        return tuple(each for each in self.components if each not in self.optional)
 
     @property
     def schemas(self) -> tuple[Schema, ...]:

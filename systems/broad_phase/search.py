@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -105,6 +106,11 @@ class CandidateSearch:
         if not static_grid.serves:
             self._build_static()
         return self._moving if start < stop else self._empty, self._empty if static_grid.serves else self._static
+
+    def index_for_stages(self, scene: Any) -> None:
+        """The same within a step, and the trees where compiled code finds them."""
+        scene.refresh_rotation()
+        self._state.tree, self._state.static_tree = (tree.record for tree in self.index_now())
 
     def _build(self, index: SpatialTree, start: int, stop: int) -> None:
         index.build(self._state.bodies.lower, self._state.bodies.upper, start, stop)

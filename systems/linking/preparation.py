@@ -30,7 +30,7 @@ from ...framework.world.world import World
 from ..broad_phase.tree.passes import tree_passes
 from ..forces.accumulation import required_bodies
 from ..integration.system import Integration
-from ..plugin_stages.plugin_stages import NEEDED
+from ..plugin_stages.plugin_stages import NEEDED, QUERYING
 from ..queries.kernels import query_kernels
 from ..records import STATE
 from ..scene import Scene
@@ -56,6 +56,8 @@ def kind_of_world(scene: Scene, integration: Integration, program: Program) -> K
     conditions = frozenset(("", "dynamic bodies", *integration.stages_possible, *of_plugins))
     if of_plugins:
         conditions |= {NEEDED}
+    if linked is not None and scene.sweeps_asked:
+        conditions |= {QUERYING}
     if any(plugin.name == "joints" for plugin in registry.plugins):  # which may come at any time
         conditions |= {"joints", "colliders or joints"}
     if scene.state.parts.count > 0:

@@ -139,8 +139,11 @@ class StepLinks:
     def _functions_of_shapes(self) -> Iterator[Linked | Called]:
         linked = self._scene.linked
         if linked is not None:
-            sweeps = self._state.sweeps_ready or self._bounces
-            yield from linked.all_functions(sweeps, self._scene.moments_asked)
+            yield from linked.all_functions(self._sweeps(), self._scene.moments_asked)
+
+    def _sweeps(self) -> bool:
+        """Whether a step may ask for the sweeps of shapes."""
+        return self._state.sweeps_ready or self._bounces or self._scene.sweeps_asked
 
     def _parts_by_address(self) -> dict[int, Linked]:
         """The parts of stages that are called by address: those of swept bodies and of impacts only where there may be
@@ -152,7 +155,7 @@ class StepLinks:
 
     def link_shapes(self) -> None:
         """The functions of the shapes alone, where they are not linked yet."""
-        sweeps = self._state.sweeps_ready or self._bounces
+        sweeps = self._sweeps()
         key = self._scene.linked, sweeps, self._scene.moments_asked
         if key != self._shapes_key:
             link_all(self._functions_of_shapes())

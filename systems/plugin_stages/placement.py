@@ -94,6 +94,8 @@ def _fault_of_columns(stage: PluginStage) -> str:
                 f"it writes {name}, and stages of {' and '.join(REPEATED)} may run several times in a step: they must "
                 f"not change the bodies"
             )
+    if "tree" in stage.reads and SYSTEM_OF_STAGE[stage.anchor]:
+        return "it reads tree, and queries know where the bodies are only in stages before='update_sleep' or later"
     named = {name.rpartition(".")[2] for name in (*stage.reads, *stage.writes)}
     used = _names_in(stage.function, set()) & {name.rpartition(".")[2] for name in known}
     unnamed = sorted(used - named - {name for schema in stage.schemas for name in schema.fields})

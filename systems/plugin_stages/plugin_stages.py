@@ -24,7 +24,8 @@ from ..stage_list import MADE_AGAIN
 from .compiled import PRESENT, own_schema, visible_columns
 from .placement import OF_TABLE, check_plugin_stages, placed
 
-NEEDED = "stages of plugins"  # the condition of what all of them need
+NEEDED = "stages of plugins"  # the condition of what all of them need,
+QUERYING = "stages query"  # and of what those need that find bodies
 
 
 class PluginStages:
@@ -75,16 +76,18 @@ class PluginStages:
         dimensions = self._state.dimensions
         self._adoption.register(dict.fromkeys(component for stage in stages for component in stage.components))
         program.take(tuple(placed(stages, dimensions)))
-        self.stages, self._about = stages, [stage.components for stage in stages]
+        self.stages, self._about = stages, [stage.about for stage in stages]
         if any("rotation" in stage.writes for stage in stages) and "previous_rotation" not in self._table.arrays:
             self._table.make("previous_rotation")
             restart(self._table, slice(0, self._table.count), ("rotation",))
         self._own = {stage: make_record(own_schema(stage, dimensions), dimensions) for stage in stages}
         reads, writes = ({name for stage in stages for name in getattr(stage, what)} for what in ("reads", "writes"))
         kept = {name for name in writes if name in OF_TABLE or self._table.has_column(name)}.difference(MADE_AGAIN)
-        self.written = ColumnCopies(self._table, tuple(sorted(kept)))
+        owners = {column.key: each for stage in stages for each in stage.components for column in each.columns.values()}
+        self.written = ColumnCopies(self._table, tuple(sorted(kept)), owners)
         own = {name for name in writes if "." in name}  # no stage writes what sleeps, see docs/write-a-stage.md
         self._scene.read_by_plugins, self._scene.moments_asked = (reads - writes) | own, "shapes" in reads
+        self._scene.sweeps_asked = "tree" in reads
 
     def _bind(self, program: Program) -> None:
         """Rows for all columns that the stages name, and the addresses of what they have of their own."""
@@ -138,6 +141,7 @@ class PluginStages:
         spins = any(needed[stage.name] for stage in self.stages if "spin" in stage.writes)
         return {
             NEEDED: any(needed.values()), **needed,
+            QUERYING: any(needed[stage.name] for stage in self.stages if "tree" in stage.reads),
             "bodies spin": spins, "bodies spin, no joints": spins and not met["joints"],
             "no body spins, no joints": met["colliders"] and not spins and not met["joints"],
         }  # fmt: skip

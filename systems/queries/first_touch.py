@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import collections
 import math
+from collections.abc import Callable
+from typing import Any
 
 from ...framework.compilation import inlined, part, pasted
 from ...framework.vectors import add_scaled, dot, length, scale
@@ -35,62 +37,82 @@ def power_above(distance):
     return math.ldexp(1.0, math.frexp(distance)[1])
 
 
-@part
-def touch_at(state, batch, q, i, path, away, distance):
-    """(normal, point) of the touch at a distance that is known."""
-    shape, direction = state.bodies.shape[i], path.direction
-    d = add_scaled(away, direction, 0.0 - distance)
-    _, _, normal, point = evaluate_against(state, batch.query, q, shape, i, d)
-    if distance > 0.0 and not dot(direction, normal) > 0.0:  # a rounding error too far may reverse the normal
-        before = min(distance, LAST_STEP * length(away))
-        d = add_scaled(away, direction, before - distance)
-        _, _, other, _ = evaluate_against(state, batch.query, q, shape, i, d)
-        if dot(direction, other) > 0.0:
-            normal = other
-    return normal, point
+def make_first_touch(evaluate_at: Callable[..., Any], sweep_at: Callable[..., Any]) -> Any:
+    """first_touch(state, batch, q, i, path, leave, reach) of what asks with number q.
 
+    evaluate_at, sweep_at
+        (state, batch, q, i, d) -> (hit, depth, normal, point) of what asks and row i, d from its centre to the row's;
+        (state, batch, q, i, d, way) -> (known, hit, time) where it moves by ``way``
+    """
 
-@part
-def search_touch(state, batch, q, i, path, away, reach):
-    """(touches, distance, normal, point) by steps along the path; reach: where to give up."""
-    shape, direction = state.bodies.shape[i], path.direction
-    distance, touches, normal, point = 0.0, False, away, away
-    for step in range(CAST_STEPS):
+    @part
+    def touch_at(state, batch, q, i, path, away, distance):
+        """(normal, point) of the touch at a distance that is known."""
+        direction = path.direction
         d = add_scaled(away, direction, 0.0 - distance)
-        hit, depth, here, point = evaluate_against(state, batch.query, q, shape, i, d)
-        rate = dot(direction, here)
-        if step == 0 or rate > 0.0:  # a rounding error too far may reverse the normal
-            normal = here
-        near = abs(depth) <= ROUNDING * length(d)
-        touches = hit or (near and (step > 0 or rate > 0.0))
-        further = distance - depth / rate if rate != 0.0 else math.inf
-        if touches or not rate > 0.0:
-            if near and step > 0 and abs(further - distance) <= LAST_STEP * distance:
-                distance = further  # what rounding leaves of the gap is a long way at a graze
-            break
-        if further > reach:
-            break
-        touches = step == CAST_STEPS - 1
-        if not further > distance:
-            touches = True
-            break
-        distance = further
-    return touches, distance, normal, point
+        _, _, normal, point = evaluate_at(state, batch, q, i, d)
+        if distance > 0.0 and not dot(direction, normal) > 0.0:  # a rounding error too far may reverse the normal
+            before = min(distance, LAST_STEP * length(away))
+            d = add_scaled(away, direction, before - distance)
+            _, _, other, _ = evaluate_at(state, batch, q, i, d)
+            if dot(direction, other) > 0.0:
+                normal = other
+        return normal, point
+
+    @part
+    def search_touch(state, batch, q, i, path, away, reach):
+        """(touches, distance, normal, point) by steps along the path; reach: where to give up."""
+        direction, distance, touches, normal, point = path.direction, 0.0, False, away, away
+        for step in range(CAST_STEPS):
+            d = add_scaled(away, direction, 0.0 - distance)
+            hit, depth, here, point = evaluate_at(state, batch, q, i, d)
+            rate = dot(direction, here)
+            if step == 0 or rate > 0.0:  # a rounding error too far may reverse the normal
+                normal = here
+            near = abs(depth) <= ROUNDING * length(d)
+            touches = hit or (near and (step > 0 or rate > 0.0))
+            further = distance - depth / rate if rate != 0.0 else math.inf
+            if touches or not rate > 0.0:
+                if near and step > 0 and abs(further - distance) <= LAST_STEP * distance:
+                    distance = further  # what rounding leaves of the gap is a long way at a graze
+                break
+            if further > reach:
+                break
+            touches = step == CAST_STEPS - 1
+            if not further > distance:
+                touches = True
+                break
+            distance = further
+        return touches, distance, normal, point
+
+    @pasted
+    def first_touch(state, batch, q, i, path, leave, reach):
+        """(touches, distance, normal, point) of query q on its path and row i, whose box it leaves at ``leave``."""
+        away = to_collider(state, path.start, i)
+        if not leave <= batch.span < SPAN_RATIO * leave:
+            batch.span = power_above(min(leave, LONGEST_SPAN))
+        span = batch.span
+        known, touches, time = sweep_at(state, batch, q, i, away, scale(path.direction, span))
+        if not known:
+            return search_touch(state, batch, q, i, path, away, reach)
+        if not touches:
+            return False, 0.0, away, away
+        normal, point = touch_at(state, batch, q, i, path, away, time * span)
+        return True, time * span, normal, point
+
+    return first_touch
 
 
-@pasted
-def first_touch_of_cast(state, batch, q, i, path, leave, reach):
-    """(touches, distance, normal, point) of query q on its path and row i, whose box it leaves at ``leave``."""
-    away = to_collider(state, path.start, i)
-    if not leave <= batch.span < SPAN_RATIO * leave:
-        batch.span = power_above(min(leave, LONGEST_SPAN))
-    span = batch.span
-    known, touches, time = sweep_against(
-        state, batch.query, q, state.bodies.shape[i], i, away, scale(path.direction, span)
-    )
-    if not known:
-        return search_touch(state, batch, q, i, path, away, reach)
-    if not touches:
-        return False, 0.0, away, away
-    normal, point = touch_at(state, batch, q, i, path, away, time * span)
-    return True, time * span, normal, point
+@inlined
+def evaluate_query(state, batch, q, i, d):
+    """Of query q's shape."""
+    return evaluate_against(state, batch.query, q, state.bodies.shape[i], i, d)
+
+
+@inlined
+def sweep_query(state, batch, q, i, d, way):
+    """The same."""
+    return sweep_against(state, batch.query, q, state.bodies.shape[i], i, d, way)
+
+
+first_touch_of_cast = make_first_touch(evaluate_query, sweep_query)

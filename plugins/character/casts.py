@@ -1,0 +1,188 @@
+"""What a character meets on its way, what it stands on, how deep it is in others: among the rows that are near it."""
+
+from __future__ import annotations
+
+from ...framework.compilation import inlined, part
+from ...framework.vectors import add_scaled, dot, length, negative, scale, sub
+from ...systems.queries.compiled import Path, box_interval, cast, inverse_of, is_sensor, overlap
+from .records import EXACT
+
+REACH = 10.0  # skins that a cast looks beyond its way
+FOOT = 0.8  # of the half extent: what touches farther out is no floor
+LEAN = 0.1  # of the half extent: how far it leans towards an edge to see what is behind it
+ONE_WAY = 0.5  # cosine from which a normal is that of the side that holds
+
+
+@inlined
+def is_dynamic(state, j):
+    """Whether forces move row j."""
+    return j < state.dynamic
+
+
+@inlined
+def one_way_of(state, j):
+    """The direction to which row j holds alone; 0: to all."""
+    return scale(state.bodies.position[j], 0.0)
+
+
+@inlined
+def holds(state, walker, j, out, distance):
+    """Whether row j, met along that normal, is in the way: what is solid from one side is not from others."""
+    side = one_way_of(state, j)
+    if dot(side, side) == 0.0:
+        return True
+    return not walker.dropping and dot(out, side) >= ONE_WAY and distance > 0.0
+
+
+@inlined
+def across(vector, up):
+    """The part of a vector that is not along ``up``."""
+    return add_scaled(vector, up, 0.0 - dot(vector, up))
+
+
+@part
+def meet_character(state, walker, j, at, way):
+    """(touches, distance, out) of another character: each may come half the way to where the other stood at the start,
+    up to a plane between them, so that their order does not matter."""
+    depth, out, _ = overlap(state, walker.row, j, walker.start)
+    along = 0.0 - dot(out, way)
+    if along <= EXACT:
+        return False, 0.0, out
+    return True, (0.5 * (walker.skin - depth) + dot(sub(at, walker.start), out)) / along, out
+
+
+@part
+def cast_near(state, near, character, walker, at, way, reach, ignored):
+    """(row, distance, out) of what opposes a way first; row -1: it is free."""
+    best, first, normal = -1, reach, way
+    path = Path(at, way, inverse_of(way), walker.half_extents)
+    for k in range(walker.near):
+        j = near.row[k]
+        if j == ignored or is_sensor(state, j):
+            continue
+        if character.present[j]:
+            touches, distance, out = meet_character(state, walker, j, at, way)
+        else:
+            enter, leave = box_interval(state.bodies.lower[j], state.bodies.upper[j], path, first)
+            if enter > leave:
+                continue
+            touches, distance, out, _ = cast(state, near, walker.row, j, path, first, first)
+        along = dot(out, way)
+        if not touches or distance >= first or along >= -EXACT or not holds(state, walker, j, out, distance):
+            continue
+        if distance <= 0.0 and is_dynamic(state, j) and along > -0.5:
+            continue
+        best, first, normal = j, distance, out
+    return best, first, normal
+
+
+@part
+def is_inside(state, near, character, walker, at):
+    """Whether it is in something that rests."""
+    for k in range(walker.near):
+        j = near.row[k]
+        if is_sensor(state, j) or j < state.moving or dot(one_way_of(state, j), walker.up) != 0.0:
+            continue
+        if overlap(state, walker.row, j, at)[0] > EXACT:
+            return True
+    return False
+
+
+@part
+def is_walkable(state, walker, j, out, at, point):
+    """Whether it can stand there. At an edge what is behind it decides, not the rounded foot: moved towards it and up,
+    the normal turns up; that of a slope does not."""
+    rise = dot(out, walker.up)
+    if rise >= walker.limit:
+        return True
+    if rise < 0.1 or length(across(point, walker.up)) > FOOT * walker.half:
+        return False
+    level = across(out, walker.up)
+    step = LEAN * walker.half
+    to = add_scaled(add_scaled(at, level, 0.0 - step / length(level)), walker.up, 2.0 * step / rise)
+    _, turned, _ = overlap(state, walker.row, j, to)
+    return dot(turned, walker.up) > rise + 1e-3
+
+
+@part
+def floor_below(state, near, character, walker, at, reach):
+    """(row, gap, out) of the floor that it can walk on within reach, and how far it may go down; row -1: none.
+
+    What is too steep in between only limits the way: it stands on a floor although a steep wall is nearer.
+    """
+    skin, up = walker.skin, walker.up
+    far = reach + REACH * skin
+    down = negative(up)
+    path = Path(at, down, inverse_of(down), walker.half_extents)
+    best, gap, normal, blocked = -1, far, up, far
+    for k in range(walker.near):
+        j = near.row[k]
+        if is_sensor(state, j):
+            continue
+        point = at
+        if character.present[j]:
+            touches, distance, out = meet_character(state, walker, j, at, down)
+        else:
+            enter, leave = box_interval(state.bodies.lower[j], state.bodies.upper[j], path, far)
+            if enter > leave:
+                continue
+            touches, distance, out, point = cast(state, near, walker.row, j, path, far, far)
+        rise = dot(out, up)
+        if not touches or rise <= EXACT or not holds(state, walker, j, out, distance):
+            continue
+        here = distance - skin / max(rise, 0.1)
+        walkable = rise >= walker.limit
+        if not walkable and not character.present[j]:
+            walkable = is_walkable(state, walker, j, out, add_scaled(at, down, distance), point)
+        if walkable:
+            if here < gap:
+                best, gap, normal = j, here, out if rise >= walker.limit else up
+        elif here < blocked:
+            blocked = here
+    if best >= 0 and (gap > reach or gap - max(blocked, 0.0) > 2.0 * skin):
+        best = -1
+    return best, min(gap, max(blocked, 0.0)), normal
+
+
+@part
+def lowered(state, near, character, walker, at, gap):
+    """Where it is after going down by the gap; up, where that is negative, only as far as there is room."""
+    if gap >= 0.0 or gap > -1e-12:
+        return add_scaled(at, walker.up, 0.0 - gap) if gap > 1e-12 else at
+    skin = walker.skin
+    j, distance, _ = cast_near(state, near, character, walker, at, walker.up, 0.5 * skin - gap, -1)
+    rise = 0.0 - gap if j < 0 else min(0.0 - gap, max(0.0, distance - 0.5 * skin))
+    return add_scaled(at, walker.up, rise)
+
+
+@part
+def deepest(state, near, character, walker, at, first, tolerance):
+    """(row, depth) of the worst overlap with what cannot be pushed, of rows from ``first`` on."""
+    worst, deep = -1, tolerance
+    for k in range(walker.near):
+        j = near.row[k]
+        if j < first or is_dynamic(state, j) or is_sensor(state, j) or character.present[j]:
+            continue
+        side = one_way_of(state, j)
+        if dot(side, side) != 0.0:
+            continue
+        depth, _, _ = overlap(state, walker.row, j, at)
+        if depth > deep:
+            worst, deep = j, depth
+    return worst, deep
+
+
+@part
+def meets_on_way(state, near, walker, j, start, stop):
+    """Whether it touches row j on a straight way but not where this begins."""
+    way = sub(stop, start)
+    size = length(way)
+    if size == 0.0 or overlap(state, walker.row, j, start)[0] > 0.0:
+        return False
+    way = scale(way, 1.0 / size)
+    path = Path(start, way, inverse_of(way), walker.half_extents)
+    enter, leave = box_interval(state.bodies.lower[j], state.bodies.upper[j], path, size)
+    if enter > leave:
+        return False
+    touches, distance, _, _ = cast(state, near, walker.row, j, path, size, size)
+    return touches and distance <= size

@@ -1,0 +1,159 @@
+"""How a character moves along what it meets, and out of what has moved into it."""
+
+from __future__ import annotations
+
+from ...framework.compilation import inlined, part
+from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, scale, sub
+from ...systems.queries.compiled import is_sensor, overlap
+from .casts import ONE_WAY, REACH, across, cast_near, deepest, is_dynamic, one_way_of
+from .records import EXACT, MOST_HITS, SLIDES
+
+MOST_PLANES = 32
+ROUNDS = 20  # over the planes
+
+
+@inlined
+def note_hit(work, j, out, speed):
+    """Row j was met."""
+    if work.hits < MOST_HITS:
+        work.hit_row[work.hits], work.hit_out[work.hits], work.hit_speed[work.hits] = j, out, speed
+        work.hits += 1
+
+
+@inlined
+def add_plane(work, out, depth):
+    """One more plane that holds it."""
+    if work.planes < MOST_PLANES:
+        work.plane_out[work.planes], work.plane_depth[work.planes] = out, depth
+        work.planes += 1
+
+
+@inlined
+def cross(a, b):
+    """a x b; in a plane 0, as nothing lies along two lines."""
+    result = scale(a, 0.0)
+    if len(a) == 3:
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            result = replace(result, k, item(a, i) * item(b, j) - item(a, j) * item(b, i))
+    return result
+
+
+@part
+def clipped(work, left):
+    """What is left of a way along the newest plane, or along the edge of it and another one; 0 in a corner."""
+    newest = work.planes - 1
+    size, out = length(left), work.plane_out[newest]
+    along = add_scaled(left, out, 0.0 - min(0.0, dot(left, out)))
+    for k in range(newest):
+        if dot(along, work.plane_out[k]) < -EXACT * size:
+            edge = cross(out, work.plane_out[k])
+            square = dot(edge, edge)
+            along = scale(edge, dot(left, edge) / square) if square > EXACT else scale(left, 0.0)
+            for m in range(newest):
+                if dot(along, work.plane_out[m]) < -EXACT * size:
+                    return scale(left, 0.0)
+    return along
+
+
+@part
+def slide(state, near, character, work, walker, at, wish, is_walking, is_carried, ignored):
+    """Where it gets by moving by ``wish`` and along what it meets.
+
+    is_walking
+        what is steep is as a wall
+    is_carried
+        it may also be moved back
+    """
+    left, skin = wish, walker.skin
+    work.planes = 0
+    for _turn in range(SLIDES):
+        size = length(left)
+        if size < EXACT:
+            break
+        way = divided(left, size)
+        j, distance, out = cast_near(state, near, character, walker, at, way, size + REACH * skin, ignored)
+        if j < 0:
+            return add(at, left)
+        slope = 0.0 - dot(out, way)
+        free = max(0.0, distance - skin / max(slope, 1e-3))
+        if free >= size:
+            return add(at, left)
+        at = add_scaled(at, way, free)
+        left = add_scaled(left, way, 0.0 - free)
+        note_hit(work, j, out, slope)
+        rise = dot(out, walker.up)
+        if is_walking and -0.1 < rise < walker.limit:
+            level = across(out, walker.up)
+            out = divided(level, length(level))
+        add_plane(work, out, 0.0)
+        left = clipped(work, left)
+        if not is_carried and dot(left, wish) <= 0.0:
+            break
+    return at
+
+
+@part
+def pushed_by_planes(work):
+    """The shortest way out of all planes."""
+    way = scale(work.plane_out[0], 0.0)
+    for k in range(work.planes):
+        work.plane_push[k] = 0.0
+    for _round in range(ROUNDS):
+        change = 0.0
+        for k in range(work.planes):
+            out = work.plane_out[k]
+            push = max(0.0, work.plane_push[k] + work.plane_depth[k] - dot(way, out))
+            more = push - work.plane_push[k]
+            work.plane_push[k] = push
+            way = add_scaled(way, out, more)
+            change = max(change, abs(more))
+        if change < EXACT:
+            break
+    return way
+
+
+@part
+def part_out(state, near, character, work, walker, at, rising):
+    """(place, row of what crushes it): out of static and kinematic bodies, the planes of all that overlap together.
+
+    rising
+        m/s, its own speed upwards: what holds from above does not pick up what jumps
+    """
+    start, crusher, skin = at, -1, walker.skin
+    for turn in range(6):
+        work.planes, worst = 0, 0.0
+        for k in range(walker.near):
+            j = near.row[k]
+            if is_dynamic(state, j) or is_sensor(state, j):
+                continue
+            one_way = one_way_of(state, j)
+            is_one_way = dot(one_way, one_way) != 0.0
+            depth, out, _ = overlap(state, walker.row, j, at)
+            if character.present[j]:
+                if depth > EXACT and turn == 0:
+                    add_plane(work, out, 0.5 * (depth + skin))
+                    worst = max(worst, 0.5 * (depth + skin))
+                continue
+            if depth <= EXACT:
+                if not is_one_way and depth > -2.0 * skin and turn > 0:
+                    add_plane(work, out, depth + 0.5 * skin)
+                    worst = max(worst, depth + 0.5 * skin)
+                continue
+            if is_one_way:  # picked up by one that rises, and by that way at most
+                rise = dot(sub(state.bodies.position[j], state.bodies.previous_position[j]), one_way)
+                side = dot(out, one_way)
+                if walker.dropping or side < ONE_WAY or not rise > 0.0 or depth > rise + EXACT or rising > 0.0:
+                    continue
+            add_plane(work, out, depth + skin)
+            worst = max(worst, depth + skin)
+            if j < state.moving or crusher < 0:
+                crusher = j
+            note_hit(work, j, out, 0.0)
+        if worst <= 0.6 * skin:
+            return at, -1
+        at = add(at, pushed_by_planes(work))
+    worst_row, _ = deepest(state, near, character, walker, at, 0, 1e-6)
+    if worst_row < 0:
+        return at, -1
+    return start, crusher if crusher >= 0 else worst_row

@@ -1,0 +1,471 @@
+"""One step of one character: what carries it, out of what has come into it, its jumps, its way, what it knows then."""
+
+from __future__ import annotations
+
+import math
+
+from ...framework.compilation import inlined, part
+from ...framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, scale, sub
+from ...systems.queries.compiled import is_sensor, make_gather, meets, overlap
+from ...systems.shapes.dispatch import half_extents
+from .casts import (
+    across,
+    deepest,
+    floor_below,
+    is_dynamic,
+    is_inside,
+    lowered,
+    meets_on_way,
+    one_way_of,
+)
+from .records import (
+    AIR,
+    CLIMB,
+    CRUSHED,
+    EXACT,
+    FLOOR,
+    HIT,
+    LANDED,
+    LEAVE_ALL,
+    LEAVE_NOTHING,
+    NEVER,
+    STEEP,
+    Walker,
+)
+from .slides import cross, part_out, slide
+
+FARTHEST_CARRIED = 1.0  # m in a step; what goes farther was put elsewhere
+NEAR_BY = 0.25  # m: room around what it may reach in a step
+DROPS_FOR = 0.1  # s in which it falls through what holds from above,
+DROPS_AGAIN = 0.2  # and until when it does not begin anew
+WALL = 0.9  # of a normal across up: is a wall
+CEILING = -0.5  # of a normal along up: is above
+
+gather = make_gather(meets)
+
+
+# -- vectors ---------------------------------------------------------------------------------------
+
+
+@inlined
+def up_of(state, character, i):
+    """Its unit vector upwards: its own, else against gravity, else along the second axis."""
+    up = character.up[i]
+    size = length(up)
+    if not size > 0.0:  # nan where it has none
+        up = negative(state.gravity[0])
+        size = length(up)
+        if not size > 0.0:
+            up = replace(scale(up, 0.0), 1, 1.0)
+            size = 1.0
+    return divided(up, size)
+
+
+@inlined
+def wish_of(character, i, up):
+    """The velocity that it wants across up: in a plane to the right of up, in space a vector."""
+    wish = up
+    if len(up) == 2:
+        speed = character.move[i, 0]
+        return replace(replace(wish, 0, speed * item(up, 1)), 1, 0.0 - speed * item(up, 0))
+    for k in range(3):
+        wish = replace(wish, k, character.move[i, k])
+    return across(wish, up)
+
+
+@inlined
+def along_floor(way, normal, up):
+    """A way across up, as long along the floor of that normal."""
+    size, rise = length(way), dot(normal, up)
+    if size == 0.0 or rise <= 0.0:
+        return way
+    tilted = add_scaled(way, up, 0.0 - dot(way, normal) / rise)
+    return scale(tilted, size / length(tilted))
+
+
+@inlined
+def axis_of(state, j, k):
+    """Axis k of row j, in the world."""
+    axis, d = scale(state.bodies.position[j], 0.0), len(state.bodies.position[j])
+    if len(state.bodies.axes) == 0:
+        return replace(axis, k, 1.0)
+    for m in range(d):
+        axis = replace(axis, m, state.bodies.axes[(j * d + m) * d + k])
+    return axis
+
+
+@part
+def turned(vector, x_before, y_before, x, y):
+    """A vector, turned as two axes have."""
+    result = add(scale(x, dot(vector, x_before)), scale(y, dot(vector, y_before)))
+    if len(vector) == 3:
+        result = add_scaled(result, cross(x, y), dot(vector, cross(x_before, y_before)))
+    return result
+
+
+@inlined
+def differs(a, b):
+    """Whether two vectors differ in any bit."""
+    different = False
+    for k in range(len(a)):
+        different |= item(a, k) != item(b, k)
+    return different
+
+
+# -- what it stands on -----------------------------------------------------------------------------
+
+
+@part
+def row_of_floor(state, character, i):
+    """The row of what it stands on, -1: nothing."""
+    floor, entity = character.floor_row[i], character.floor_entity[i]
+    if entity < 0:
+        return -1
+    if 0 <= floor < state.count and state.bodies.entity[floor] == entity:
+        return floor
+    for j in range(state.count):  # rows have moved
+        if state.bodies.entity[j] == entity:
+            return j
+    return -1
+
+
+@part
+def ride_of(state, character, i, at, floor, up, dt):
+    """How far what it stands on has carried it in this step."""
+    then, now = character.floor_place[i], state.bodies.position[floor]
+    ride = scale(at, 0.0)
+    x, y = axis_of(state, floor, 0), axis_of(state, floor, 1)
+    moved, turns = differs(then, now), differs(x, character.floor_x[i]) or differs(y, character.floor_y[i])
+    if moved or turns:
+        way = sub(now, then)
+        if length(way) <= FARTHEST_CARRIED:
+            ride = way
+            if turns:
+                arm = sub(at, then)
+                ride = add(ride, sub(turned(arm, character.floor_x[i], character.floor_y[i], x, y), arm))
+    return add_scaled(ride, surface_of(state, floor, character.floor_normal[i]), dt)
+
+
+@inlined
+def surface_of(state, j, normal):
+    """The velocity at which the surface of row j runs."""
+    return scale(normal, 0.0)
+
+
+@inlined
+def stands_on(state, character, i, floor, out):
+    """It knows where it stands."""
+    character.floor_entity[i], character.floor_row[i] = state.bodies.entity[floor], floor
+    character.floor_place[i], character.floor_normal[i] = state.bodies.position[floor], out
+    character.floor_x[i], character.floor_y[i] = axis_of(state, floor, 0), axis_of(state, floor, 1)
+
+
+# -- its own way -----------------------------------------------------------------------------------
+
+
+@part
+def jump_speed_of(character, i, gravity):
+    """m/s, from the height if one is given."""
+    height = character.jump_height[i]
+    return math.sqrt(2.0 * gravity * height) if height == height else character.jump_speed[i]
+
+
+@part
+def takes_ladder(state, near, ladder, walker, at):
+    """Whether it is in a ladder."""
+    if len(ladder.present) > 0:
+        for k in range(walker.near):
+            j = near.row[k]
+            if ladder.present[j] and overlap(state, walker.row, j, at)[0] > 0.0:
+                return True
+    return False
+
+
+@part
+def step_over(state, near, character, work, walker, at, wish, done, height):
+    """(taken, place) of going over an edge: up, forward and down, if that leads farther, to a floor."""
+    up, skin = walker.up, walker.skin
+    top = slide(state, near, character, work, walker, at, scale(up, height), False, True, -1)
+    raised = dot(sub(top, at), up)
+    if raised < skin:
+        return False, at
+    size = length(wish)
+    level = across(wish, up)
+    rest = max(size - done, 3.0 * skin)
+    ahead = divided(level, length(level))
+    over = slide(state, near, character, work, walker, top, scale(ahead, rest), False, False, -1)
+    if dot(sub(over, top), ahead) < 2.0 * skin:
+        return False, at
+    j, gap, _ = floor_below(state, near, character, walker, over, raised)
+    down = add_scaled(over, up, 0.0 - gap)
+    if j < 0 or gap < -EXACT or dot(sub(down, at), up) <= 1e-6:
+        return False, at
+    return True, down
+
+
+@part
+def push(state, character, work, walker, i, j, out, wish, dt):
+    """Push row j, which it has walked against, by its force, and no faster than it wants to walk."""
+    bodies, level = state.bodies, across(out, walker.up)
+    size = length(level)
+    if size < 0.5 or dot(wish, level) >= 0.0:
+        return
+    ahead = divided(level, 0.0 - size)
+    if character.present[j]:
+        if not character.pushable[j]:
+            return
+        speed, gain = dot(character.velocity[j], ahead), character.push_force[i] * dt / bodies.mass[j]
+    elif is_dynamic(state, j):
+        speed, gain = dot(bodies.linear_velocity[j], ahead), character.push_force[i] * dt * bodies.inverse_mass[j]
+    else:
+        return
+    wanted = dot(wish, ahead)
+    more = min(gain, wanted - speed)
+    if more > 0.0:
+        if work.most_push[j] == 0.0:
+            work.pushed[work.pushes] = j
+            work.pushes += 1
+        work.push[j] = add_scaled(work.push[j], ahead, more)
+        work.most_push[j] = max(work.most_push[j], wanted)
+
+
+@inlined
+def tell(work, event, entity, other, normal, speed):
+    """Note an event; there is room for all of a step."""
+    k = work.events
+    work.event[k], work.entity[k], work.other[k] = event, entity, other
+    work.normal[k], work.speed[k] = normal, speed
+    work.events = k + 1
+
+
+@part
+def tell_hits(state, near, character, work, walker, floor, first, start, carried, stop):
+    """What it has run against on its own way, and which sensors it has come into."""
+    me = state.bodies.entity[walker.row]
+    for k in range(first, work.hits):
+        j, known = work.hit_row[k], work.hit_row[k] == floor
+        for m in range(first, k):
+            known |= work.hit_row[m] == j
+        if not known:
+            tell(work, HIT, me, state.bodies.entity[j], work.hit_out[k], work.hit_speed[k])
+    for k in range(walker.near):
+        j = near.row[k]
+        if is_sensor(state, j):
+            met = meets_on_way(state, near, walker, j, start, carried)
+            if met or meets_on_way(state, near, walker, j, carried, stop):
+                way = sub(stop, start)
+                tell(work, HIT, me, state.bodies.entity[j], divided(way, 0.0 - length(way)), length(way))
+
+
+# -- a step ----------------------------------------------------------------------------------------
+
+
+@part
+def move_one(state, near, character, ladder, work, i, dt):
+    """Where character i will be, into ``work.place``, and all that it knows then."""
+    bodies = state.bodies
+    start = add(bodies.position[i], bodies.offset[i])
+    up, skin = up_of(state, character, i), character.skin[i]
+    extents = half_extents(state, bodies.shape[i], i)
+    half = item(extents, 0)
+    for k in range(len(extents)):
+        half = min(half, item(extents, k))
+    velocity = add(character.velocity[i], character.pushed[i])
+    gravity = character.gravity[i]
+    if gravity != gravity:
+        gravity = length(state.gravity[0])
+    wish, jump_speed = wish_of(character, i, up), jump_speed_of(character, i, gravity)
+    max_fall, before = character.max_fall[i], character.state[i]
+    standing, climbing = before == FLOOR, before == CLIMB
+    # what carries it
+    ride, floor = scale(start, 0.0), row_of_floor(state, character, i)
+    if standing and (floor < 0 or not meets(state, i, floor) or is_sensor(state, floor)):
+        standing = False
+    if standing:
+        ride = ride_of(state, character, i, start, floor, up, dt)
+    # what is near
+    reach = (length(velocity) + length(wish) + abs(character.climb[i]) + jump_speed + gravity * dt) * dt + length(ride)
+    reach += character.step_height[i] + character.snap[i] + 20.0 * skin + NEAR_BY
+    low, high = start, start
+    for k in range(len(start)):
+        low = replace(low, k, item(start, k) - item(extents, k) - reach)
+        high = replace(high, k, item(start, k) + item(extents, k) + reach)
+    found = gather(state, near, i, low, high)
+    work.hits = 0
+    # times
+    character.since_floor[i] = 0.0 if standing else character.since_floor[i] + dt
+    character.since_press[i] += dt
+    character.since_wall[i] += dt
+    character.since_drop[i] += dt
+    if character.jump[i] and not character.held[i]:
+        character.since_press[i] = 0.0
+    character.held[i] = character.jump[i]
+    rising = dot(velocity, up)
+    if character.drop[i] and standing and character.since_drop[i] > DROPS_AGAIN:
+        side = one_way_of(state, floor)
+        if dot(side, side) > 0.0:
+            character.since_drop[i], standing, rising = 0.0, False, 0.0
+    dropping = character.since_drop[i] < DROPS_FOR
+    limit = math.cos(character.max_slope[i])
+    walker = Walker(i, start, extents, half, up, skin, limit, dropping, found)
+    # ride, and out of what has moved into it
+    at = start
+    if dot(ride, ride) > 0.0:
+        at = slide(state, near, character, work, walker, at, ride, False, True, floor)
+    carried_hits, crusher = work.hits, -1
+    disturbed = state.statics_version != work.statics_version or work.hits > 0 or character.since_floor[i] > 0.1 * NEVER
+    for k in range(found):  # beside what rests nothing can have moved into it
+        disturbed |= state.dynamic <= near.row[k] < state.moving
+    if disturbed:
+        at, crusher = part_out(state, near, character, work, walker, at, rising)
+    if crusher >= 0:
+        into_static, _ = deepest(state, near, character, walker, at, state.moving, 1e-6)
+        if into_static >= 0:
+            at = start
+    carried = at
+    # ladders
+    ladder_near = takes_ladder(state, near, ladder, walker, at)
+    if ladder_near and character.climb[i] != 0.0 and not (standing and character.climb[i] < 0.0):
+        climbing = True
+    climbing = climbing and ladder_near
+    # jumps
+    level = across(velocity, up)
+    kept, lift = scale(ride, 1.0 / dt), dot(ride, up) / dt
+    if character.leave[i] == LEAVE_NOTHING:
+        kept, lift = scale(ride, 0.0), 0.0
+    kept = across(kept, up) if character.leave[i] == LEAVE_ALL else scale(ride, 0.0)
+    if standing or climbing:
+        character.air_jumped[i] = 0
+    jumped = False
+    if character.since_press[i] <= character.buffer[i]:
+        if climbing or character.since_floor[i] <= character.coyote[i]:
+            level = add(level, kept) if standing else level
+            rising, jumped = jump_speed + max(lift, 0.0), True
+        elif character.wall_jump[i] > 0.0 and character.since_wall[i] <= character.coyote[i]:
+            level = scale(character.wall_normal[i], character.wall_jump[i])
+            rising, jumped = character.wall_jump_up[i], True
+            rising = rising if rising == rising else jump_speed
+        elif character.air_jumped[i] < character.air_jumps[i] and character.since_press[i] == 0.0:
+            character.air_jumped[i] += 1
+            rising, jumped = jump_speed, True
+        if jumped:
+            character.since_press[i] = character.since_floor[i] = character.since_wall[i] = NEVER
+            character.jumping[i], standing, climbing = True, False, False
+    normal = character.floor_normal[i]
+    if standing and dot(normal, up) == 0.0:  # wedged: it falls each step, and lands in it again
+        standing = False
+    if character.jumping[i] and not jumped:
+        if rising <= 0.0:
+            character.jumping[i] = False
+        elif not character.jump[i]:
+            rising *= character.jump_cut[i]
+            character.jumping[i] = False
+    # speed
+    rate = (character.acceleration[i] if standing or climbing else character.air_acceleration[i]) * dt
+    change, pushed = sub(wish, level), character.pushed[i]
+    if dot(change, pushed) < 0.0:  # it does not brake what pushes it
+        change = add_scaled(change, pushed, 0.0 - dot(change, pushed) / dot(pushed, pushed))
+    size = length(change)
+    level = add(level, change if size <= rate else scale(change, rate / size))
+    # its own way
+    state_now, ground, out, fell = AIR, -1, up, rising
+    if climbing:
+        rising = character.climb[i]
+        at = slide(
+            state, near, character, work, walker, at, scale(add_scaled(level, up, rising), dt), False, False, -1
+        )
+        state_now = CLIMB
+    elif standing:
+        way = scale(along_floor(level, normal, up), dt)
+        at = slide(state, near, character, work, walker, at, way, True, False, -1)
+        blocked = -1
+        for k in range(carried_hits, work.hits):
+            if dot(work.hit_out[k], up) < limit and dot(work.hit_out[k], level) < 0.0:
+                blocked = work.hit_row[k]
+        if blocked >= 0 and character.step_height[i] > 0.0 and not is_dynamic(state, blocked):
+            hits = work.hits
+            done = length(sub(at, carried))
+            taken, to = step_over(state, near, character, work, walker, at, way, done, character.step_height[i])
+            if taken:
+                at, blocked = to, -1
+            work.hits = hits
+        j, gap, found_out = floor_below(state, near, character, walker, at, character.snap[i])
+        if j >= 0:
+            at = lowered(state, near, character, walker, at, gap)
+            state_now, ground, out = FLOOR, j, found_out
+        else:
+            velocity = along_floor(level, normal, up)
+            level = add(across(velocity, up), kept)
+            rising = dot(velocity, up) + max(lift, 0.0 - max_fall)
+            character.since_floor[i] = 0.0
+        gone = sub(at, carried)
+        if blocked >= 0 and dot(gone, gone) < 0.25 * dot(way, way):
+            level = scale(level, 0.0)
+    if state_now == AIR and not standing:
+        start_rising = rising
+        rising = max(rising - gravity * dt, 0.0 - max_fall)
+        slowest = character.wall_slide[i]
+        if slowest == slowest and character.on_wall[i] and dot(wish, character.wall_normal[i]) < 0.0:
+            rising = max(rising, 0.0 - slowest)
+        begin, first, fell = at, work.hits, rising
+        mean = 0.5 * (start_rising + rising)
+        at = slide(
+            state, near, character, work, walker, at, scale(add_scaled(level, up, mean), dt), False, False, -1
+        )
+        velocity, wedge, steep = add_scaled(level, up, rising), False, False
+        for k in range(first, work.hits):
+            hit, rise = work.hit_out[k], dot(work.hit_out[k], up)
+            if rise > -1e-3 and length(across(hit, up)) > 1e-3:
+                steep = True
+                for m in range(first, k):
+                    other = work.hit_out[m]
+                    wedge |= dot(across(hit, up), other) < -EXACT and dot(other, up) > -1e-3
+            if rise < limit or rising <= 0.0:
+                velocity = add_scaled(velocity, hit, 0.0 - min(0.0, dot(velocity, hit)))
+        level, rising = across(velocity, up), dot(velocity, up)
+        if not jumped and rising <= EXACT:
+            j, gap, found_out = floor_below(state, near, character, walker, at, 2.0 * skin)
+            stayed = abs(dot(sub(at, begin), up)) < 1e-3 * abs(2.0 * mean) * dt + 1e-6
+            if j >= 0:
+                at = lowered(state, near, character, walker, at, gap)
+                state_now, ground, out = FLOOR, j, found_out
+            elif wedge and stayed:  # between two slopes that are both too steep
+                state_now, ground, out = FLOOR, work.hit_row[work.hits - 1], scale(up, 0.0)
+            elif steep:
+                state_now = STEEP
+    if not disturbed and is_inside(state, near, character, walker, at):  # it was put there, or came from behind a chain
+        at, crusher = part_out(state, near, character, work, walker, at, rising)
+    # what it knows in the end
+    if state_now == FLOOR:
+        character.since_floor[i], rising = 0.0, 0.0
+        character.jumping[i] = False
+        stands_on(state, character, i, ground, out)
+        if before != FLOOR and before != CLIMB:
+            tell(work, LANDED, bodies.entity[i], bodies.entity[ground], out, max(0.0, 0.0 - fell))
+    else:
+        character.floor_entity[i], character.floor_row[i], character.floor_normal[i] = -1, -1, scale(up, 0.0)
+    wall, ceiling = -1, False
+    for k in range(work.hits):
+        j, hit = work.hit_row[k], work.hit_out[k]
+        side = across(hit, up)
+        if length(side) > WALL:
+            wall = j
+            character.wall_normal[i] = divided(side, length(side))
+        ceiling |= dot(hit, up) < CEILING
+        push(state, character, work, walker, i, j, hit, wish, dt)
+    character.on_wall[i], character.on_ceiling[i] = wall >= 0, ceiling
+    character.wall_entity[i] = bodies.entity[wall] if wall >= 0 else -1
+    if wall >= 0 and state_now == AIR:
+        character.since_wall[i] = 0.0
+    by = bodies.entity[crusher] if crusher >= 0 else -1
+    if by >= 0:
+        level, rising = scale(level, 0.0), 0.0
+        if character.crushed[i] < 0:
+            tell(work, CRUSHED, bodies.entity[i], by, scale(up, 0.0), 0.0)
+    character.crushed[i] = by
+    for k in range(carried_hits, work.hits):
+        work.hit_speed[k] *= length(sub(at, carried)) / dt if work.hit_speed[k] > 0.0 else 0.0
+    tell_hits(state, near, character, work, walker, ground, carried_hits, start, carried, at)
+    character.state[i], work.velocity[i] = state_now, add_scaled(level, up, rising)
+    character.floor_velocity[i] = scale(ride, 1.0 / dt)
+    work.place[i] = add(bodies.position[i], sub(at, start))
