@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
+
 from ...framework.compilation import inlined, part
-from ...framework.vectors import add_scaled, dot, length, negative, scale, sub
+from ...framework.vectors import add, add_scaled, dot, length, negative, scale, sub
 from ...systems.queries.compiled import Path, box_interval, cast, inverse_of, is_sensor, overlap
 from .records import EXACT
 
 REACH = 10.0  # skins that a cast looks beyond its way
 FOOT = 0.8  # of the half extent: what touches farther out is no floor
 LEAN = 0.1  # of the half extent: how far it leans towards an edge to see what is behind it
+STEEPEST = 0.01  # rise of a normal along up: less is a wall
+EDGE_SINE = 1e-3  # of a normal to up: less is flat
+STEEP_GROUND, SLOPE, EDGE, RIM = range(4)
 ONE_WAY = 0.5  # cosine from which a normal is that of the side that holds
 
 
@@ -53,11 +58,11 @@ def meet_character(state, walker, j, at, way):
 
 @part
 def cast_near(state, near, character, walker, at, way, reach, ignored):
-    """(row, distance, out) of what opposes a way first; row -1: it is free."""
-    best, first, normal = -1, reach, way
+    """(row, distance, out, point) of what opposes a way first; row -1: it is free."""
+    best, first, normal, touch = -1, reach, way, at
     path = Path(at, way, inverse_of(way), walker.half_extents)
     for k in range(walker.near):
-        j = near.row[k]
+        j, point = near.row[k], way
         if j == ignored or is_sensor(state, j):
             continue
         if character.present[j]:
@@ -66,14 +71,14 @@ def cast_near(state, near, character, walker, at, way, reach, ignored):
             enter, leave = box_interval(state.bodies.lower[j], state.bodies.upper[j], path, first)
             if enter > leave:
                 continue
-            touches, distance, out, _ = cast(state, near, walker.row, j, path, first, first)
+            touches, distance, out, point = cast(state, near, walker.row, j, path, first, first)
         along = dot(out, way)
         if not touches or distance >= first or along >= -EXACT or not holds(state, walker, j, out, distance):
             continue
         if distance <= 0.0 and is_dynamic(state, j) and along > -0.5:
             continue
-        best, first, normal = j, distance, out
-    return best, first, normal
+        best, first, normal, touch = j, distance, out, point
+    return best, first, normal, touch
 
 
 @part
@@ -89,24 +94,31 @@ def is_inside(state, near, character, walker, at):
 
 
 @part
-def is_walkable(state, walker, j, out, at, point):
-    """Whether it can stand there. At an edge what is behind it decides, not the rounded foot: moved towards it and up,
-    the normal turns up; that of a slope does not."""
-    rise = dot(out, walker.up)
-    if rise >= walker.limit:
-        return True
-    if rise < 0.1 or length(across(point, walker.up)) > FOOT * walker.half:
-        return False
-    level = across(out, walker.up)
-    step = LEAN * walker.half
-    to = add_scaled(add_scaled(at, level, 0.0 - step / length(level)), walker.up, 2.0 * step / rise)
-    _, turned, _ = overlap(state, walker.row, j, to)
-    return dot(turned, walker.up) > rise + 1e-3
+def ground_kind(state, walker, j, out, at, point):
+    """Whether what it touches there is too steep, a slope that it can walk on, an edge that it can stand on, or the rim
+    of one, too far out to stand on.
+
+    At an edge the foot's normal turns as the foot moves: that is tried a little towards it and upwards.
+    """
+    rise, level = dot(out, walker.up), across(out, walker.up)
+    sine, arm = length(level), length(across(point, walker.up))
+    if rise < STEEPEST:
+        return STEEP_GROUND
+    if sine > EDGE_SINE and arm > 0.0:
+        step = LEAN * walker.half
+        lift = 2.0 * step / max(rise, 0.1)
+        to = add_scaled(add_scaled(at, level, 0.0 - step / sine), walker.up, lift)
+        _, turned, _ = overlap(state, walker.row, j, to)
+        x, y = arm - step, arm * rise / sine + lift  # from a point to the middle of the foot
+        if 2.0 * (dot(turned, walker.up) - rise) >= y / math.sqrt(x * x + y * y) - rise:
+            return EDGE if arm <= FOOT * walker.half else RIM
+    return SLOPE if rise >= walker.limit else STEEP_GROUND
 
 
 @part
 def floor_below(state, near, character, walker, at, reach):
-    """(row, gap, out) of the floor that it can walk on within reach, and how far it may go down; row -1: none.
+    """(row, gap, out, height) of the floor that it can walk on within reach, and how far it may go down; row -1: none.
+    height: of the touch along up, nan where something else keeps it from getting there.
 
     What is too steep in between only limits the way: it stands on a floor although a steep wall is nearer.
     """
@@ -114,7 +126,7 @@ def floor_below(state, near, character, walker, at, reach):
     far = reach + REACH * skin
     down = negative(up)
     path = Path(at, down, inverse_of(down), walker.half_extents)
-    best, gap, normal, blocked = -1, far, up, far
+    best, gap, normal, blocked, rim, height, rim_height = -1, far, up, far, far, math.nan, math.nan
     for k in range(walker.near):
         j = near.row[k]
         if is_sensor(state, j):
@@ -131,17 +143,25 @@ def floor_below(state, near, character, walker, at, reach):
         if not touches or rise <= EXACT or not holds(state, walker, j, out, distance):
             continue
         here = distance - skin / max(rise, 0.1)
-        walkable = rise >= walker.limit
-        if not walkable and not character.present[j]:
-            walkable = is_walkable(state, walker, j, out, add_scaled(at, down, distance), point)
-        if walkable:
+        kind = SLOPE if rise >= walker.limit else STEEP_GROUND
+        if not character.present[j]:
+            kind = ground_kind(state, walker, j, out, add_scaled(at, down, distance), point)
+        if kind == SLOPE or kind == EDGE:
             if here < gap:
-                best, gap, normal = j, here, out if rise >= walker.limit else up
+                best, gap, normal = j, here, out if kind == SLOPE else up
+                height = dot(add(at, point), up) - distance
+        elif kind == RIM:
+            if here < rim:
+                rim, rim_height = here, dot(add(at, point), up) - distance
         elif here < blocked:
             blocked = here
-    if best >= 0 and (gap > reach or gap - max(blocked, 0.0) > 2.0 * skin):
+    if best >= 0 and (gap > reach + EXACT or gap - max(blocked, 0.0) > 2.0 * skin):
         best = -1
-    return best, min(gap, max(blocked, 0.0)), normal
+    if rim < gap:
+        gap, height = max(rim, 0.0), rim_height
+    if blocked < gap:
+        gap, height = max(blocked, 0.0), math.nan
+    return best, gap, normal, height
 
 
 @part
@@ -150,7 +170,7 @@ def lowered(state, near, character, walker, at, gap):
     if gap >= 0.0 or gap > -1e-12:
         return add_scaled(at, walker.up, 0.0 - gap) if gap > 1e-12 else at
     skin = walker.skin
-    j, distance, _ = cast_near(state, near, character, walker, at, walker.up, 0.5 * skin - gap, -1)
+    j, distance, _, _ = cast_near(state, near, character, walker, at, walker.up, 0.5 * skin - gap, -1)
     rise = 0.0 - gap if j < 0 else min(0.0 - gap, max(0.0, distance - 0.5 * skin))
     return add_scaled(at, walker.up, rise)
 

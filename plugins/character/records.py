@@ -34,7 +34,8 @@ WORK = Schema(
     other=ints(),
     normal=vectors(unit="1"),
     speed=floats(unit="m/s"),
-    hits=integer(),  # of the character at work
+    blocked=integer(),  # row that the character at work has walked against; -1: none
+    hits=integer(),  # what it has met
     hit_row=ints(),
     hit_out=vectors(unit="1"),
     hit_speed=floats(unit="m/s"),

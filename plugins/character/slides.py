@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...framework.compilation import inlined, part
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, scale, sub
 from ...systems.queries.compiled import is_sensor, overlap
-from .casts import ONE_WAY, REACH, across, cast_near, deepest, is_dynamic, one_way_of
+from .casts import ONE_WAY, REACH, SLOPE, across, cast_near, deepest, ground_kind, is_dynamic, one_way_of
 from .records import EXACT, MOST_HITS, SLIDES
 
 MOST_PLANES = 32
@@ -56,12 +56,30 @@ def clipped(work, left):
     return along
 
 
+@inlined
+def along_floor(way, normal, up):
+    """A way across up, as long along the floor of that normal."""
+    size, rise = length(way), dot(normal, up)
+    if size == 0.0 or rise <= 0.0:
+        return way
+    tilted = add_scaled(way, up, 0.0 - dot(way, normal) / rise)
+    return scale(tilted, size / length(tilted))
+
+
+@part
+def climbs(state, character, walker, j, out, at, point):
+    """Whether it walks on along what it meets; edges are stepped over, but for those of what can be pushed."""
+    if character.present[j] or is_dynamic(state, j):
+        return dot(out, walker.up) >= walker.limit
+    return ground_kind(state, walker, j, out, at, point) == SLOPE
+
+
 @part
 def slide(state, near, character, work, walker, at, wish, is_walking, is_carried, ignored):
     """Where it gets by moving by ``wish`` and along what it meets.
 
     is_walking
-        what is steep is as a wall
+        what is too steep or an edge is as a wall, and it is as fast along a slope
     is_carried
         it may also be moved back
     """
@@ -72,7 +90,7 @@ def slide(state, near, character, work, walker, at, wish, is_walking, is_carried
         if size < EXACT:
             break
         way = divided(left, size)
-        j, distance, out = cast_near(state, near, character, walker, at, way, size + REACH * skin, ignored)
+        j, distance, out, point = cast_near(state, near, character, walker, at, way, size + REACH * skin, ignored)
         if j < 0:
             return add(at, left)
         slope = 0.0 - dot(out, way)
@@ -82,10 +100,12 @@ def slide(state, near, character, work, walker, at, wish, is_walking, is_carried
         at = add_scaled(at, way, free)
         left = add_scaled(left, way, 0.0 - free)
         note_hit(work, j, out, slope)
-        rise = dot(out, walker.up)
-        if is_walking and -0.1 < rise < walker.limit:
-            level = across(out, walker.up)
-            out = divided(level, length(level))
+        if is_walking:
+            if climbs(state, character, walker, j, out, add_scaled(at, way, distance - free), point):
+                left = along_floor(across(left, walker.up), out, walker.up)
+            elif dot(out, walker.up) > -0.1:
+                level = across(out, walker.up)
+                out, work.blocked = divided(level, length(level)), j
         add_plane(work, out, 0.0)
         left = clipped(work, left)
         if not is_carried and dot(left, wish) <= 0.0:

@@ -32,7 +32,7 @@ from .records import (
     STEEP,
     Walker,
 )
-from .slides import cross, part_out, slide
+from .slides import along_floor, cross, part_out, slide
 
 FARTHEST_CARRIED = 1.0  # m in a step; what goes farther was put elsewhere
 NEAR_BY = 0.25  # m: room around what it may reach in a step
@@ -71,16 +71,6 @@ def wish_of(character, i, up):
     for k in range(3):
         wish = replace(wish, k, character.move[i, k])
     return across(wish, up)
-
-
-@inlined
-def along_floor(way, normal, up):
-    """A way across up, as long along the floor of that normal."""
-    size, rise = length(way), dot(normal, up)
-    if size == 0.0 or rise <= 0.0:
-        return way
-    tilted = add_scaled(way, up, 0.0 - dot(way, normal) / rise)
-    return scale(tilted, size / length(tilted))
 
 
 @inlined
@@ -183,24 +173,22 @@ def takes_ladder(state, near, ladder, walker, at):
 
 @part
 def step_over(state, near, character, work, walker, at, wish, done, height):
-    """(taken, place) of going over an edge: up, forward and down, if that leads farther, to a floor."""
-    up, skin = walker.up, walker.skin
+    """(taken, place) of going over an edge: up, forward and down, if that leads farther than it has done, to a floor
+    that is at most so high."""
+    up, size = walker.up, length(wish)
     top = slide(state, near, character, work, walker, at, scale(up, height), False, True, -1)
-    raised = dot(sub(top, at), up)
-    if raised < skin:
-        return False, at
-    size = length(wish)
-    level = across(wish, up)
-    rest = max(size - done, 3.0 * skin)
+    level, raised = across(wish, up), dot(sub(top, at), up)
     ahead = divided(level, length(level))
-    over = slide(state, near, character, work, walker, top, scale(ahead, rest), False, False, -1)
-    if dot(sub(over, top), ahead) < 2.0 * skin:
+    over = slide(state, near, character, work, walker, top, scale(ahead, size), False, False, -1)
+    if dot(sub(over, top), ahead) <= dot(done, ahead) + EXACT:
         return False, at
-    j, gap, _ = floor_below(state, near, character, walker, over, raised)
-    down = add_scaled(over, up, 0.0 - gap)
-    if j < 0 or gap < -EXACT or dot(sub(down, at), up) <= 1e-6:
+    j, gap, _, floor_height = floor_below(state, near, character, walker, over, raised)
+    foot = dot(at, up) - walker.skin
+    for k in range(len(up)):
+        foot -= abs(item(up, k)) * item(walker.half_extents, k)
+    if j < 0 or gap < -EXACT or not floor_height - foot <= height + walker.skin:
         return False, at
-    return True, down
+    return True, add_scaled(over, up, 0.0 - gap)
 
 
 @part
@@ -376,20 +364,17 @@ def move_one(state, near, character, ladder, work, i, dt):
         )
         state_now = CLIMB
     elif standing:
-        way = scale(along_floor(level, normal, up), dt)
+        way, work.blocked = scale(along_floor(level, normal, up), dt), -1
         at = slide(state, near, character, work, walker, at, way, True, False, -1)
-        blocked = -1
-        for k in range(carried_hits, work.hits):
-            if dot(work.hit_out[k], up) < limit and dot(work.hit_out[k], level) < 0.0:
-                blocked = work.hit_row[k]
+        blocked = work.blocked
         if blocked >= 0 and character.step_height[i] > 0.0 and not is_dynamic(state, blocked):
             hits = work.hits
-            done = length(sub(at, carried))
-            taken, to = step_over(state, near, character, work, walker, at, way, done, character.step_height[i])
+            done, high = sub(at, carried), character.step_height[i]
+            taken, to = step_over(state, near, character, work, walker, carried, way, done, high)
             if taken:
                 at, blocked = to, -1
             work.hits = hits
-        j, gap, found_out = floor_below(state, near, character, walker, at, character.snap[i])
+        j, gap, found_out, _ = floor_below(state, near, character, walker, at, character.snap[i])
         if j >= 0:
             at = lowered(state, near, character, walker, at, gap)
             state_now, ground, out = FLOOR, j, found_out
@@ -424,7 +409,7 @@ def move_one(state, near, character, ladder, work, i, dt):
                 velocity = add_scaled(velocity, hit, 0.0 - min(0.0, dot(velocity, hit)))
         level, rising = across(velocity, up), dot(velocity, up)
         if not jumped and rising <= EXACT:
-            j, gap, found_out = floor_below(state, near, character, walker, at, 2.0 * skin)
+            j, gap, found_out, _ = floor_below(state, near, character, walker, at, 2.0 * skin)
             stayed = abs(dot(sub(at, begin), up)) < 1e-3 * abs(2.0 * mean) * dt + 1e-6
             if j >= 0:
                 at = lowered(state, near, character, walker, at, gap)
