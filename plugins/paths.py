@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 
 from ..components import RigidBody, Transform
-from ..framework import Component, NoPhysicsError, Phase, Plugin, System, World, array_column, column
+from ..framework import Component, Phase, Plugin, System, array_column, column
 from ..framework.data.arrays.column import ArrayColumn
 from ..framework.data.columns import Column
 from ..framework.typing import ArrayField
@@ -105,15 +105,9 @@ class Paths(Plugin):
     """Moves the bodies that have a :class:`Path`: at the end of each step they are on it."""
 
     def __init__(self) -> None:
-        super().__init__("paths", version="1.0")
-        self.components = (Path,)
+        super().__init__("paths", version="1.0", needs_physics=True)
+        self.component(Path)
         self.system(FollowPaths)
-
-    def install(self, world: World) -> None:
-        """Called by the world; NoPhysicsError if it has none."""
-        if world.physics is None:
-            raise NoPhysicsError("paths need physics before them: World(Physics(...), Paths())")
-        super().install(world)
 
 
 class FollowPaths(System):
@@ -125,8 +119,6 @@ class FollowPaths(System):
     def process(self, dt: float) -> None:
         table, bodies = self.world.physics.table, self.world.bodies.kinematic
         self._refuse_loose()
-        if Path not in table.mask_names:
-            return
         rows = np.flatnonzero(table.has_mask(Path)[: table.count])
         own = rows - bodies.rows.start
         if not len(rows):

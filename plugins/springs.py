@@ -16,7 +16,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from ..framework import Bodies, CaromError, ForceSystem, NoPhysicsError, Phase, Plugin, System, World
+from ..framework import Bodies, CaromError, ForceSystem, Phase, Plugin, System, World
 
 __all__ = ["Spring", "Springs"]
 
@@ -100,7 +100,8 @@ class Springs(Plugin):
     """
 
     def __init__(self) -> None:
-        super().__init__("springs", version="1.0")
+        super().__init__("springs", version="1.0", needs_physics=True)
+        self.event("spring_lost")
         self.world: World | None = None
         self._springs: dict[Spring, None] = {}
         self._columns: _Columns | None = None  # of the present springs
@@ -111,14 +112,11 @@ class Springs(Plugin):
 
     def install(self, world: World) -> None:
         """Called by the world; ValueError if these springs are in another one that is not closed."""
-        if world.physics is None:
-            raise NoPhysicsError("springs need physics before them: World(Physics(...), springs)")
         if self.world is not None and not self.world.closed:
             raise ValueError(f"these springs belong to world {self.world.name!r}: each world takes its own Springs()")
-        self.world = world
-        world.events.define("spring_lost")
-        self.clear()
         super().install(world)
+        self.world = world
+        self.clear()
 
     def connect(
         self, a: int, b: int, rest_length: float | None = None, *, stiffness: float, damping: float = 0.0,

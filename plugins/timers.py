@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..framework import Component, NoPhysicsError, Phase, Plugin, System, World, column
+from ..framework import Component, Phase, Plugin, System, column
 from ..framework.data.columns import special_column
 
 __all__ = ["Timer", "Timers"]
@@ -46,17 +46,11 @@ class Timers(Plugin):
     """Counts the timers of a world, in steps: they stand still while it does."""
 
     def __init__(self) -> None:
-        super().__init__("timers", version="1.0")
-        self.components = (Timer,)
+        super().__init__("timers", version="1.0", needs_physics=True)
+        self.component(Timer)
+        self.event("timer")
         self.system(StartTimers)
         self.system(FireTimers)
-
-    def install(self, world: World) -> None:
-        """Called by the world; NoPhysicsError if it has none."""
-        if world.physics is None:
-            raise NoPhysicsError("timers need physics before them: World(Physics(...), Timers())")
-        world.events.define("timer")
-        super().install(world)
 
 
 class OfTimers(System):
@@ -78,8 +72,6 @@ class OfTimers(System):
     def rows(self) -> tuple[np.ndarray, list[np.ndarray]]:
         """The rows of bodies with a timer, and the arrays of its columns."""
         table = self.world.physics.table
-        if Timer not in table.mask_names:
-            return np.empty(0, np.int64), []
         arrays = [table.arrays[each.key] for each in Timer.columns.values()]
         return np.flatnonzero(table.has_mask(Timer)[: table.count]), arrays
 

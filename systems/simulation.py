@@ -370,6 +370,7 @@ class Simulation:
             "ids_changed": state.ids_changed or self.table.generation != self._generation,
             "quarantine": self.quarantine.saved(),
             "sleepers": self.sleepers.saved(),
+            "records": self.plugin_stages.saved(),
             "counters": counters_of(state),
         }
 
@@ -381,6 +382,7 @@ class Simulation:
         put_rows_back(state.contacts, CONTACT_ROWS, saved["contacts"])
         state.warm_start.rows_version[:] = -1
         self.sleepers.take_back(saved.get("sleepers"))
+        self.plugin_stages.take_back(saved.get("records", {}))
         self._generation, state.ids_changed = self.table.generation, saved["ids_changed"]
         if self.quarantine.take_back(saved["quarantine"]) or moved or not saved["followed"]:
             self.scene.forget()

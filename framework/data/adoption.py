@@ -119,8 +119,10 @@ class Adoption:
 
     def register(self, components: Iterable[type[Component]]) -> None:
         """Columns of these types exist from now on, whether a body has them or not; ValueError for taken names."""
+        components = tuple(components)
         for component in components:
             self.table.check_component_type(component)
+        for component in components:
             self.table.add_component_type(component)
 
     def release(self) -> None:

@@ -298,6 +298,19 @@ def is_column(field: Any) -> bool:
     return isinstance(field, Column) and not field.stacked
 
 
+def check_component(plugin: Any, component: Any) -> None:
+    where = f"plugin {plugin.name}: component {_name(component)}"
+    if not (isinstance(component, type) and issubclass(component, Component)) or component._abstract:
+        raise PluginError(f"{where}: register a class derived from Component, got {component!r}")
+    if component.plugin not in ("", plugin.name):
+        raise PluginError(f"{where} says that its plugin is {component.plugin!r}")
+
+
+def check_record(plugin: Any, schema: Any) -> None:
+    if not isinstance(schema, Schema):
+        raise PluginError(f"plugin {plugin.name}: record takes a Schema, got {schema!r}")
+
+
 def check_system(plugin: Any, make: Any) -> None:
     if not callable(make):
         raise PluginError(f"plugin {plugin.name}: system takes a class, or a function that makes one, got {make!r}")

@@ -11,7 +11,7 @@ from typing import Any, ParamSpec, TypeVar
 
 from ..compilation import inlined, part, pasted
 from ..data.component import Component
-from ..errors import PluginError
+from ..errors import NoPhysicsError, PluginError
 from ..jit.records.schema import Schema
 from ..settings import Settings
 from ..vectors import dot, scale
@@ -49,18 +49,24 @@ class Plugin:
         of the plugin, in messages and in ``carom plugins``
     version
         of the plugin, for ``carom plugins``
+    needs_physics
+        whether a world without physics, or one in which it comes before Physics, refuses it with a NoPhysicsError
 
     Registering is checked at once: a function that cannot work is refused with a PluginError that names it, before
     anything is compiled. What is registered while worlds run is seen at their next step; to register something again
     replaces it. ValueError without a name.
     """
 
-    def __init__(self, name: str, version: str = "") -> None:
+    def __init__(self, name: str, version: str = "", *, needs_physics: bool = False) -> None:
         if not isinstance(name, str) or not name:
             raise ValueError(f"a plugin needs a name, got {name!r}")
         self.name = name
         self.version = version
+        self.needs_physics = needs_physics
         self.components: tuple[type[Component], ...] = ()  # those that saved worlds have, beside those of its stages
+        self.declared: dict[type[Component], type[Component]] = {}  # those of them that bodies have columns of
+        self.events: dict[str, str] = {}
+        self.records: dict[str, Schema] = {}
         self.shapes: dict[type[Component], Shape] = {}
         self.pairs: dict[tuple[type[Any], type[Any]], Pair] = {}
         self.integrators: dict[str, Any] = {}
@@ -156,6 +162,30 @@ class Plugin:
             return function
 
         return register
+
+    # -- what its systems use ---------------------------------------------------------------------
+
+    def component(self, component: ShapeClass) -> ShapeClass:
+        """Register a class of components: ``bodies`` of each world with the plugin have its columns, whether a body has
+        one or not, and files hold them. PluginError if bodies have columns of these names already."""
+        checks.check_component(self, component)
+        self._register(self.declared, component, component)
+        self.components = tuple(dict.fromkeys((*self.components, component)))
+        return component
+
+    def event(self, *names: str) -> None:
+        """Register events by their ``names``: ``world.on(name, handler)`` takes them, and its systems send them with
+        ``world.dispatch_event(name, ...)``."""
+        for name in names:
+            checks.check_name(f"plugin {self.name}: event {name!r}", name)
+            self._register(self.events, name, name)
+
+    def record(self, schema: Schema) -> Schema:
+        """Register a record of numbers and columns that belong to no body: each world that takes the plugin has one,
+        ``world.record(schema)``. What is in it belongs to snapshots and files."""
+        checks.check_record(self, schema)
+        self._register(self.records, schema.name, schema)
+        return schema
 
     # -- other things -----------------------------------------------------------------------------
 
@@ -278,7 +308,13 @@ class Plugin:
     # -- being taken by a world -------------------------------------------------------------------
 
     def install(self, world: Any) -> None:
-        """Called by the world after all its plugins are registered; all of it, or an error and nothing."""
+        """Called by the world after all its plugins are registered; all of it, or an error and nothing.
+
+        NoPhysicsError if it needs physics and there is none.
+        """
+        if self.needs_physics and world.physics is None:
+            own = "plugin" if type(self) is Plugin else f"{type(self).__name__}()"
+            raise NoPhysicsError(f"plugin {self.name} needs physics before it: World(Physics(...), {own})")
         self._add_systems(world, self.systems)
 
     # -- snapshots --------------------------------------------------------------------------------
@@ -318,6 +354,8 @@ class Plugin:
             "pair filters": [function.__name__ for function in self.pair_filters],
             "stages": list(self.stages),
             "joints": [component.__name__ for component in self.joints],
+            "events": list(self.events),
+            "records": list(self.records),
             "systems": [getattr(make, "__name__", repr(make)) for make in self.systems],
         }
         return {kind: names for kind, names in found.items() if names}

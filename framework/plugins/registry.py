@@ -10,6 +10,7 @@ from ..data.component import Component
 from ..errors import PluginError
 from ..jit.records.schema import Schema
 from ..settings import AUTOMATIC, MIXING_RULES
+from ..world.events import CONTACT_EVENTS
 
 
 class Convex:
@@ -159,6 +160,11 @@ class Registry:
     pair_filters: list[tuple[str, Any]] = field(default_factory=list)  # (plugin, function)
     stages: dict[str, PluginStage] = field(default_factory=dict)
     joints: dict[type[Component], Any] = field(default_factory=dict)
+    components: dict[type[Component], Any] = field(default_factory=dict)
+    events: dict[str, str] = field(default_factory=dict)
+    records: dict[str, Schema] = field(default_factory=dict)
+    # of the world, called with components and events: PluginError for what it cannot have
+    declare: Callable[[Iterable[type[Component]], Iterable[str]], None] = lambda components, events: None
     check_stages: Callable[[Iterable[PluginStage]], Any] = tuple  # PluginError for what no step can have
 
     def require(self, component: type[Component], entity: int | None = None) -> None:
@@ -199,12 +205,17 @@ class Registry:
         mixing_rules: dict[str, Any] = {}
         stages: dict[str, PluginStage] = {}
         joints: dict[Any, Any] = {}
+        components: dict[Any, Any] = {}
+        events: dict[str, str] = {}
+        records: dict[str, Schema] = {}
         owners: dict[Any, str] = {}
         for plugin in self.plugins:
             kinds = (
                 ("shape", shapes, plugin.shapes), ("integrator", integrators, plugin.integrators),
                 ("broad phase", broad_phases, plugin.broad_phases), ("mixing rule", mixing_rules, plugin.mixing_rules),
                 ("stage", stages, plugin.stages), ("joint", joints, plugin.joints),
+                ("component", components, plugin.declared), ("event", events, plugin.events),
+                ("record", records, plugin.records),
             )  # fmt: skip
             for kind, known, fresh in kinds:
                 for key in fresh:
@@ -221,7 +232,7 @@ class Registry:
                             f"plugin {plugin.name}: {kind} {name} goes by the name of another class, of plugin "
                             f"{owners[kind, twin]}: columns are named after the class, so give it another name"
                         )
-                    if key in (*MIXING_RULES, AUTOMATIC):
+                    if key in (CONTACT_EVENTS if kind == "event" else (*MIXING_RULES, AUTOMATIC)):
                         raise PluginError(f"plugin {plugin.name}: {kind} {name} is one of carom's own names")
                 known.update(fresh)
             for (first, second), pair in plugin.pairs.items():
@@ -233,8 +244,10 @@ class Registry:
                     )
                 pairs[first, second] = pair
         self.check_stages(stages.values())
+        self.declare(components, events)
         self.shapes, self.pairs, self.integrators, self.stages = shapes, pairs, integrators, stages
         self.broad_phases, self.mixing_rules, self.joints = broad_phases, mixing_rules, joints
+        self.components, self.events, self.records = components, events, records
         self.pair_filters = [(plugin.name, each) for plugin in self.plugins for each in plugin.pair_filters]
         self.version += 1
 

@@ -41,6 +41,15 @@ class OfOneWorld:
 
     world: Any  # declare ``world: World`` in a class of your own to have it typed
 
+    def on_add(self, world: Any) -> None:
+        """Called once when it has joined ``world``, before it runs: when it is added, or at the end of that step.
+
+        If it raises, the call that added it does, or the step, and the system is not in the world.
+        """
+
+    def on_remove(self, world: Any) -> None:
+        """Called once when it has been removed from ``world``; not when the world closes."""
+
     def __getstate__(self) -> object:
         state = super().__getstate__()
         if isinstance(state, dict):

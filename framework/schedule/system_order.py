@@ -9,7 +9,7 @@ import esper
 
 from ..data import esper_bridge
 from ..errors import NoPhysicsError, ScheduleError
-from .phases import ForceSystem, Phase, System, in_order, means
+from .phases import ForceSystem, OfOneWorld, Phase, System, in_order, means
 
 PLACED = ("before", "after", "phase")  # attributes of a system that being added may set
 
@@ -29,6 +29,7 @@ class SystemOrder:
         self._later: list[Callable[[], None]] = []  # what is to happen to plain processors after the step
         self.changed = False  # whether something has been asked for that is not so yet
         self.foreign = True  # whether code that is not carom's runs in the step and may write any column
+        self._joined: list[OfOneWorld] = []  # those whose on_add has been called
         self._given: dict[int, dict[str, Any]] = {}  # what PLACED attributes a system had before it was added
 
     # -- adding -----------------------------------------------------------------------------------
@@ -61,6 +62,7 @@ class SystemOrder:
         self._refuse_twice(system, [*self.frame_systems, *self._wanted])
         self.frame_systems.append(system)
         system.world = self.world
+        self._tell()
 
     def _add_force_system(self, system: ForceSystem) -> None:
         if self.world.physics is None:
@@ -144,6 +146,7 @@ class SystemOrder:
                 return
         if any(system is other for other in self.frame_systems):
             self.frame_systems = [other for other in self.frame_systems if other is not system]
+            self._tell()
             return
         self.remove_processor(system)
 
@@ -190,6 +193,45 @@ class SystemOrder:
         if not _same(self._wanted, self.systems):
             self._place_systems()
         self.changed = False
+        self._note_change()
+        self._tell()
+
+    def _tell(self) -> None:
+        """Call on_add of what has joined, in order, and on_remove of what has left. What raises on joining is taken out
+        again; the first error is raised when all others have been called."""
+        errors: list[BaseException] = []
+        while True:
+            here = [*self.systems, *self.force_systems, *self.frame_systems]
+            left = next((s for s in self._joined if not any(s is other for other in here)), None)
+            come = (s for s in here if isinstance(s, OfOneWorld) and not any(s is other for other in self._joined))
+            system = next(come, None) if left is None else left
+            if system is None:
+                break
+            self._joined = [other for other in self._joined if other is not left]
+            try:
+                with esper_bridge.context(self.world.name):
+                    if left is not None:
+                        left.on_remove(self.world)
+                    else:
+                        self._joined.append(system)
+                        system.on_add(self.world)
+            except BaseException as error:
+                error.add_note(f"in {type(system).__name__}.{'on_add' if left is None else 'on_remove'}")
+                errors.append(error)
+                if left is None:
+                    self._take_out(system)
+        if errors:
+            raise errors[0]
+
+    def _take_out(self, system: OfOneWorld) -> None:
+        """As if it had never been added."""
+        lists = self._wanted, self._wanted_forces, self.frame_systems, self._joined
+        self._wanted, self._wanted_forces, self.frame_systems, self._joined = (  # type: ignore[assignment]
+            [other for other in each if other is not system] for each in lists
+        )
+        self.force_systems = list(self._wanted_forces)
+        if not _same(self._wanted, self.systems):
+            self._place_systems()
         self._note_change()
 
     def _place_systems(self) -> None:

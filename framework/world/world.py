@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import numbers
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from typing import Any, Never, Self, TypeVar
 
@@ -78,7 +78,7 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
             raise ValueError(f"an esper world named {name!r} exists already")
         self.name = name
         self.closed = False
-        self.registry = Registry()
+        self.registry = Registry(declare=self._declare)
         self.physics = None
         self.plugins = plugins
         self._settings = settings or Settings()
@@ -181,6 +181,18 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
             raise
         self.plugins = (*self.plugins, plugin)
 
+    def _declare(self, components: Iterable[type[Component]], events: Iterable[str]) -> None:
+        """Take what plugins declare; PluginError, and nothing is taken, if bodies have such columns already."""
+        if self.physics is not None:
+            fresh = [component for component in components if component not in self.physics.table.mask_names]
+            if fresh and self._pipeline.in_step:
+                raise PluginError(f"component {fresh[0].__name__} can be registered between steps only")
+            try:
+                self.physics.adoption.register(fresh)
+            except ValueError as error:
+                raise PluginError(str(error)) from None
+        self._events.define(*events)
+
     # -- settings and physics ---------------------------------------------------------------------
 
     @property
@@ -206,6 +218,7 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
         if self.physics is not None:
             raise ValueError("a world takes one Physics")
         self.physics = self._pipeline.physics = physics
+        self._declare(self.registry.components, ())
 
     @property
     def _services(self) -> PhysicsServices:

@@ -11,7 +11,7 @@ from ...components import RigidBody
 from ...components.part_of import Changes as PartChanges
 from ...components.part_of import PartOf
 from ...components.spin import Spin
-from ...framework import NoPhysicsError, Plugin, World
+from ...framework import Plugin, World
 from ...systems.double_buffers import BEFORE_STEP
 from ...systems.joints.own import Placed, rows_of
 from ...systems.joints.records import CUSTOM, FREE, HOLD, JOINTS, POINT, TURN
@@ -62,21 +62,21 @@ class Joints(Plugin):
     """
 
     def __init__(self) -> None:
-        super().__init__("joints", version="1.0")
+        super().__init__("joints", version="1.0", needs_physics=True)
+        self.event("joint_lost", "joint_broken")
         self.components = KINDS
         self.world: World | None = None
 
     def install(self, world: World) -> None:
         """Called by the world; ValueError if these joints are in another one that is not closed."""
-        if world.physics is None:
-            raise NoPhysicsError("joints need physics before them: World(Physics(...), Joints())")
         if self.world is not None and not self.world.closed:
             raise ValueError(f"these joints belong to world {self.world.name!r}: each world takes its own Joints()")
-        self.world, physics = world, world.physics
-        self._physics: Any = physics
-        self._record: Any = physics.record(JOINTS)
+        super().install(world)
+        self.world = world
+        self._physics: Any = world.physics
+        self._record: Any = self._physics.record(JOINTS)
         self._contents = world._contents()
-        self._rows = JointRows(self._record, physics.dimensions, world.registry)
+        self._rows = JointRows(self._record, self._physics.dimensions, world.registry)
         self._joints: dict[int, Joint] = {}  # those that have rows, by entity, which ascend
         self._holds: list[Holds] | None = None  # what columns() measures, once they are asked for
         # Entities that came, went or changed, and joints of which a field was set, since the last step.
@@ -88,11 +88,9 @@ class Joints(Plugin):
         self._parts_changes = PartChanges.count
         self._breaking = False
         self._contents.log.followers.append(self._touched)
-        world.events.define("joint_lost", "joint_broken")
         self._physics.plugin_stages.followers.append(self._follow)
         self._physics.plugin_stages.finishers.append(self._finish)
         self._physics.plugin_stages.waiting.append(self._waits)
-        super().install(world)
 
     def __len__(self) -> int:
         return len(self._present())

@@ -10,7 +10,7 @@ from ...components import Collider, RigidBody, Transform
 from ...components.part_of import Changes, PartOf, rows_of_parts
 from ...components.rigid_body import WEIGHTLESS
 from ...components.spin import Spin, mass_of_shape
-from ...framework import NoPhysicsError, Plugin, World
+from ...framework import Plugin, World
 from ...systems.parts.records import PARTS
 from .outline import Outline as Outline
 from .outline import Piece as Piece
@@ -34,22 +34,21 @@ class Parts(Plugin):
     """
 
     def __init__(self) -> None:
-        super().__init__("parts", version="1.0")
-        self.components = (PartOf,)
+        super().__init__("parts", version="1.0", needs_physics=True)
+        self.event("part_lost")
+        self.component(PartOf)
         self.world: World | None = None
 
     def install(self, world: World) -> None:
         """Called by the world; ValueError if these parts are in another one that is not closed."""
-        if world.physics is None:
-            raise NoPhysicsError("parts need physics before them: World(Physics(...), Parts())")
         if self.world is not None and not self.world.closed:
             raise ValueError(f"these parts belong to world {self.world.name!r}: each world takes its own Parts()")
-        self.world, physics = world, world.physics
-        self._physics: Any = physics
+        super().install(world)
+        self.world = world
+        self._physics: Any = world.physics
         self._table: Any = self._physics.table
-        self._record: Any = physics.record(PARTS)
+        self._record: Any = self._physics.record(PARTS)
         self._contents = world._contents()
-        self._physics.adoption.register((PartOf,))
         self._seen: Any = None  # what all of this depends on
         self._followed: Any = None  # of the parts when they were followed last: entities, fields, and what all share
         self._places: dict[int, Place] = {}
@@ -59,10 +58,8 @@ class Parts(Plugin):
         self._rows: Any = ()  # of the parts and of their bodies
         self._rows_version = -1
         self._looked_at: list[str] = []  # columns of their colliders
-        world.events.define("part_lost")
         self._physics.plugin_stages.adopters.append(self._follow)
         self._physics.plugin_stages.waiting.append(lambda: self._now() != self._seen)
-        super().install(world)
 
     def of(self, body: int) -> list[int]:
         """The parts of a body, by their entities."""

@@ -120,6 +120,15 @@ class PluginStages:
             self._records[schema] = make_record(schema, self._state.dimensions)
         return self._records[schema]
 
+    def saved(self) -> dict[str, Any]:
+        """Copies of the records that plugins have declared, by name."""
+        return {name: _values(self.record(schema)) for name, schema in self._registry.records.items()}
+
+    def take_back(self, saved: dict[str, Any]) -> None:
+        for name, values in saved.items():
+            if name in self._registry.records:
+                _put(self.record(self._registry.records[name]), values)
+
     def own(self, stage: Stage) -> Record | None:
         """What a stage of a plugin gets beside the state; None for others."""
         return next((own for each, own in self._own.items() if each.name == stage.name), None)
@@ -145,3 +154,20 @@ class PluginStages:
             "bodies spin": spins, "bodies spin, no joints": spins and not met["joints"],
             "no body spins, no joints": met["colliders"] and not spins and not met["joints"],
         }  # fmt: skip
+
+
+def _values(record: Record) -> dict[str, Any]:
+    """A copy of all that is in a record."""
+    fields = {name: getattr(record, name) for name in record.schema.fields}
+    return {
+        name: _values(value) if isinstance(value, Record) else value.copy() if isinstance(value, np.ndarray) else value
+        for name, value in fields.items()
+    }
+
+
+def _put(record: Record, values: dict[str, Any]) -> None:
+    for name, value in values.items():
+        if isinstance(value, dict):
+            _put(getattr(record, name), value)
+        else:
+            setattr(record, name, value.copy() if isinstance(value, np.ndarray) else value)

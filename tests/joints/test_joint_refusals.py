@@ -141,7 +141,7 @@ def test_bodies_that_do_not_exist_are_refused_at_the_call_and_what_comes_to_be_w
 @pytest.mark.plain
 def test_joints_belong_to_one_world_with_physics():
     joints = Joints()
-    with pytest.raises(Exception, match="need physics"):
+    with pytest.raises(Exception, match="needs physics"):
         World(Joints())
     _kept = World(Physics(dimensions=2), joints)
     with pytest.raises(ValueError, match="belong to world"):

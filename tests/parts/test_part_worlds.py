@@ -112,7 +112,7 @@ def test_what_does_not_go_together_is_refused_when_the_world_takes_it(components
 
 def test_parts_belong_to_one_world_with_physics():
     parts = Parts()
-    with pytest.raises(NoPhysicsError, match="need physics"):
+    with pytest.raises(NoPhysicsError, match="needs physics"):
         World(parts)
     with World(Physics(dimensions=2), parts), pytest.raises(ValueError, match="each world takes its own"):
         World(Physics(dimensions=2), parts)

@@ -260,6 +260,14 @@ MISTAKES = {
     "mixing rule is a text": (lambda plugin: plugin.mixing_rule("text")(lambda x, y: "a"), "return a number from 0"),
     "pair filter": (lambda plugin: plugin.pair_filter(lambda: None), r"takes \(\), it must take 3 arguments"),
     "system": (lambda plugin: plugin.system(3), "system takes a class"),
+    "component": (lambda plugin: plugin.component(7), "register a class derived from Component, got 7"),
+    "base of components": (lambda plugin: plugin.component(Collider), "register a class derived from Component, got"),
+    "component of another": (
+        lambda plugin: plugin.component(type("Fuse", (Component,), {"plugin": "bombs", "left": column(0.0)})),
+        "component Fuse says that its plugin is 'bombs'",
+    ),
+    "event": (lambda plugin: plugin.event(3), "event 3: it needs a name"),
+    "record": (lambda plugin: plugin.record({}), "record takes a Schema, got {}"),
     "kernel": (lambda plugin: plugin.kernel(3), "kernel takes a function"),
 }  # fmt: skip
 
@@ -273,6 +281,7 @@ def test_mistakes_are_refused_at_registration(mistake):
     assert "\n" not in str(refusal.value)
     added = plugin.adds()
     assert not {"integrators", "broad phases", "mixing rules", "pair filters", "systems"} & {*added}
+    assert not {"components", "events", "records"} & {*added}
     assert all(pair.sweep is None for pair in plugin.pairs.values())
     assert "pairs" not in added or "sweep" in mistake
 

@@ -249,7 +249,7 @@ def test_fields_that_cannot_be_are_refused(values, field):
 
 
 def test_what_cannot_move_along_a_path_is_refused_with_its_entity():
-    with pytest.raises(NoPhysicsError, match="paths need physics before them"):
+    with pytest.raises(NoPhysicsError, match="plugin paths needs physics before it"):
         World(Paths())
     body = Transform((0, 0)), RigidBody(kind="kinematic")
     with pytest.raises(ValueError, match="Path does nothing without its plugin"):

@@ -271,7 +271,7 @@ def test_bad_bodies_are_refused():
 def test_springs_belong_to_one_world():
     with pytest.raises(CaromError, match="in no world yet"):
         Springs().connect(1, 2, stiffness=1.0)
-    with pytest.raises(NoPhysicsError, match="springs need physics before them"):
+    with pytest.raises(NoPhysicsError, match="plugin springs needs physics before it"):
         World(Springs())
     world, springs = make()
     with pytest.raises(ValueError, match="each world takes its own Springs"):

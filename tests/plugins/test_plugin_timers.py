@@ -232,7 +232,7 @@ def test_seconds_that_are_none_are_refused(seconds):
 
 
 def test_what_timers_need():
-    with pytest.raises(NoPhysicsError, match="timers need physics before them"):
+    with pytest.raises(NoPhysicsError, match=r"timers needs physics before it: World\(Physics\(...\), Timers\(\)\)"):
         World(Timers())
     with pytest.raises(
         ValueError, match=r"Timer does nothing without its plugin: .*Timers.*, from carom\.plugins\.timers"

@@ -329,3 +329,108 @@ def test_a_built_in_system_can_be_taken_out():
     world.add_system(forces)
     world.step()
     assert world.bodies.linear_velocity.tolist() == [[1.0, -10.0]]
+
+
+class Aware(Note):
+    """Notes when it joins and leaves; what it may raise then."""
+
+    fails = ""
+
+    def on_add(self, world):
+        assert self.world is world
+        self.log.append(f"{self.label} joins")
+        if "on_add" in self.fails:
+            raise ValueError("cannot join")
+
+    def on_remove(self, world):
+        self.log.append(f"{self.label} leaves")
+
+
+class AwareForces(ForceSystem):
+    log, label, fails, on_add, on_remove = [], "forces", "", Aware.on_add, Aware.on_remove
+
+    def add_forces(self, bodies, time): ...
+
+
+def test_systems_are_called_when_they_join_and_leave():
+    world, log = make_world(), []
+    one, forces, frame, plain = Aware(log, "one"), AwareForces(), Aware(log, "frame"), Aware(log, "plain")
+    forces.log = log
+    world.add_system(one)
+    world.add_system(forces)
+    world.add_system(frame, frame=True)
+    with world:
+        esper.add_processor(plain, priority=3)
+        assert log == ["one joins", "forces joins", "frame joins"]
+        world.step()
+    assert log[3:] == ["plain joins", "one", "plain"]
+    world.step()
+    log.clear()
+    for system in (one, forces, frame, plain):
+        world.remove_system(system)
+        world.add_system(system, frame=system is frame)  # joins again
+    names = "one", "forces", "frame", "plain"
+    assert log == [f"{name} {does}" for name in names for does in ("leaves", "joins")]
+
+
+def test_what_is_added_within_a_step_is_called_at_its_end():
+    world, log = make_world(), []
+
+    class Change(System):
+        phase = Phase.START
+
+        def process(self, dt):
+            if not self.world.step_count:
+                for label in ("first", "second"):
+                    self.world.add_system(Aware(log, label))
+            log.append("step")
+
+    world.add_system(Change())
+    world.step()
+    assert log == ["step", "first joins", "second joins"]
+    world.step()
+    assert log[3:] == ["step", "first", "second"]
+
+
+def test_a_system_that_cannot_join_is_not_in_the_world():
+    world, log = make_world(), []
+    others = Aware(log, "early"), Aware(log, "late")
+
+    class Change(System):
+        phase = Phase.START
+
+        def process(self, dt):
+            if not self.world.step_count:
+                for system in (others[0], bad, others[1]):
+                    self.world.add_system(system)
+
+    class Helped(Aware):
+        def on_add(self, world):
+            super().on_add(world)
+            world.add_system(bad)
+
+    bad, before = Aware(log, "bad"), world.systems
+    bad.fails = "on_add"
+    for options in ({"before": Response}, {"frame": True}):
+        with pytest.raises(ValueError, match="cannot join") as error:
+            world.add_system(bad, **options)
+        assert error.value.__notes__ == ["in Aware.on_add"]
+        assert world.systems == before
+        assert not world.has_system(bad)
+        assert "phase" not in vars(bad)
+    with pytest.raises(ValueError, match="cannot join"):
+        world.add_system(Helped(log, "helped"))
+    assert world.systems == before
+    with world:
+        esper.add_processor(bad)
+    with pytest.raises(ValueError, match="cannot join"):
+        world.step()
+    log.clear()
+    change = Change()
+    world.add_system(change)
+    with pytest.raises(ValueError, match="cannot join"):
+        world.step()
+    assert world.step_count == 1  # the step is complete
+    world.step()
+    assert log == ["early joins", "bad joins", "late joins", "early", "late"]
+    assert set(world.systems) == {*before, change, *others}
