@@ -448,7 +448,7 @@ def test_a_shape_of_carom_without_its_plugin_names_it():
 
 
 def test_springs_before_physics_say_in_which_order():
-    with pytest.raises(NoPhysicsError, match=r"before them: World\(Physics"):
+    with pytest.raises(NoPhysicsError, match=r"before it: World\(Physics"):
         World(Springs(), Physics())
 
 
