@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal
 from ...components import Collider, RigidBody, Transform
 from ...components.part_of import PartOf
 from ...components.spin import Spin
-from ...framework import Component, NoPhysicsError, Plugin, World, column
+from ...framework import Component, Plugin, World, column
 from ...framework.data.columns import special_column
 from ...framework.typing import VectorField
 from ...framework.vectors import add, dot, scale
@@ -102,8 +102,10 @@ class Characters(Plugin):
     """Moves the bodies that have a :class:`Character`, last in the step."""
 
     def __init__(self) -> None:
-        super().__init__("character", version="1.0")
-        self.components = (Character, Ladder)
+        super().__init__("character", version="1.0", needs_physics=True)
+        self.component(Character)
+        self.component(Ladder)
+        self.event(*EVENTS.values())
         self.stage(
             before="update_sleep", records=(Character, NEAR, WORK), optional=(Ladder,), needed="colliders",
             reads=("tree", "static_tree", "grid", "static_grid", *(f"character.{name}" for name in Character.columns)),
@@ -112,13 +114,8 @@ class Characters(Plugin):
 
     def install(self, world: World) -> None:
         """Called by the world; NoPhysicsError if it has none."""
-        if world.physics is None:
-            raise NoPhysicsError("characters need physics before them: World(Physics(...), Characters())")
-        world.register(Character, Ladder)
-        for name in EVENTS.values():
-            world.events.define(name)
-        world.physics.plugin_stages.finishers.append(tell_events)
         super().install(world)
+        world.physics.plugin_stages.finishers.append(tell_events)
 
 
 def tell_events(world: Any) -> None:
