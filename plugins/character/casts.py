@@ -111,7 +111,10 @@ def ground_kind(state, walker, j, out, at, point):
         _, turned, _ = overlap(state, walker.row, j, to)
         x, y = arm - step, arm * rise / sine + lift  # from a point to the middle of the foot
         if 2.0 * (dot(turned, walker.up) - rise) >= y / math.sqrt(x * x + y * y) - rise:
-            return EDGE if arm <= FOOT * walker.half else RIM
+            if arm <= FOOT * walker.half:
+                return EDGE
+            if rise < walker.limit:
+                return RIM
     return SLOPE if rise >= walker.limit else STEEP_GROUND
 
 

@@ -384,7 +384,7 @@ def move_one(state, near, character, ladder, work, i, dt):
             rising = dot(velocity, up) + max(lift, 0.0 - max_fall)
             character.since_floor[i] = 0.0
         gone = sub(at, carried)
-        if blocked >= 0 and dot(gone, gone) < 0.25 * dot(way, way):
+        if work.hits > carried_hits and dot(gone, gone) < 0.25 * dot(way, way):
             level = scale(level, 0.0)
     if state_now == AIR and not standing:
         start_rising = rising
