@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
 
 from ..framework.data.columns import special_column
-from ..framework.data.component import Component
+from ..framework.data.component import NOTHING, Component
 from ..framework.typing import RotationField, VectorField
 from .rigid_body import RigidBody
 from .transform import Transform
@@ -63,7 +63,7 @@ class PartOf(Component):
     )
     gyration_products: float | np.ndarray = special_column(unit="m^2", default=0.0, item="angular", init=False)
 
-    def check_in(self, contents: Any, entity: int | None, beside: Collection[type[Any]] = ()) -> None:
+    def check_in(self, contents: Any, entity: int | None, beside: Mapping[type[Any], Any] = NOTHING) -> None:
         """ValueError if its body is none, or is a part of this entity."""
         name, types_of = "PartOf" if entity is None else f"entity {entity}: PartOf", contents.entities.types_of
         if self.body not in contents.entities or self.body in contents.dead:

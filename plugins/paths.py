@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
@@ -12,6 +12,7 @@ from ..components import RigidBody, Transform
 from ..framework import Component, Phase, Plugin, System, array_column, column
 from ..framework.data.arrays.column import ArrayColumn
 from ..framework.data.columns import Column
+from ..framework.data.component import NOTHING
 from ..framework.typing import ArrayField
 
 __all__ = ["Path", "Paths"]
@@ -94,7 +95,7 @@ class Path(Component):
     ease: bool = column(default=False, dtype=bool, kw_only=True)
     travelled: float = column(default=0.0, minimum=0.0, kw_only=True, unit="m")
 
-    def check_in(self, contents: Any, entity: int | None, beside: Collection[type[Any]] = ()) -> None:
+    def check_in(self, contents: Any, entity: int | None, beside: Mapping[type[Any], Any] = NOTHING) -> None:
         """ValueError if its entity is no body that moves."""
         types = {*beside, *(() if entity is None else contents.entities.types_of(entity))}
         if not {Transform, RigidBody} <= types:

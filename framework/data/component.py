@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
 
 import numpy as np
@@ -13,6 +14,8 @@ from ..names import did_you_mean, near_names, snake_case
 from .arrays.column import ArrayColumn, array_column, hold_arrays
 from .columns import LARGEST, REQUIRED, Column, special_column
 from .columns import column as plain_column
+
+NOTHING: Mapping[type[Any], Any] = MappingProxyType({})  # beside a component that is given alone
 
 
 @dataclass_transform(field_specifiers=(plain_column, array_column, special_column), eq_default=False)
@@ -190,8 +193,8 @@ class Component:
             if not fits:
                 column.check_dimensions(value, dimensions, entity)
 
-    def check_in(self, contents: Any, entity: int | None, beside: Collection[type[Any]] = ()) -> None:
-        """ValueError if it cannot be in a world with these contents, given to the entity with others beside it."""
+    def check_in(self, contents: Any, entity: int | None, beside: Mapping[type[Any], Any] = NOTHING) -> None:
+        """ValueError if it cannot be in a world with these contents, given to the entity with others ``beside`` it."""
 
     def fit(self, dimensions: int, entity: int | None = None) -> None:
         """Whole vectors, of that many dimensions, from now on; ValueError if one has others."""

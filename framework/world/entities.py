@@ -187,14 +187,14 @@ class EntityVerbs:
             raise KeyError(f"no entity {entity!r} in this world") from None
 
     def _check(self, components: Collection[Any], entity: int | None) -> None:
-        dimensions, contents, types = self.dimensions, self._contents(), set(map(type, components))
+        dimensions, contents, beside = self.dimensions, self._contents(), {type(each): each for each in components}
         for component in components:
             if isinstance(component, Component):
                 if component.plugin:
                     self.registry.require(type(component), entity)
                 if dimensions is not None:
                     component.fit(dimensions, entity)
-                component.check_in(contents, entity, types)
+                component.check_in(contents, entity, beside)
             elif isinstance(component, type):
                 raise TypeError(f"components are instances: {component.__name__}(...), got the class itself")
             elif isinstance(component, (list, tuple, Many)):

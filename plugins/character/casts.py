@@ -149,7 +149,7 @@ def floor_below(state, near, character, walker, at, reach):
         kind = SLOPE if rise >= walker.limit else STEEP_GROUND
         if not character.present[j]:
             kind = ground_kind(state, walker, j, out, add_scaled(at, down, distance), point)
-        if kind == SLOPE or kind == EDGE:
+        if kind == SLOPE or kind == EDGE:  # noqa: PLR1714, SIM109  compiled
             if here < gap:
                 best, gap, normal = j, here, out if kind == SLOPE else up
                 height = dot(add(at, point), up) - distance

@@ -28,6 +28,8 @@ WORK = Schema(
     most_push=floats(unit="m/s"),  # as fast as those who push it want to be
     pushes=integer(),
     pushed=ints(),  # rows
+    wakes=integer(),
+    woken=ints(),  # entities
     events=integer(),
     event=ints(),  # CRUSHED and the like
     entity=ints(),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Set
+from collections.abc import Mapping, Set
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from ...components import RigidBody
 from ...components.part_of import PartOf
 from ...framework.data.columns import Column, special_column
-from ...framework.data.component import Component
+from ...framework.data.component import NOTHING, Component
 from ...framework.typing import Vector
 from ...systems.joints.own import OwnJoint, own_joint
 from ...systems.joints.records import ALIGN, CUSTOM, DRIVE, FREE, HOLD, LIMIT, SPRING, TURN
@@ -241,7 +241,7 @@ class Joint(Component, abstract=True):
         if dimensions == 3 and "axis" in self.columns and not np.any(np.abs(self.axis) > LEAST):
             raise ValueError(f"{name} needs an axis in a world of 3 dimensions, got {np.asarray(self.axis).tolist()}")
 
-    def check_in(self, contents: Any, entity: int | None, beside: Collection[type[Any]] = ()) -> None:
+    def check_in(self, contents: Any, entity: int | None, beside: Mapping[type[Any], Any] = NOTHING) -> None:
         """ValueError unless it has two bodies, or one and the world, one of which is dynamic, and an entity of its own.
         """
         self._contents = contents
