@@ -45,6 +45,15 @@ def across(vector, up):
     return add_scaled(vector, up, 0.0 - dot(vector, up))
 
 
+@inlined
+def comes_near(state, j, path, reach):
+    """Whether the box around the shape on its path meets that around row j's, which is tighter than the one that is
+    looked for in grids."""
+    centre, half = add(state.bodies.position[j], state.bodies.offset[j]), state.bodies.half_extents[j]
+    enter, leave = box_interval(sub(centre, half), add(centre, half), path, reach)
+    return enter <= leave + EXACT
+
+
 @part
 def meet_character(state, walker, j, at, way):
     """(touches, distance, out) of another character: each may come half the way to where the other stood at the start,
@@ -68,8 +77,7 @@ def cast_near(state, near, character, walker, at, way, reach, ignored):
         if character.present[j]:
             touches, distance, out = meet_character(state, walker, j, at, way)
         else:
-            enter, leave = box_interval(state.bodies.lower[j], state.bodies.upper[j], path, first)
-            if enter > leave:
+            if not comes_near(state, j, path, first):
                 continue
             touches, distance, out, point = cast(state, near, walker.row, j, path, first, first)
         along = dot(out, way)
@@ -138,8 +146,7 @@ def floor_below(state, near, character, walker, at, reach):
         if character.present[j]:
             touches, distance, out = meet_character(state, walker, j, at, down)
         else:
-            enter, leave = box_interval(state.bodies.lower[j], state.bodies.upper[j], path, far)
-            if enter > leave:
+            if not comes_near(state, j, path, far):
                 continue
             touches, distance, out, point = cast(state, near, walker.row, j, path, far, far)
         rise = dot(out, up)
@@ -149,7 +156,7 @@ def floor_below(state, near, character, walker, at, reach):
         kind = SLOPE if rise >= walker.limit else STEEP_GROUND
         if not character.present[j]:
             kind = ground_kind(state, walker, j, out, add_scaled(at, down, distance), point)
-        if kind == SLOPE or kind == EDGE:  # noqa: PLR1714, SIM109  compiled
+        if kind == SLOPE or kind == EDGE:  # noqa: SIM109  compiled
             if here < gap:
                 best, gap, normal = j, here, out if kind == SLOPE else up
                 height = dot(add(at, point), up) - distance
@@ -204,8 +211,7 @@ def meets_on_way(state, near, walker, j, start, stop):
         return False
     way = scale(way, 1.0 / size)
     path = Path(start, way, inverse_of(way), walker.half_extents)
-    enter, leave = box_interval(state.bodies.lower[j], state.bodies.upper[j], path, size)
-    if enter > leave:
+    if not comes_near(state, j, path, size):
         return False
     touches, distance, _, _ = cast(state, near, walker.row, j, path, size, size)
     return touches and distance <= size

@@ -115,7 +115,7 @@ class Character(Component):
     jump: bool = column(default=False, dtype=bool)
     drop: bool = column(default=False, dtype=bool)
 
-    max_slope: float = SlopeColumn(math.radians(50.0), kw_only=True, unit="rad")  # type: ignore[assignment]
+    max_slope: float = SlopeColumn(math.radians(50.0), minimum=0.0, largest=math.pi / 2, kw_only=True, unit="rad")  # type: ignore[assignment]
     step_height: float = column(0.3, minimum=0.0, kw_only=True, unit="m")
     snap: float = column(0.3, minimum=0.0, kw_only=True, unit="m")
     skin: float = column(0.01, positive=True, kw_only=True, unit="m")

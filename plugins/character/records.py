@@ -47,7 +47,7 @@ WORK = Schema(
     plane_push=floats(unit="m"),
 )
 
-# A character at work. start: centre of its shape at the start of the step; half_extents: of its box, half: the smallest;
+# A character at work. start: centre of its shape at the start of the step; half_extents: of its box, half: the least;
 # limit: cosine of the steepest slope it walks on; dropping: whether it falls through what holds from above only; near:
 # how many rows have been found.
 Walker = collections.namedtuple("Walker", "row start half_extents half up skin limit dropping near")

@@ -359,9 +359,7 @@ def move_one(state, near, character, ladder, work, i, dt):
     state_now, ground, out, fell = AIR, -1, up, rising
     if climbing:
         rising = character.climb[i]
-        at = slide(
-            state, near, character, work, walker, at, scale(add_scaled(level, up, rising), dt), False, False, -1
-        )
+        at = slide(state, near, character, work, walker, at, scale(add_scaled(level, up, rising), dt), False, False, -1)
         state_now = CLIMB
     elif standing:
         way, work.blocked = scale(along_floor(level, normal, up), dt), -1
@@ -394,9 +392,7 @@ def move_one(state, near, character, ladder, work, i, dt):
             rising = max(rising, 0.0 - slowest)
         begin, first, fell = at, work.hits, rising
         mean = 0.5 * (start_rising + rising)
-        at = slide(
-            state, near, character, work, walker, at, scale(add_scaled(level, up, mean), dt), False, False, -1
-        )
+        at = slide(state, near, character, work, walker, at, scale(add_scaled(level, up, mean), dt), False, False, -1)
         velocity, wedge, steep = add_scaled(level, up, rising), False, False
         for k in range(first, work.hits):
             hit, rise = work.hit_out[k], dot(work.hit_out[k], up)
