@@ -11,7 +11,6 @@ import math
 from ...framework.compilation import part
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, divided, length, sub
-from ..standard_shapes import convex_convex, sharp
 from .cells import BLOCK
 from .collider import ALL, WALLS
 from .rectangles import (
@@ -20,7 +19,6 @@ from .rectangles import (
     SLANT,
     TIE,
     WAITING,
-    box_around,
     cell_at,
     cells_in,
     contents,
@@ -35,17 +33,17 @@ from .rectangles import (
     load_cells,
     rectangle,
     store_cells,
-    tile_support,
 )
+from .shapes import core_of, meet_rectangle
 
 DEEP = 16  # tiles: rectangles extend at most this far beyond a shape, so depth inside solid rock is exact up to it
 SEEN = 8  # recent rectangles that are not tested again
 
 
 @part
-def box_on_map(b, at, support, rounding):
+def box_on_map(core, radius, at):
     """The box around the shape: left, right, lower, upper end relative to the map's lower left corner."""
-    left, right, lower, upper = box_around(b, support, rounding(b))
+    left, right, lower, upper = core[0] - radius, core[1] + radius, core[2] - radius, core[3] + radius
     return at[0] + left, at[0] + right, at[1] + lower, at[1] + upper
 
 
@@ -84,13 +82,12 @@ def searched(cells, ring, size):
 
 
 @part
-def ring_with_tiles(grid, touched, size):
-    """By how many cells to enlarge the searched area around the shape until it contains tiles; -1: there are none."""
-    if has_tiles(grid, touched):
-        return 0
-    ring = BLOCK  # most are near tiles, or far from all
-    if has_tiles(grid, searched(touched, ring, size)):
-        ring = 1
+def ring_with_tiles(grid, ring, touched, size):
+    """By how many cells more to enlarge the area around a shape until it contains tiles; -1: there are none."""
+    if ring == 0:  # most are near tiles, or far from all
+        return 1
+    if not has_tiles(grid, searched(touched, BLOCK, size)):
+        ring = BLOCK
     while True:
         cells = searched(touched, ring, size)
         if has_tiles(grid, cells):
@@ -117,10 +114,10 @@ def ring_to_search(ring, nearest, inner_depth, faces, tile, size):
 @part
 def contains_cells(seen, count, cells):
     """True if one of the first ``count`` stored rectangles is this one."""
-    found = False
-    for k in range(count):
-        found |= load_cells(seen, k) == cells
-    return found
+    k = 0
+    while k < count and load_cells(seen, k) != cells:
+        k += 1
+    return k < count
 
 
 @part
@@ -154,17 +151,15 @@ def deepest_contact(a, b, d, support, rounding):
     columns, rows = grid[1], grid[2]
     size, middle = (columns, rows), (0.5 * columns * tile, 0.5 * rows * tile)
     at = add(d, middle)
-    box = box_on_map(b, at, support, rounding)
+    core, radius = core_of(b, support), rounding(b)
+    box = box_on_map(core, radius, at)
     under, touched = cells_under(box, tile, size)
-    ring = ring_with_tiles(grid, touched, size)
-    if ring < 0:
-        return False, -math.inf, (0.0, 1.0), (0.0, 0.0)
     # How far rectangles may grow beyond the shape: cut ends must never be the nearest way out.
     beyond = DEEP + max(touched[2] - touched[0], touched[3] - touched[1]) - 1
     limits = around(touched, beyond, size)
     waiting, seen = stack_array(WAITING, (0, 0, 0, 0)), stack_array(SEEN, (0, 0, 0, 0))
-    count, tested = 1, 0
-    store_cells(waiting, 0, searched(touched, ring, size))
+    ring, count, tested = 0, 1, 0
+    store_cells(waiting, 0, touched)
     hit, depth, normal, point, width = False, -math.inf, (0.0, 1.0), (0.0, 0.0), 0.0
     # The deepest wall and floor (ceiling) contacts: signed depth along their axis.
     wall, floor = 0.0, 0.0
@@ -175,7 +170,10 @@ def deepest_contact(a, b, d, support, rounding):
     tie = TIE * tile
     while True:
         if count == 0:
-            need = ring_to_search(ring, nearest, inner_depth, a.faces, tile, size)
+            if tested == 0:
+                need = ring_with_tiles(grid, ring, touched, size)
+            else:
+                need = ring_to_search(ring, nearest, inner_depth, a.faces, tile, size)
             if need <= ring:
                 break
             ring, count = need, 1
@@ -204,7 +202,7 @@ def deepest_contact(a, b, d, support, rounding):
             if -max(gap_x, gap_y) < min(depth, 0.0) - tie:  # the depth is at most the overlap of the boxes
                 continue
             extent, centre = rectangle(cells, tile, middle)
-            touches, deep, n, p = convex_convex(extent, b, sub(d, centre), tile_support, support, sharp, rounding)
+            touches, deep, n, p = meet_rectangle(extent, b, core, radius, sub(d, centre), support, rounding)
             if hidden(grid, cells, n, under):
                 if deep > inner_depth:
                     inner_depth, inner_normal, inner_point = deep, n, add(centre, p)

@@ -6,14 +6,14 @@ large ones by the sums over blocks; see :mod:`.cells` for both.
 
 from __future__ import annotations
 
-import math
-
 from ...framework.compilation import part
+from ...systems.bits import highest_bit, lowest_bit
 from .cells import BITS, BLOCK, HEAD, PER_BLOCK, PER_NUMBER
 from .collider import ALL, FLOORS, plugin
 
 EMPTY, MIXED, FULL = range(3)
 ALL_BITS = 2**BITS - 1
+MOST_BITS = 62  # read at once
 WAITING = 64  # capacity of the stack of blocks to search: two for each halving of the map
 SLANT = 1e-9  # radians; faces that lean by less count as parallel to the tiles
 TIE = 1e-9  # of a tile: contacts whose depths differ by less count as equally deep
@@ -125,42 +125,35 @@ def has_tiles(grid, cells):
 
 
 @plugin.kernel
-def highest_bit(bits):
-    """Its place, from 0; bits has one."""
-    return math.frexp(float(bits))[1] - 1
-
-
-@part
-def trimmed(grid, cells):
-    """A rectangle of at most BITS columns without empty rows and columns at its sides: none, where all are empty."""
-    packed, words = grid[0], grid[3]
-    x0, y0, x1, y1 = cells
-    at, shift, both = HEAD + y0 * words + (x0 >> PER_NUMBER), x0 & (BITS - 1), 0
-    mask, more = ALL_BITS >> (BITS - (x1 - x0)), shift + x1 - x0 > BITS
-    lower, upper = y1, y1
-    for y in range(y0, y1):
-        bits = int(packed[at, 0]) >> shift
-        if more:
-            bits |= int(packed[at + 1, 0]) << (BITS - shift)
-        bits &= mask
-        if bits != 0:
-            lower, upper = min(lower, y), y + 1
-            both |= bits
-        at += words
-    if both == 0:
-        return x0, y1, x0, y1
-    return x0 + highest_bit(both & -both), lower, x0 + highest_bit(both) + 1, upper
+def bits_of(grid, y, x0, count):
+    """The bits of ``count`` columns of a row, at most MOST_BITS, from column x0 on."""
+    packed, at, shift = grid[0], HEAD + y * grid[3] + (x0 >> PER_NUMBER), x0 & (BITS - 1)
+    bits, known = int(packed[at, 0]) >> shift, BITS - shift
+    while known < count:
+        at += 1
+        bits |= int(packed[at, 0]) << known
+        known += BITS
+    return bits & ((1 << count) - 1)
 
 
 @part
 def contents(grid, cells):
-    """Whether a rectangle is EMPTY, FULL of tiles or MIXED, and the rectangle: a small one is trimmed before."""
-    if cells[2] - cells[0] > BLOCK or cells[3] - cells[1] > BLOCK:
+    """Whether a rectangle is EMPTY, FULL of tiles or MIXED, and the rectangle: a small one without empty rows and
+    columns at its sides."""
+    x0, y0, x1, y1 = cells
+    if x1 - x0 > BLOCK or y1 - y0 > BLOCK:
         return contents_by_blocks(grid, cells), cells
-    cells = trimmed(grid, cells)
-    if cells[0] == cells[2]:
-        return EMPTY, cells
-    return FULL if alike(grid, cells, True) else MIXED, cells
+    some, every, rows, lower, upper = 0, -1, 0, y1, y1
+    for y in range(y0, y1):
+        bits = bits_of(grid, y, x0, x1 - x0)
+        if bits != 0:
+            some, every = some | bits, every & bits
+            rows, lower, upper = rows + 1, min(lower, y), y + 1
+    if some == 0:
+        return EMPTY, (x0, y1, x0, y1)
+    first, last = lowest_bit(some), highest_bit(some)
+    full = every == (2 << last) - (1 << first) and rows == upper - lower
+    return FULL if full else MIXED, (x0 + first, lower, x0 + last + 1, upper)
 
 
 @part
@@ -178,18 +171,17 @@ def full_rows(grid, cells, way, room):
 def full_columns(grid, cells, way, room):
     """How many columns right of a rectangle (way 1) or left of it (-1) are full of tiles, at most ``room``."""
     x0, y0, x1, y1 = cells
-    for y in range(y0, y1):
-        low, high = 0, room
-        step = high  # most often it can grow by all or by nothing
-        while low < high:
-            start, stop = (x1 + low, x1 + step) if way > 0 else (x0 - step, x0 - low)
-            if row_is(grid, y, start, stop, True):
-                low = step
-            else:
-                high = step - 1
-            step = 1 if low == 0 and step == room else (low + high + 1) >> 1
-        room = low
-    return room
+    count = 0
+    while count < room:
+        some = min(room - count, MOST_BITS)
+        start = x1 + count if way > 0 else x0 - count - some
+        gaps = 0
+        for y in range(y0, y1):
+            gaps |= bits_of(grid, y, start, some) ^ ((1 << some) - 1)
+        if gaps != 0:
+            return count + (lowest_bit(gaps) if way > 0 else some - 1 - highest_bit(gaps))
+        count += some
+    return count
 
 
 @part
@@ -234,12 +226,6 @@ def gaps(low, high, first, last, tile):
 
 
 @plugin.kernel
-def tile_support(half, direction):
-    """A corner of a rectangle."""
-    return (half[0] if direction[0] >= 0.0 else -half[0], half[1] if direction[1] >= 0.0 else -half[1])
-
-
-@plugin.kernel
 def halved(waiting, count, cells, right_first, upper_first):
     """Push both halves of a rectangle, cut across its longer side, at index ``count``; the first one goes on top.
 
@@ -263,13 +249,6 @@ def halved(waiting, count, cells, right_first, upper_first):
             waiting[count, 0], waiting[count, 1], waiting[count, 2], waiting[count, 3] = x0, y0, cut_x, cut_y
         count += 1
     return count
-
-
-@plugin.kernel
-def box_around(b, support, around):
-    """Left, right, lower and upper end of a shape, relative to its centre."""
-    left, right = support(b, (-1.0, 0.0))[0] - around, support(b, (1.0, 0.0))[0] + around
-    return left, right, support(b, (0.0, -1.0))[1] - around, support(b, (0.0, 1.0))[1] + around
 
 
 @plugin.kernel

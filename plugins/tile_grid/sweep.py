@@ -7,16 +7,14 @@ import math
 from ...framework.compilation import part
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, length, sub
-from ..standard_shapes import convex_convex, sharp
 from .cells import BLOCK
 from .collider import plugin
-from .contact import cells_under, searched
+from .contact import box_on_map, cells_under, searched
 from .rectangles import (
     EMPTY,
     MIXED,
     TIE,
     WAITING,
-    box_around,
     contents,
     faces_like,
     grid_of,
@@ -24,8 +22,8 @@ from .rectangles import (
     load_cells,
     rectangle,
     store_cells,
-    tile_support,
 )
+from .shapes import core_of, meet_rectangle
 
 LOOKS = 100  # iterations for the time of a touch; a graze takes about 30
 ROUNDING = 4e-16  # of the distance: smaller gaps count as none
@@ -58,8 +56,8 @@ def first_touch(a, b, d, v, support, rounding):
     columns, rows = grid[1], grid[2]
     middle = (0.5 * columns * tile, 0.5 * rows * tile)
     at = add(d, middle)
-    left, right, lower, upper = box_around(b, support, rounding(b))
-    box = at[0] + left, at[0] + right, at[1] + lower, at[1] + upper
+    core, radius = core_of(b, support), rounding(b)
+    box = box_on_map(core, radius, at)
     waiting = stack_array(WAITING, (0, 0, 0, 0))
     left, right, lower, upper = min(v[0], 0.0), max(v[0], 0.0), min(v[1], 0.0), max(v[1], 0.0)
     swept = box[0] + left, box[1] + right, box[2] + lower, box[3] + upper
@@ -73,12 +71,14 @@ def first_touch(a, b, d, v, support, rounding):
         enter, leave = passing_cells(box, v, cells, tile, min(best, 1.0))
         if not enter <= leave:
             continue
-        inside, cells = contents(grid, cells)
+        inside, found = contents(grid, cells)
         if inside == EMPTY:
             continue
-        enter, leave = passing_cells(box, v, cells, tile, min(best, 1.0))
-        if not enter <= leave:
-            continue
+        if found != cells:
+            cells = found
+            enter, leave = passing_cells(box, v, cells, tile, min(best, 1.0))
+            if not enter <= leave:
+                continue
         if inside == MIXED:
             count = halved(waiting, count, cells, v[0] < 0.0, v[1] < 0.0)
             continue
@@ -86,7 +86,7 @@ def first_touch(a, b, d, v, support, rounding):
         time = enter
         for look in range(LOOKS):
             way = sub(add_scaled(d, v, time), centre)
-            touches, deep, n, _ = convex_convex(extent, b, way, tile_support, support, sharp, rounding)
+            touches, deep, n, _ = meet_rectangle(extent, b, core, radius, way, support, rounding)
             rate = -dot(v, n)
             touches |= -deep <= ROUNDING * length(way) and (look > 0 or rate > 0.0)
             if touches or not rate > 0.0:

@@ -109,6 +109,8 @@ def test_random_polygons_against_every_single_cell(size, tile):
     low, high = boxes_of(cells, tile)
     turns = rng.uniform(0, 2 * np.pi, (count, 1)) + np.array((0.0, 1.5, 3.0, 4.8)) + rng.uniform(-0.5, 0.5, (count, 4))
     vertices = size * np.stack((np.cos(turns), np.sin(turns)), 2)
+    corners = np.array(((-1, -1), (1, -1), (1, 1), (-1, 1)))
+    vertices[::2] = corners * (size * rng.uniform(0.05, 1, (len(vertices[::2]), 1, 2)))  # boxes meet in closed form
     offsets = rng.uniform(-5, 5, (count, 2)) * tile
     offsets[:20] = np.round(offsets[:20] / tile) * tile
     radii = np.where(rng.random(count) < 0.5, 0.0, rng.uniform(0, 0.5 * size, count))
