@@ -226,13 +226,14 @@ class Column:
         usual = self.item != "rotation" and array.size and low <= array.min() and array.max() <= high  # none is nan
         if usual and (not self.nonzero or np.all(array)):
             return
+        each_axis = "" if self.item == "scalar" else " along each axis"
         for bad, rule in (
             (~np.isfinite(array), "must be finite"),
             (array <= 0 if self.positive else None, "must be positive"),
             (array < SMALLEST_WITH_INVERSE if self.positive else None, "must not be so small that 1 / value overflows"),
             (array < self.minimum if self.minimum is not None else None, f"must be at least {self.minimum}"),
             (array == 0 if self.nonzero else None, f"must not be 0: {self.nonzero}"),
-            (abs(array) > self.largest, f"must be at most {self.largest:g} along each axis"),
+            (abs(array) > self.largest, f"must be at most {self.largest:g}" + each_axis),
         ):
             if bad is not None and np.any(bad):
                 if shown is None:

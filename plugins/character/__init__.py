@@ -10,7 +10,7 @@ from ...systems.queries.compiled import NEAR
 from .checks import CharacterCheck
 from .component import WRITTEN, Character, Ladder
 from .records import CRUSHED, HIT, LANDED, WORK
-from .stage import move_characters
+from .stage import move_characters, press_bodies, tilt_bodies
 
 __all__ = ["Character", "Characters", "Ladder"]
 
@@ -30,15 +30,17 @@ class Characters(Plugin):
         self.component(Character)
         self.component(Ladder)
         self.event(*EVENTS.values())
+        settings = tuple(f"character.{name}" for name in Character.columns if name not in WRITTEN)
+        known = tuple(f"character.{name}" for name in WRITTEN)
+        self.stage(after="sum_forces", records=(Character,), reads=(*settings, *known), writes=("force",))(press_bodies)
         self.stage(
-            before="update_sleep", records=(Character, NEAR, WORK), optional=(Ladder, Spin), needed="colliders",
-            reads=(
-                "tree", "static_tree", "grid", "static_grid", "rotation",
-                *(f"character.{name}" for name in Character.columns if name not in WRITTEN),
-            ),
-            writes=(
-                "position", "linear_velocity", "spin.angular_velocity", *(f"character.{name}" for name in WRITTEN),
-            ),
+            after="read_bodies", records=(Character, Spin), reads=("position", *settings, *known),
+            writes=("spin.step_torque",),
+        )(tilt_bodies)  # fmt: skip
+        self.stage(
+            before="update_sleep", records=(Character, NEAR, WORK), optional=(Ladder,), needed="colliders",
+            reads=("tree", "static_tree", "grid", "static_grid", "rotation", *settings),
+            writes=("position", "linear_velocity", *known),
         )(move_characters)  # fmt: skip
 
     def install(self, world: World) -> None:
@@ -50,11 +52,9 @@ class Characters(Plugin):
 
 
 def tell_events(world: Any) -> None:
-    """What has happened to characters in the step, in their order; and what they push and tread on wakes."""
+    """What has happened to characters in the step, in their order."""
     work = world.physics.record(WORK)
-    for entity in work.woken[: work.wakes].tolist():
-        world.wake(entity)
-    count, work.events, work.wakes = work.events, 0, 0
+    count, work.events = work.events, 0
     for k in range(count):
         name, entity, other = EVENTS[int(work.event[k])], int(work.entity[k]), int(work.other[k])
         if name == "crushed":

@@ -26,6 +26,15 @@ class SlopeColumn(Column):
             raise self._error(array.tolist() if shown is None else shown, rule, entity)
 
 
+class UpColumn(Column):
+    """A direction, of any length but 0."""
+
+    def check_numbers(self, array: np.ndarray, shown: Any, entity: int | None) -> None:
+        super().check_numbers(array, shown, entity)
+        if not np.all(np.any(array, axis=-1)):
+            raise self._error(array.tolist() if shown is None else shown, "must be a direction, not 0", entity)
+
+
 def known(default: Any = 0.0, **options: Any) -> Any:
     """A column that the plugin writes."""
     return special_column(default, init=False, **options)
@@ -66,7 +75,7 @@ class Character(Component):
     max_fall
         m/s
     jump_speed, jump_height
-        m/s, or m: the height counts where it is given
+        m/s, 9 if neither is given, or m
     jump_cut
         of the speed upwards, what is left when jump is let go on the way up
     coyote, buffer
@@ -85,7 +94,7 @@ class Character(Component):
     weight
         N, on a dynamic body that it stands on
     up
-        (d,) a direction; None, or 0: against gravity, and the second axis without any
+        (d,) a direction; None: against gravity, and the second axis without any
     leave
         of the velocity of what has carried it, what it keeps when it leaves: ``"all"``, ``"up"``, the part upwards, or
         ``"none"``
@@ -123,9 +132,9 @@ class Character(Component):
     air_acceleration: float = column(40.0, minimum=0.0, kw_only=True, unit="m/s^2")
     gravity: float | None = column(None, minimum=0.0, optional=True, kw_only=True, unit="m/s^2")
     max_fall: float = column(30.0, minimum=0.0, kw_only=True, unit="m/s")
-    jump_speed: float = column(9.0, minimum=0.0, kw_only=True, unit="m/s")
+    jump_speed: float | None = column(None, minimum=0.0, optional=True, kw_only=True, unit="m/s")
     jump_height: float | None = column(None, minimum=0.0, optional=True, kw_only=True, unit="m")
-    jump_cut: float = column(1.0, minimum=0.0, kw_only=True, unit="1")
+    jump_cut: float = special_column(1.0, minimum=0.0, largest=1.0, kw_only=True, unit="1")
     coyote: float = column(0.1, minimum=0.0, kw_only=True, unit="s")
     buffer: float = column(0.1, minimum=0.0, kw_only=True, unit="s")
     air_jumps: int = column(0, dtype=int, minimum=0, kw_only=True)
@@ -135,7 +144,7 @@ class Character(Component):
     push_force: float = column(60.0, minimum=0.0, kw_only=True, unit="N")
     pushable: bool = column(default=False, dtype=bool, kw_only=True)
     weight: float = column(0.0, minimum=0.0, kw_only=True, unit="N")
-    up: VectorField = column(None, item="vector", optional=True, kw_only=True, unit="1")
+    up: VectorField = UpColumn(None, item="vector", optional=True, kw_only=True, unit="1")  # type: ignore[assignment]
     leave: Literal["all", "up", "none"] = column("all", choices=LEAVES, kw_only=True)
 
     state: Literal["air", "floor", "steep", "climb"] = known("air", choices=STATES)
@@ -148,7 +157,8 @@ class Character(Component):
     wall_entity: int = known(-1, dtype=int)
     on_ceiling: bool = known(default=False, dtype=bool)
     crushed: int = known(-1, dtype=int)
-    # Its memory: seconds since, whether the key was held, what the floor was like when it was last seen.
+    # Its memory: seconds since, whether the key was held, what others have given it, with what force it pushes what, and
+    # what the floor was like when it was last seen.
     since_floor: float = known(NEVER, unit="s")
     since_press: float = known(NEVER, unit="s")
     since_wall: float = known(NEVER, unit="s")
@@ -157,6 +167,9 @@ class Character(Component):
     jumping: bool = known(default=False, dtype=bool)
     air_jumped: int = known(0, dtype=int)
     pushed: VectorField = known(item="vector", unit="m/s")
+    push: VectorField = known(item="vector", unit="N")
+    push_entity: int = known(-1, dtype=int)
+    push_row: int = known(-1, dtype=int)
     floor_row: int = known(-1, dtype=int)
     floor_place: VectorField = known(item="vector", unit="m")
     floor_x: VectorField = known(item="vector", unit="1")
@@ -169,6 +182,11 @@ class Character(Component):
         why = refusal(entity, {*beside, *own}, "static" if body is None else body.kind)
         if why:
             raise ValueError(why)
+        if self.jump_speed is not None and self.jump_height is not None:
+            name = "Character" if entity is None else f"entity {entity}: Character"
+            raise ValueError(
+                f"{name} takes a jump_speed or a jump_height, got {self.jump_speed} and {self.jump_height}"
+            )
 
 
 WRITTEN = tuple(name for name, each in Character.columns.items() if not each.constructor)

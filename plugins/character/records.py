@@ -24,12 +24,10 @@ WORK = Schema(
     statics_version=integer(),  # of the state, when characters were moved last
     place=vectors(unit="m"),  # where row i will be,
     velocity=vectors(unit="m/s"),  # and its own velocity: all look at those of the start
-    push=vectors(unit="m/s"),  # what characters change the velocity of row i by
+    push=vectors(unit="m/s"),  # what characters have changed the velocity of row i by
     most_push=floats(unit="m/s"),  # as fast as those who push it want to be
     pushes=integer(),
     pushed=ints(),  # rows
-    wakes=integer(),
-    woken=ints(),  # entities
     events=integer(),
     event=ints(),  # CRUSHED and the like
     entity=ints(),
@@ -40,7 +38,6 @@ WORK = Schema(
     hits=integer(),  # what it has met
     hit_row=ints(),
     hit_out=vectors(unit="1"),
-    hit_speed=floats(unit="m/s"),
     planes=integer(),
     plane_out=vectors(unit="1"),
     plane_depth=floats(unit="m"),

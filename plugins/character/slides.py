@@ -13,10 +13,10 @@ ROUNDS = 20  # over the planes
 
 
 @inlined
-def note_hit(work, j, out, speed):
+def note_hit(work, j, out):
     """Row j was met."""
     if work.hits < MOST_HITS:
-        work.hit_row[work.hits], work.hit_out[work.hits], work.hit_speed[work.hits] = j, out, speed
+        work.hit_row[work.hits], work.hit_out[work.hits] = j, out
         work.hits += 1
 
 
@@ -96,10 +96,12 @@ def slide(state, near, character, work, walker, at, wish, is_walking, is_carried
         slope = 0.0 - dot(out, way)
         free = max(0.0, distance - skin / max(slope, 1e-3))
         if free >= size:
+            if is_dynamic(state, j) and free < size + skin:
+                note_hit(work, j, out)  # it follows what it pushes
             return add(at, left)
         at = add_scaled(at, way, free)
         left = add_scaled(left, way, 0.0 - free)
-        note_hit(work, j, out, slope)
+        note_hit(work, j, out)
         if is_walking:
             if climbs(state, character, walker, j, out, add_scaled(at, way, distance - free), point):
                 left = along_floor(across(left, walker.up), out, walker.up)
@@ -169,7 +171,7 @@ def part_out(state, near, character, work, walker, at, rising):
             worst = max(worst, depth + skin)
             if j < state.moving or crusher < 0:
                 crusher = j
-            note_hit(work, j, out, 0.0)
+            note_hit(work, j, out)
         if worst <= 0.6 * skin:
             return at, -1
         at = add(at, pushed_by_planes(work))

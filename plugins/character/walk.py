@@ -34,7 +34,9 @@ from .records import (
 )
 from .slides import along_floor, cross, part_out, slide
 
+JUMP_SPEED = 9.0  # m/s, if nothing else is given
 FARTHEST_CARRIED = 1.0  # m in a step; what goes farther was put elsewhere
+SLOWER = 1e-6  # of its speed: less is rounding
 NEAR_BY = 0.25  # m: room around what it may reach in a step
 DROPS_FOR = 0.1  # s in which it falls through what holds from above,
 DROPS_AGAIN = 0.2  # and until when it does not begin anew
@@ -106,17 +108,22 @@ def differs(a, b):
 
 
 @part
-def row_of_floor(state, character, i):
-    """The row of what it stands on, -1: nothing."""
-    floor, entity = character.floor_row[i], character.floor_entity[i]
+def row_of(state, entity, known):
+    """The row of a body, -1 if there is none; known: where it was."""
     if entity < 0:
         return -1
-    if 0 <= floor < state.count and state.bodies.entity[floor] == entity:
-        return floor
+    if 0 <= known < state.count and state.bodies.entity[known] == entity:
+        return known
     for j in range(state.count):  # rows have moved
         if state.bodies.entity[j] == entity:
             return j
     return -1
+
+
+@part
+def row_of_floor(state, character, i):
+    """The row of what it stands on, -1: nothing."""
+    return row_of(state, character.floor_entity[i], character.floor_row[i])
 
 
 @part
@@ -156,8 +163,10 @@ def stands_on(state, character, i, floor, out):
 @part
 def jump_speed_of(character, i, gravity):
     """m/s, from the height if one is given."""
-    height = character.jump_height[i]
-    return math.sqrt(2.0 * gravity * height) if height == height else character.jump_speed[i]
+    height, speed = character.jump_height[i], character.jump_speed[i]
+    if height == height:
+        return math.sqrt(2.0 * gravity * height)
+    return speed if speed == speed else JUMP_SPEED
 
 
 @part
@@ -192,29 +201,33 @@ def step_over(state, near, character, work, walker, at, wish, done, height):
 
 
 @part
-def push(state, character, work, walker, i, j, out, wish, dt):
-    """Push row j, which it has walked against, by its force, and no faster than it wants to walk."""
-    bodies, level = state.bodies, across(out, walker.up)
-    size = length(level)
-    if size < 0.5 or dot(wish, level) >= 0.0:
-        return
+def push(state, character, work, walker, j, out, wish, dt):
+    """(pushes, force) with which it pushes row j in the next step, so that this gets no faster than it wants to walk."""
+    bodies, i, level = state.bodies, walker.row, across(out, walker.up)
+    size, force = length(level), character.push_force[walker.row]
+    if size < 0.5 or dot(wish, level) >= 0.0 or force == 0.0:
+        return False, level
     ahead = divided(level, 0.0 - size)
+    wanted = dot(wish, ahead)
     if character.present[j]:
         if not character.pushable[j]:
-            return
-        speed, gain = dot(character.velocity[j], ahead), character.push_force[i] * dt / bodies.mass[j]
+            return False, level
+        gained = force * dt / bodies.mass[j]
     elif is_dynamic(state, j):
-        speed, gain = dot(bodies.linear_velocity[j], ahead), character.push_force[i] * dt * bodies.inverse_mass[j]
+        mass, speed, resisted, gained = bodies.mass[j], dot(bodies.linear_velocity[j], ahead), 0.0, 0.0
+        if character.push_entity[i] == bodies.entity[j]:
+            before, pushed = dot(bodies.start_velocity[j], ahead), dot(character.push[i], ahead)
+            resisted = max(0.0, pushed - mass * (speed - before) / dt)
+            gained = pushed * dt / mass if before <= wanted else 0.0
+        force = min(force, max(0.0, mass * (wanted - speed) / dt + resisted))
     else:
-        return
-    wanted = dot(wish, ahead)
-    more = min(gain, wanted - speed)
-    if more > 0.0:
-        if work.most_push[j] == 0.0:
-            work.pushed[work.pushes] = j
-            work.pushes += 1
-        work.push[j] = add_scaled(work.push[j], ahead, more)
-        work.most_push[j] = max(work.most_push[j], wanted)
+        return False, level
+    if work.most_push[j] == 0.0:
+        work.pushed[work.pushes] = j
+        work.pushes += 1
+    work.push[j] = add_scaled(work.push[j], ahead, gained)
+    work.most_push[j] = max(work.most_push[j], wanted)
+    return not character.present[j], scale(ahead, force)
 
 
 @inlined
@@ -227,22 +240,23 @@ def tell(work, event, entity, other, normal, speed):
 
 
 @part
-def tell_hits(state, near, character, work, walker, floor, first, start, carried, stop):
+def tell_hits(state, near, work, walker, floor, first, velocity, start, carried, stop, dt):
     """What it has run against on its own way, and which sensors it has come into."""
     me = state.bodies.entity[walker.row]
     for k in range(first, work.hits):
-        j, known = work.hit_row[k], work.hit_row[k] == floor
+        j, speed = work.hit_row[k], 0.0 - dot(velocity, work.hit_out[k])
+        known = j == floor or speed <= 0.0
         for m in range(first, k):
             known |= work.hit_row[m] == j
         if not known:
-            tell(work, HIT, me, state.bodies.entity[j], work.hit_out[k], work.hit_speed[k])
+            tell(work, HIT, me, state.bodies.entity[j], work.hit_out[k], speed)
     for k in range(walker.near):
         j = near.row[k]
         if is_sensor(state, j):
             met = meets_on_way(state, near, walker, j, start, carried)
             if met or meets_on_way(state, near, walker, j, carried, stop):
                 way = sub(stop, start)
-                tell(work, HIT, me, state.bodies.entity[j], divided(way, 0.0 - length(way)), length(way))
+                tell(work, HIT, me, state.bodies.entity[j], divided(way, 0.0 - length(way)), length(way) / dt)
 
 
 # -- a step ----------------------------------------------------------------------------------------
@@ -293,12 +307,13 @@ def move_one(state, near, character, ladder, work, i, dt):
         side = one_way_of(state, floor)
         if dot(side, side) > 0.0:
             character.since_drop[i], standing, rising = 0.0, False, 0.0
+    leaves = standing and character.since_press[i] <= character.buffer[i]
     dropping = character.since_drop[i] < DROPS_FOR
     limit = math.cos(character.max_slope[i])
     walker = Walker(i, start, extents, half, up, skin, limit, dropping, found)
     # ride, and out of what has moved into it
     at = start
-    if dot(ride, ride) > 0.0:
+    if dot(ride, ride) > 0.0 and not leaves:  # it jumps as the step begins
         at = slide(state, near, character, work, walker, at, ride, False, True, floor)
     carried_hits, crusher = work.hits, -1
     disturbed = state.statics_version != work.statics_version or work.hits > 0 or character.since_floor[i] > 0.1 * NEVER
@@ -356,22 +371,26 @@ def move_one(state, near, character, ladder, work, i, dt):
     size = length(change)
     level = add(level, change if size <= rate else scale(change, rate / size))
     # its own way
-    state_now, ground, out, fell = AIR, -1, up, rising
+    state_now, ground, out, fell, tried = AIR, -1, up, rising, level
     if climbing:
         rising = character.climb[i]
         at = slide(state, near, character, work, walker, at, scale(add_scaled(level, up, rising), dt), False, False, -1)
-        state_now = CLIMB
+        state_now, tried = CLIMB, add_scaled(level, up, rising)
     elif standing:
         way, work.blocked = scale(along_floor(level, normal, up), dt), -1
         at = slide(state, near, character, work, walker, at, way, True, False, -1)
-        blocked = work.blocked
+        blocked, taken = work.blocked, False
         if blocked >= 0 and character.step_height[i] > 0.0 and not is_dynamic(state, blocked):
             hits = work.hits
             done, high = sub(at, carried), character.step_height[i]
             taken, to = step_over(state, near, character, work, walker, carried, way, done, high)
             if taken:
-                at, blocked = to, -1
+                at = to
             work.hits = hits
+        gone = sub(at, carried)
+        if not taken and work.hits > carried_hits and length(gone) < (1.0 - SLOWER) * length(way):
+            ahead = across(gone, up)  # as fast as it got along the floor
+            level = scale(ahead, length(gone) / (dt * max(length(ahead), EXACT)))
         j, gap, found_out, _ = floor_below(state, near, character, walker, at, character.snap[i])
         if j >= 0:
             at = lowered(state, near, character, walker, at, gap)
@@ -381,9 +400,6 @@ def move_one(state, near, character, ladder, work, i, dt):
             level = add(across(velocity, up), kept)
             rising = dot(velocity, up) + max(lift, 0.0 - max_fall)
             character.since_floor[i] = 0.0
-        gone = sub(at, carried)
-        if work.hits > carried_hits and dot(gone, gone) < 0.25 * dot(way, way):
-            level = scale(level, 0.0)
     if state_now == AIR and not standing:
         start_rising = rising
         rising = max(rising - gravity * dt, 0.0 - max_fall)
@@ -392,6 +408,7 @@ def move_one(state, near, character, ladder, work, i, dt):
             rising = max(rising, 0.0 - slowest)
         begin, first, fell = at, work.hits, rising
         mean = 0.5 * (start_rising + rising)
+        tried = add_scaled(level, up, mean)
         at = slide(state, near, character, work, walker, at, scale(add_scaled(level, up, mean), dt), False, False, -1)
         velocity, wedge, steep = add_scaled(level, up, rising), False, False
         for k in range(first, work.hits):
@@ -425,7 +442,7 @@ def move_one(state, near, character, ladder, work, i, dt):
             tell(work, LANDED, bodies.entity[i], bodies.entity[ground], out, max(0.0, 0.0 - fell))
     else:
         character.floor_entity[i], character.floor_row[i], character.floor_normal[i] = -1, -1, scale(up, 0.0)
-    wall, ceiling = -1, False
+    wall, ceiling, pushes_row, force = -1, False, -1, scale(up, 0.0)
     for k in range(work.hits):
         j, hit = work.hit_row[k], work.hit_out[k]
         side = across(hit, up)
@@ -433,7 +450,11 @@ def move_one(state, near, character, ladder, work, i, dt):
             wall = j
             character.wall_normal[i] = divided(side, length(side))
         ceiling |= dot(hit, up) < CEILING
-        push(state, character, work, walker, i, j, hit, wish, dt)
+        pushes, given = push(state, character, work, walker, j, hit, wish, dt)
+        if pushes:
+            pushes_row, force = j, given
+    character.push_row[i], character.push[i] = pushes_row, force
+    character.push_entity[i] = bodies.entity[pushes_row] if pushes_row >= 0 else -1
     character.on_wall[i], character.on_ceiling[i] = wall >= 0, ceiling
     character.wall_entity[i] = bodies.entity[wall] if wall >= 0 else -1
     if wall >= 0 and state_now == AIR:
@@ -444,9 +465,7 @@ def move_one(state, near, character, ladder, work, i, dt):
         if character.crushed[i] < 0:
             tell(work, CRUSHED, bodies.entity[i], by, scale(up, 0.0), 0.0)
     character.crushed[i] = by
-    for k in range(carried_hits, work.hits):
-        work.hit_speed[k] *= length(sub(at, carried)) / dt if work.hit_speed[k] > 0.0 else 0.0
-    tell_hits(state, near, character, work, walker, ground, carried_hits, start, carried, at)
+    tell_hits(state, near, work, walker, ground, carried_hits, tried, start, carried, at, dt)
     character.state[i], work.velocity[i] = state_now, add_scaled(level, up, rising)
     character.floor_velocity[i] = scale(ride, 1.0 / dt)
     work.place[i] = add(bodies.position[i], sub(at, start))
