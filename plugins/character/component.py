@@ -157,8 +157,8 @@ class Character(Component):
     wall_entity: int = known(-1, dtype=int)
     on_ceiling: bool = known(default=False, dtype=bool)
     crushed: int = known(-1, dtype=int)
-    # Its memory: seconds since, whether the key was held, what others have given it, with what force it pushes what, and
-    # what the floor was like when it was last seen.
+    # Its memory: seconds since, whether the key was held, what others have given it, with what force it pushes what,
+    # and what the floor was like when it was last seen.
     since_floor: float = known(NEVER, unit="s")
     since_press: float = known(NEVER, unit="s")
     since_wall: float = known(NEVER, unit="s")

@@ -202,7 +202,7 @@ def step_over(state, near, character, work, walker, at, wish, done, height):
 
 @part
 def push(state, character, work, walker, j, out, wish, dt):
-    """(pushes, force) with which it pushes row j in the next step, so that this gets no faster than it wants to walk."""
+    """(pushes, force) with which it pushes row j in the next step, so that this gets no faster than it wants to be."""
     bodies, i, level = state.bodies, walker.row, across(out, walker.up)
     size, force = length(level), character.push_force[walker.row]
     if size < 0.5 or dot(wish, level) >= 0.0 or force == 0.0:
