@@ -9,7 +9,9 @@ import numpy as np
 from ..framework.data import esper_bridge
 from ..framework.data.columns import Column, special_column
 from ..framework.data.component import Component
+from ..framework.data.driven import drive
 from ..framework.data.table import KINDS
+from ..framework.errors import CaromError
 from ..framework.typing import Vector, VectorField
 
 WEIGHTLESS = 1e-200  # kg, of the RigidBody of a part: what a part weighs is in its body's mass
@@ -26,6 +28,8 @@ Kind = Literal["dynamic", "kinematic", "static"]
 # Arguments, checked like fields.
 FORCE = Column(item="vector", owner="RigidBody", name="apply_force")
 IMPULSE = Column(item="vector", owner="RigidBody", name="apply_impulse")
+PLACE = Column(item="vector", owner="RigidBody", name="move_to")
+TURN = Column(item="rotation", owner="RigidBody", name="move_to: its rotation")
 
 
 def force_applied(table: Any, row: int) -> None:
@@ -155,6 +159,31 @@ class RigidBody(Component, flat=True):
             store.make("force")[store.find(self._entity)] += push
         else:
             add_push(self, push, ("applied_force", "step_force"))
+
+    def move_to(self, position: Vector | float, rotation: Any = None) -> None:
+        """Have the velocity with which the next step ends there, and stand still after it: a kinematic body that is
+        moved so in each step, by a tween, carries and pushes with its true speed.
+
+        position
+            (d,) m; the step ends there to within 2**-53 of it and 2**-51 of the way
+        rotation
+            rad, in 3D a unit quaternion, the short way, of a body with a :class:`Spin`. None: it turns as it did
+
+        Within a step that has moved the bodies already it is for the next one. CaromError before a world has taken the
+        body; ValueError if it is not kinematic, has no Spin and is to turn, or cannot come there.
+        """
+        store: Any = self._store
+        if getattr(store, "clock", None) is None:
+            raise CaromError("this RigidBody is in no world yet: a look at world.bodies, or a step, takes it there")
+        if self.kind != "kinematic":
+            why = f'RigidBody.move_to moves kinematic bodies, RigidBody(kind="kinematic"): this one is {self.kind}'
+            raise ValueError(f"entity {self._entity}: {why}")
+        place, d = self._vector(PLACE, position), store.dimensions
+        turn = None if rotation is None else TURN.checked(rotation, self._entity)
+        if turn is not None:
+            TURN.check_dimensions(turn, d, self._entity)
+            turn = np.array([turn if np.ndim(turn) else TURN.whole(turn, d)])
+        drive(store, np.array([store.find(self._entity)]), PLACE.whole(place, d)[None], turn, "RigidBody.move_to")
 
     def _own_mass(self) -> float:
         """kg; of a part that which it goes on with once it is none, also before the next step knows that it is none."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..components import AABBCollider, Collider, RigidBody, Transform
 from ..components.spin import Spin
+from ..framework.data.driven import STOPS
 from ..framework.data.row_moves import MovedColumns, RowPlan
 from ..framework.data.table import FEW, Table
 from ..framework.jit.records.record import Record
@@ -409,6 +410,7 @@ def make_table(dimensions: int) -> Table:
     table.add_array("force", "vector", on_demand=True)
     table.add_array("torque", "angular", on_demand=True)
     table.add_array("inverse_mass")
+    table.add_array(STOPS, dtype=np.int8, on_demand=True)
     for name, column in SLEEP_COLUMNS.fields.items():
         table.add_array(f"_{name}", column.item, dtype=column.dtype, on_demand=True)
     return table

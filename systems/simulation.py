@@ -13,6 +13,7 @@ from ..components.spin import keep_gyration
 from ..framework.data.adoption import Adoption
 from ..framework.data.bodies import Bodies
 from ..framework.data.column_copies import ColumnCopies
+from ..framework.data.driven import STOPS, stop
 from ..framework.data.esper_bridge import Membership
 from ..framework.data.interpolation import restart
 from ..framework.jit.records.record import Record, make_record
@@ -110,7 +111,7 @@ class Simulation:
         table.clock = self._world.clock
         table.on_make, table.on_expose = self._follow_columns, self._follow_exposed
         table.on_arrays_changed, table.on_changed_inside = self.scene.follow_arrays, self.sleepers.follow_change
-        table.forces_are_summed = self._forces_are_summed
+        table.forces_are_summed, table.has_flown = self._forces_are_summed, lambda: self.state.moved
         table.writable_while = {"force": self._force_is_writable, "torque": self._torque_is_writable}
 
     def _wire_program(self) -> None:
@@ -323,6 +324,8 @@ class Simulation:
     def end_step(self) -> None:
         for finish in self.plugin_stages.finishers:  # while there is a way back
             finish(self._world)
+        if self.table.driven:
+            stop(self.table)
         self.table.in_step = False
         self.copies.kept = False
         if self.sleepers.on:
@@ -378,6 +381,7 @@ class Simulation:
         """Go on from that; the table is what it was then. moved: it has had other rows, or other components."""
         state = self.state
         self.set_gravity(saved["gravity"])
+        self.table.driven = STOPS in self.table.arrays
         put_rows_back(state.warm_start, WARM_START_ROWS, saved["warm_start"])
         put_rows_back(state.contacts, CONTACT_ROWS, saved["contacts"])
         state.warm_start.rows_version[:] = -1

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from ..names import did_you_mean
 from ..typing import BodiesColumn, Integers
+from .columns import Column
 from .component import Component
+from .driven import drive
 from .interpolation import interpolated
 from .table import DYNAMIC, KINDS, KINEMATIC, STATIC, Table
 
@@ -89,6 +91,32 @@ class Bodies:
         """The same of rotations, by slerp (Shoemake, 1985): (n,) rad in 2D, (n, 4) in 3D. Only what turns by its Spin
         is between two steps."""
         return interpolated(self._table, "rotation", self.rows)
+
+    def move_to(self, positions: Any, rotations: Any = None) -> None:
+        """As :meth:`RigidBody.move_to`, for all: ``bodies.kinematic.move_to(positions, rotations)``.
+
+        positions
+            (n, d) m; where a row is nan the body goes on as it does
+        rotations
+            None, or (n,) rad, in 3D (n, 4), of bodies with a Spin alone
+
+        ValueError, and nothing has changed, if these are not kinematic bodies, or for a row that cannot be.
+        """
+        table, n, d = self._table, len(self), self._table.dimensions
+        if self._kind != KINEMATIC:
+            raise ValueError("move_to moves kinematic bodies: bodies.kinematic.move_to(positions)")
+        places = np.array(positions, float)
+        if places.shape != (n, d):
+            raise ValueError(f"move_to takes positions of shape {(n, d)}, got shape {places.shape}")
+        chosen = np.flatnonzero(~np.isnan(places).all(axis=1))
+        wrong = ~np.isfinite(places[chosen]).all(axis=1)
+        if wrong.any():
+            row = chosen[wrong][0]
+            raise ValueError(f"move_to: a position must be finite, got {places[row].tolist()} (row {row})")
+        turns = None
+        if rotations is not None:
+            turns = Column(item="rotation", owner="bodies", name="move_to").checked_many(rotations, n, d)[chosen]
+        drive(table, chosen + self.rows.start, places[chosen], turns, "move_to")
 
     def row_of(self, entity: int) -> int:
         """The row of that entity among all bodies; KeyError if it is no body."""

@@ -52,6 +52,8 @@ class Table(TableColumns):
         self.on_rows_moved: Callable[[RowPlan], None] = lambda plan: None
         self.on_arrays_changed: Callable[[], None] = lambda: None  # called when a row has got another array
         self.on_changed_inside: Callable[[Any, int, int, np.ndarray], None] = lambda *_: None  # see changed_inside
+        self.driven = False  # whether a body stops at the end of a step, see driven.py
+        self.has_flown: Callable[[], bool] = lambda: False  # whether this step has moved the bodies already
         self.forces_are_summed: Callable[[], bool] = lambda: False  # whether ``force`` holds the sum of this step
         self.adding_forces = False  # force systems do at the moment
         self.frames_applied = False  # whether a force was applied from outside since the last window

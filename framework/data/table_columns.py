@@ -13,8 +13,8 @@ from .component import Component
 
 # Attributes of Bodies:
 RESERVED = (
-    "asleep", "column_names", "dynamic", "has", "interpolated_position", "interpolated_rotation", "kinematic", "row_of",
-    "rows", "rows_of", "static",
+    "asleep", "column_names", "dynamic", "has", "interpolated_position", "interpolated_rotation", "kinematic",
+    "move_to", "row_of", "rows", "rows_of", "static",
 )  # fmt: skip
 
 

@@ -41,7 +41,7 @@ def make_quiet_step(pipeline: Any, physics: Any) -> Callable[[], bool] | None:
             or table.version + table.members_version + registry.version != scene.structure
             or table.static_version != scene.static_version or physics.parts_version != parts_version
             or links.version != scene.version or physics.must_check or unsettled() or sleepers.on or words[others_write]
-            or events.of_esper or (events.handlers and events.any_handlers()) or pipeline.in_step
+            or table.driven or events.of_esper or (events.handlers and events.any_handlers()) or pipeline.in_step
         ):  # fmt: skip
             return False
         if not acquire(False):

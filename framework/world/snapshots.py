@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..data.driven import STOPS
 from ..data.saved.population import LooseValues, Population, PopulationRestore
 from ..data.saved.table import SavedTable
 from ..errors import CaromError
@@ -139,7 +140,7 @@ def state_hash(physics: PhysicsServices) -> str:
         for key, values in {mask: table.column(mask), **columns}.items():
             digest.update(key.encode())
             digest.update(np.ascontiguousarray(values[order] + 0).tobytes())
-    asleep = table.asleep(slice(0, table.count))
-    if asleep.any():
-        digest.update(asleep[order].tobytes())
+    for column in (table.asleep(slice(0, table.count)), table.column(STOPS)):
+        if column.any():
+            digest.update(column[order].tobytes())
     return digest.hexdigest()
