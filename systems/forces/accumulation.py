@@ -20,6 +20,7 @@ from ..sleeping.stages import AWAKE
 from ..stage_system import StagedSystem
 from .stages import limit_velocities, sum_forces
 
+DEPENDS = {"position", "linear_velocity", "rotation"}  # a force of a stage that reads these changes within the step
 LARGEST_TORQUE = 1e150  # N m: squares of it are finite
 
 
@@ -52,8 +53,14 @@ class ForceAccumulation(StagedSystem):
         self.several_evaluations = False  # the integrator sums forces again within the step
         self.summed: np.ndarray | None = None  # a copy, while integrators with more stages need to compare
 
+    @property
+    def change(self) -> bool:
+        """Whether some force depends on position, velocity or time: integrators of several evaluations sum again."""
+        stages = (stage for stage in self._program.stages if stage.plugin and "force" in stage.writes)
+        return bool(self.world.force_systems) or any(not DEPENDS.isdisjoint(stage.reads) for stage in stages)
+
     def _parts(self) -> list[Any]:
-        if not self.world.force_systems:
+        if not self.world.force_systems and not (self.several_evaluations and self.change):
             return [self.segment()]
         return [self.segment(), PythonPart(self.name, self._add_of_first_evaluation)]
 

@@ -158,7 +158,9 @@ class Integration(StagedSystem):
     @property
     def in_python(self) -> bool:
         """Whether the integrator is called from Python: it is a plugin's, or forces change within the step."""
-        return type(self.integrator) not in STANDARD or bool(self.world.force_systems)
+        integrator = self.integrator
+        again = integrator.evaluations > 1 and self._forces.change
+        return type(integrator) not in STANDARD or bool(self.world.force_systems) or again
 
     def prepare(self) -> None:
         """Before a step of other settings, systems or bodies: room and numbers for the integrator."""
@@ -166,9 +168,9 @@ class Integration(StagedSystem):
         state.moves_with_old_velocity = bool(getattr(integrator, "moves_with_old_velocity", False))
         state.flies = isinstance(integrator, Flight)
         state.pushed |= state.has_force_systems  # one may be gone: sleepers look at their forces
-        state.force_changes = bool(self.world.force_systems)
+        state.force_changes = self._forces.change
         by_stages = any("force" in stage.writes for stage in self._program.stages if stage.plugin)
-        state.has_force_systems = state.force_changes or by_stages
+        state.has_force_systems = bool(self.world.force_systems) or by_stages
         state.heavy_damping, state.heavy_step = math.inf, 0.0
         state.path_degree = state.usual_path_degree = integrator.path
         self._forces.several_evaluations = integrator.evaluations > 1
@@ -194,7 +196,7 @@ class Integration(StagedSystem):
         if self._viewed != (self._scene.version, state.first):
             self._take_views()
         motion = self._motion
-        motion.evaluator = self._evaluator(motion.force) if self.world.force_systems else None
+        motion.evaluator = self._evaluator(motion.force) if self._forces.change else None
         torque = self._take_torques(motion)
         at_start = None if torque is None or self.turns.within else torque.copy()
         try:
@@ -268,7 +270,7 @@ class Integration(StagedSystem):
             return
         yield from kernels_of(self.segment(last="drift"))
         called: Any = getattr(self.integrator, "kernels", None)  # a plugin's need not say
-        for name in called(bool(self.world.force_systems)) if called is not None else ():
+        for name in called(self._forces.change) if called is not None else ():
             yield PlannedKernel(name, FLIES)
         for name in self._turning():
             yield PlannedKernel(name, TURNS_BESIDE)

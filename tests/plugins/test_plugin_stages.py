@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from helpers_processes import output_of
 from helpers_steps import both_ways  # noqa: F401  every test with each
-from worlds import ball, floor
+from worlds import METHODS, ball, floor
 
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Plugin, PluginError, Settings, StepError, System, World
@@ -395,3 +395,31 @@ def test_columns_that_a_stage_names_have_rows_where_nothing_else_needs_them():
             )
             world.step()
             assert (world.bodies.constant_force == (0.5, 0.25)).all()
+
+
+@pytest.mark.parametrize("settings", [{"integrator": name} for name in METHODS] + [{"collision": "event_driven"}])
+def test_forces_that_depend_on_where_bodies_are_have_the_bits_of_a_force_system(settings):
+    """A spring to the origin with drag, beside a push: integrators of several evaluations sum them again."""
+    plugin = Plugin("spring")
+
+    @plugin.stage(after="sum_forces", reads=("position", "linear_velocity"), writes=("force",))
+    def pull(state, dt):
+        for i in range(state.force_first, state.dynamic):
+            drawn = add(scale(state.bodies.position[i], -9.0), scale(state.bodies.linear_velocity[i], -0.1))
+            state.bodies.force[i] = add(state.bodies.force[i], drawn)
+
+    class Pull(ForceSystem):
+        def add_forces(self, bodies, time):
+            bodies.force += -9.0 * bodies.position + -0.1 * bodies.linear_velocity
+
+    places = []
+    for plugins in ((plugin,), ()):
+        world = World(Physics(2, gravity=(0.0, -1.0)), *plugins, settings=Settings(**settings))
+        body = RigidBody(linear_velocity=(0.0, 2.0), constant_force=(0.5, 0.0), linear_damping=0.25)
+        world.create_entity(Transform((1.0, 0.0)), body)
+        if not plugins:
+            world.add_system(Pull())
+        for _ in range(120):
+            world.step()
+        places.append(world.bodies.position.copy())
+    np.testing.assert_array_equal(*places)
