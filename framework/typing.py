@@ -14,6 +14,8 @@ Vector: TypeAlias = Sequence[float] | NDArray[Any]  # d numbers, in whatever hol
 Vectors: TypeAlias = Sequence[Vector] | NDArray[Any]  # m of them
 Numbers: TypeAlias = float | Sequence[float] | NDArray[Any]  # m numbers, or one for all
 Entities: TypeAlias = Sequence[int] | NDArray[np.integer[Any]]
+Masks: TypeAlias = int | Sequence[int] | NDArray[np.integer[Any]]  # bits of layers, m of them or one for all
+Excludes: TypeAlias = int | Entities | Sequence[Entities] | None  # for all queries, one for each, several for each
 
 if TYPE_CHECKING:
 
@@ -49,6 +51,6 @@ else:
     VectorField = RotationField = ArrayField = BodiesColumn = Any
 
 __all__ = [
-    "Array", "ArrayField", "BodiesColumn", "Entities", "Integers", "Numbers", "RotationField", "Vector", "VectorField",
-    "Vectors",
+    "Array", "ArrayField", "BodiesColumn", "Entities", "Excludes", "Integers", "Masks", "Numbers", "RotationField",
+    "Vector", "VectorField", "Vectors",
 ]  # fmt: skip

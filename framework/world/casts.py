@@ -10,7 +10,7 @@ import numpy as np
 
 from ..data.component import Component, Many
 from ..plugins.registry import Registry
-from ..typing import Entities, Numbers, Vector, Vectors
+from ..typing import Entities, Excludes, Masks, Numbers, Vector, Vectors
 from . import query_arguments as check
 from .hits import CastHit, CastHits
 from .services import PhysicsServices
@@ -29,14 +29,14 @@ class CastVerbs:
         max_distance: float = math.inf,
         mask: int = -1,
         *,
-        exclude: int | None = None,
+        exclude: int | Entities | None = None,
         only_nearest: bool = False,
     ) -> list[CastHit]:
         """All colliders on the ray, nearest first, ties by id; at most one with ``only_nearest``, which is quicker.
 
         The ray starts at ``origin`` and runs along ``direction`` (of any length but zero) for ``max_distance`` metres.
         A collider that holds the origin is hit at distance 0, with the normal of its nearest way out. ``mask``: a bit
-        for each layer that is asked for; ``exclude``: an entity to leave out, such as the one that looks.
+        for each layer that is asked for; ``exclude``: an entity to leave out, such as the one that looks, or several.
         ValueError names the argument that is wrong.
         """
         services = self._synchronized()
@@ -45,9 +45,8 @@ class CastVerbs:
         if not any(way):
             raise ValueError(f"ray_cast: direction must not be zero, got {direction!r}")
         limit = np.array((check.distance(max_distance, "ray_cast: max_distance", endless=True),))
-        bits = check.mask(mask, "ray_cast: mask")
-        others = check.excluded(exclude, "ray_cast: exclude", 1)
-        hits = services.queries.rays(np.array((start,)), np.array((way,)), limit, bits, others, only_nearest)
+        wanted = check.wanted_of_one("ray_cast", mask, exclude)
+        hits = services.queries.rays(np.array((start,)), np.array((way,)), limit, wanted, only_nearest)
         return _listed(hits)
 
     def ray_casts(
@@ -55,14 +54,15 @@ class CastVerbs:
         origins: Vectors,
         directions: Vectors | Vector,
         max_distances: Numbers = math.inf,
-        mask: int = -1,
+        masks: Masks = -1,
         *,
-        exclude: int | Entities | None = None,
+        excludes: Excludes = None,
     ) -> CastHits:
         """The nearest hit of each of m rays, as columns.
 
-        origins (m, d); directions (m, d) or one for all; max_distances and exclude: one for all or (m,), and nothing is
-        excluded where that is -1. ValueError names the first row with a direction of zero.
+        origins (m, d); directions (m, d) or one for all; max_distances and masks: one for all or (m,); excludes: one
+        for all, (m,), or several for each, (m, k), and nothing is excluded where that is -1. ValueError names the first
+        row with a direction of zero.
         """
         services = self._synchronized()
         starts = check.points(origins, "ray_casts: origins", services.dimensions)
@@ -71,9 +71,8 @@ class CastVerbs:
         if zero.any():
             raise ValueError(f"ray_casts: directions must not be zero, as row {int(np.argmax(zero))} is")
         limits = check.distances(max_distances, "ray_casts: max_distances", len(starts), endless=True)
-        bits = check.mask(mask, "ray_casts: mask")
-        others = check.excluded(exclude, "ray_casts: exclude", len(starts))
-        return services.queries.rays(starts, ways, limits, bits, others, True)
+        wanted = check.wanted("ray_casts", len(starts), masks, excludes)
+        return services.queries.rays(starts, ways, limits, wanted, True)
 
     def shape_cast(
         self,
@@ -82,24 +81,28 @@ class CastVerbs:
         displacement: Vector,
         mask: int = -1,
         *,
-        exclude: int | None = None,
+        exclude: int | Entities | None = None,
         only_nearest: bool = False,
+        against: bool = False,
     ) -> list[CastHit]:
         """All colliders that a shape meets on its way, nearest first, ties by id; one at most with ``only_nearest``.
 
         ``shape`` is any collider, used as a value: ``SphereCollider(0.5)``. It is moved in a straight line and not
-        turned, its offset counts, its layer, mask and group do not. It starts at ``position``, where a Transform would
-        be. What it touches there is hit at distance 0, with the normal along which the two part soonest; that also is
-        the answer for a displacement of zero. ``mask`` and ``exclude`` as in :meth:`ray_cast`.
+        turned. It meets what a body with this collider would: its offset, layer, mask and group count. It starts at
+        ``position``, where a Transform would be. What it touches there is hit at distance 0, with the normal along
+        which the two part soonest; that also is the answer for a displacement of zero. ``mask``: of these, only what is
+        in one of its layers. ``exclude`` as in :meth:`ray_cast`. ``against``: only what opposes the motion, with a
+        normal against it: not what the shape leaves, slides along or grazes. ValueError names the argument that is
+        wrong, TypeError a shape that is no collider of this world.
         """
         services = self._synchronized()
-        columns = self._values(shape, "shape_cast", services.dimensions)
+        columns, layers = self._asked(shape, "shape_cast", services.dimensions)
         start = check.point(position, "shape_cast: position", services.dimensions)
         way = check.point(displacement, "shape_cast: displacement", services.dimensions)
-        bits = check.mask(mask, "shape_cast: mask")
-        others = check.excluded(exclude, "shape_cast: exclude", 1)
+        wanted = check.met_by(layers, check.wanted_of_one("shape_cast", mask, exclude))
+        opposing = check.flag(against, "shape_cast: against")
         hits = services.queries.shapes(
-            type(shape), columns, np.array((start,)), np.array((way,)), bits, others, only_nearest
+            type(shape), columns, np.array((start,)), np.array((way,)), wanted, only_nearest, opposing
         )
         return _listed(hits)
 
@@ -108,26 +111,31 @@ class CastVerbs:
         shapes: Component | Many,
         positions: Vectors,
         displacements: Vectors | Vector,
-        mask: int = -1,
+        masks: Masks = -1,
         *,
-        exclude: int | Entities | None = None,
+        excludes: Excludes = None,
+        against: bool = False,
     ) -> CastHits:
         """The first hit of each of m moving shapes, as columns.
 
         shapes: one collider for all, or ``SphereCollider.many(radius=radii)``; positions (m, d); displacements (m, d)
-        or one for all; exclude: one for all or (m,).
+        or one for all; masks: one for all or (m,); excludes: one for all, (m,), or several for each, (m, k); against as
+        in :meth:`shape_cast`.
         """
         services = self._synchronized()
         starts = check.points(positions, "shape_casts: positions", services.dimensions)
         ways = check.points(displacements, "shape_casts: displacements", services.dimensions, len(starts))
-        columns = self._values(shapes, "shape_casts", services.dimensions, len(starts))
-        bits = check.mask(mask, "shape_casts: mask")
-        others = check.excluded(exclude, "shape_casts: exclude", len(starts))
+        columns, layers = self._asked(shapes, "shape_casts", services.dimensions, len(starts))
+        wanted = check.met_by(layers, check.wanted("shape_casts", len(starts), masks, excludes))
         component = shapes.component if isinstance(shapes, Many) else type(shapes)
-        return services.queries.shapes(component, columns, starts, ways, bits, others, True)
+        opposing = check.flag(against, "shape_casts: against")
+        return services.queries.shapes(component, columns, starts, ways, wanted, True, opposing)
 
-    def _values(self, shape: Any, verb: str, dimensions: int, many: int | None = None) -> dict[str, np.ndarray]:
-        """The shape's own columns and its offset, a row for each cast; TypeError if it is no collider of this world."""
+    def _asked(
+        self, shape: Any, verb: str, dimensions: int, many: int | None = None
+    ) -> tuple[dict[str, np.ndarray], tuple[Any, Any, Any]]:
+        """The shape's own columns and its offset, a row for each query, and its layer, mask and group, or (m,) of each;
+        TypeError if it is no collider of this world."""
         component = shape.component if isinstance(shape, Many) and many is not None else type(shape)
         registered = self.registry.shapes.get(component)
         if registered is None:
@@ -137,14 +145,16 @@ class CastVerbs:
         count = 1 if many is None else many
         if isinstance(shape, Many):
             arrays = shape.arrays(count, dimensions)
-            return {name: arrays[component.columns[name].key] for name in names}
+            layer, mask, group = (arrays[component.columns[name].key] for name in ("layer", "mask", "group"))
+            return {name: arrays[component.columns[name].key] for name in names}, (layer, mask, group)
         shape.check_dimensions(dimensions)
         made = {}
         for name in names:
             field = component.columns[name]
             value = np.asarray(field.unshared(getattr(shape, name)), field.dtype)
-            made[name] = np.array(np.broadcast_to(value, (count, *field.item_shape(dimensions))), order="C")
-        return made
+            made[name] = np.empty((count, *field.item_shape(dimensions)), field.dtype)
+            made[name][:] = value
+        return made, (shape.layer, shape.mask, shape.group)
 
 
 def _listed(hits: CastHits) -> list[CastHit]:

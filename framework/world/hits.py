@@ -70,6 +70,42 @@ class Neighbours(Hits):
         return np.repeat(self.asker_rows, self.counts), self.rows
 
 
+class OverlapHits(Hits):
+    """What touches each of m colliders, ``hits[i]`` the ids, deepest first, then ascending; columns, a row for each of
+    ``entities``: depths (k,), points and normals (k, d), as of :class:`OverlapHit`."""
+
+    def __init__(
+        self,
+        offsets: np.ndarray,
+        entities: np.ndarray,
+        rows: np.ndarray,
+        depths: np.ndarray,
+        points: np.ndarray,
+        normals: np.ndarray,
+    ) -> None:
+        super().__init__(offsets, entities, rows)
+        self.depths = depths
+        self.points = points
+        self.normals = normals
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class OverlapHit:
+    """What a collider overlaps.
+
+    depth
+        m, how far they are in each other; 0 if they just touch
+    point, normal
+        (d,) the middle of the overlap, and the unit vector from the other one to the collider: moved by ``depth`` along
+        it, the collider just touches
+    """
+
+    entity: int
+    depth: float
+    point: np.ndarray
+    normal: np.ndarray
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class NearestHit:
     """The surface nearest to a point.

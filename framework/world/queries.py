@@ -6,10 +6,11 @@ import math
 
 import numpy as np
 
-from ..typing import Entities, Numbers, Vector, Vectors
+from ..data.component import Component, Many
+from ..typing import Entities, Excludes, Masks, Numbers, Vector, Vectors
 from . import query_arguments as check
 from .casts import CastVerbs
-from .hits import Hits, NearestHit, NearestHits, Neighbours
+from .hits import Hits, NearestHit, NearestHits, Neighbours, OverlapHit, OverlapHits
 
 
 class QueryVerbs(CastVerbs):
@@ -43,17 +44,17 @@ class QueryVerbs(CastVerbs):
         size = check.distance(radius, "query_sphere: radius")
         return services.queries.sphere(place, size, check.mask(mask, "query_sphere: mask"))
 
-    def query_spheres(self, centres: Vectors, radii: Numbers, mask: int = -1) -> Hits:
-        """For each of m spheres (centres (m, d), radii one or (m,)) the ids of the entities it touches, ascending."""
+    def query_spheres(self, centres: Vectors, radii: Numbers, masks: Masks = -1) -> Hits:
+        """For each of m spheres (centres (m, d); radii, masks: one or (m,)) the ids of what it touches, ascending."""
         services = self._synchronized()
         places = check.points(centres, "query_spheres: centres", services.dimensions)
         sizes = check.distances(radii, "query_spheres: radii", len(places))
-        return services.queries.spheres(places, sizes, check.mask(mask, "query_spheres: mask"))
+        return services.queries.spheres(places, sizes, check.wanted("query_spheres", len(places), masks))
 
-    def query_aabbs(self, lower: Vectors, upper: Vectors, mask: int = -1) -> Hits:
+    def query_aabbs(self, lower: Vectors, upper: Vectors, masks: Masks = -1) -> Hits:
         """For each of m boxes (``lower`` and ``upper`` (m, d)) the ids of the entities it touches, ascending.
 
-        ValueError names the first row in which a lower bound exceeds the upper one.
+        masks: one for all or (m,). ValueError names the first row in which a lower bound exceeds the upper one.
         """
         services = self._synchronized()
         low = check.points(lower, "query_aabbs: lower", services.dimensions)
@@ -61,22 +62,57 @@ class QueryVerbs(CastVerbs):
         if (low > high).any():
             row = int(np.argmax((low > high).any(axis=1)))
             raise ValueError(f"query_aabbs: lower {low[row].tolist()} exceeds upper {high[row].tolist()} in row {row}")
-        return services.queries.boxes(low, high, check.mask(mask, "query_aabbs: mask"))
+        return services.queries.boxes(low, high, check.wanted("query_aabbs", len(low), masks))
+
+    def overlaps(
+        self, shape: Component, position: Vector, mask: int = -1, *, exclude: int | Entities | None = None
+    ) -> list[OverlapHit]:
+        """All that a collider touches at a place, the deepest first, ties by id: how deep, where, and the way out.
+
+        ``shape``, ``mask`` and ``exclude`` as in :meth:`shape_cast`; ``position``, (d,) m, is where a Transform would
+        be. ValueError names the argument that is wrong, TypeError a shape that is no collider of this world.
+        """
+        services = self._synchronized()
+        columns, layers = self._asked(shape, "overlaps", services.dimensions)
+        place = check.point(position, "overlaps: position", services.dimensions)
+        wanted = check.met_by(layers, check.wanted_of_one("overlaps", mask, exclude))
+        hits = services.queries.overlaps(type(shape), columns, np.array((place,)), wanted)
+        found = zip(hits.entities.tolist(), hits.depths.tolist(), hits.points, hits.normals, strict=True)
+        return [OverlapHit(*hit) for hit in found]
+
+    def shape_overlaps(
+        self,
+        shapes: Component | Many,
+        positions: Vectors,
+        masks: Masks = -1,
+        *,
+        excludes: Excludes = None,
+    ) -> OverlapHits:
+        """:meth:`overlaps` of m colliders, as columns.
+
+        shapes: one collider for all, or ``SphereCollider.many(radius=radii)``; positions (m, d); masks: one for all or
+        (m,); excludes: one for all, (m,), or several for each, (m, k).
+        """
+        services = self._synchronized()
+        places = check.points(positions, "shape_overlaps: positions", services.dimensions)
+        columns, layers = self._asked(shapes, "shape_overlaps", services.dimensions, len(places))
+        wanted = check.met_by(layers, check.wanted("shape_overlaps", len(places), masks, excludes))
+        component = shapes.component if isinstance(shapes, Many) else type(shapes)
+        return services.queries.overlaps(component, columns, places, wanted)
 
     def query_nearest(
-        self, point: Vector, mask: int = -1, *, max_distance: float = math.inf, exclude: int | None = None
+        self, point: Vector, mask: int = -1, *, max_distance: float = math.inf, exclude: int | Entities | None = None
     ) -> NearestHit | None:
         """The collider whose surface is nearest to ``point``, at most ``max_distance`` m away; None if there is none.
 
         Inside a collider the distance is negative, and the deepest is the nearest. Ties go to the smaller id.
-        ``exclude``: an entity to leave out.
+        ``exclude``: an entity to leave out, or several.
         """
         services = self._synchronized()
         place = check.point(point, "query_nearest: point", services.dimensions)
         limit = check.distance(max_distance, "query_nearest: max_distance", endless=True)
-        bits = check.mask(mask, "query_nearest: mask")
-        others = check.excluded(exclude, "query_nearest: exclude", 1)
-        hits = services.queries.nearest(np.array((place,)), np.array((limit,)), bits, others)
+        wanted = check.wanted_of_one("query_nearest", mask, exclude)
+        hits = services.queries.nearest(np.array((place,)), np.array((limit,)), wanted)
         if hits.row[0] < 0:
             return None
         return NearestHit(int(hits.entity[0]), float(hits.distance[0]), hits.point[0], hits.normal[0])
@@ -84,18 +120,19 @@ class QueryVerbs(CastVerbs):
     def query_nearests(
         self,
         points: Vectors,
-        mask: int = -1,
+        masks: Masks = -1,
         *,
         max_distances: Numbers = math.inf,
-        exclude: int | Entities | None = None,
+        excludes: Excludes = None,
     ) -> NearestHits:
-        """:meth:`query_nearest` for m points (m, d), as columns. max_distances, exclude: one for all or (m,)."""
+        """:meth:`query_nearest` for m points (m, d), as columns.
+
+        max_distances, masks, excludes: one for all or (m,); excludes: also several for each, (m, k).
+        """
         services = self._synchronized()
         places = check.points(points, "query_nearests: points", services.dimensions)
         limits = check.distances(max_distances, "query_nearests: max_distances", len(places), endless=True)
-        bits = check.mask(mask, "query_nearests: mask")
-        others = check.excluded(exclude, "query_nearests: exclude", len(places))
-        return services.queries.nearest(places, limits, bits, others)
+        return services.queries.nearest(places, limits, check.wanted("query_nearests", len(places), masks, excludes))
 
     def neighbours(self, radius: float, mask: int = -1, *, of: Entities | None = None) -> Neighbours:
         """For every body the others whose position is within ``radius`` m of its own, by id.

@@ -8,11 +8,29 @@ from __future__ import annotations
 import math
 import numbers
 import operator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 NO_ENTITY = -1  # in arrays of entities to leave out
+NONE_EXCLUDED = np.empty((1, 0), np.int64)
+
+
+class Wanted(NamedTuple):
+    """Which bodies m queries look for.
+
+    masks
+        bits of layers, one for all or (m,)
+    excluded
+        (m, k) ids to leave out, NO_ENTITY: none; NONE_EXCLUDED
+    layers, groups
+        if colliders ask, theirs, one for all or (m,): masks and groups of bodies count then
+    """
+
+    masks: Any
+    excluded: np.ndarray
+    layers: Any = 0
+    groups: Any = 0
 
 
 def point(value: Any, name: str, dimensions: int) -> tuple[float, ...]:
@@ -65,6 +83,13 @@ def distances(value: Any, name: str, count: int, *, endless: bool = False) -> np
     return made
 
 
+def flag(value: Any, name: str) -> bool:
+    """True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise ValueError(f"{name} must be True or False, got {value!r}")
+    return bool(value)
+
+
 def mask(value: Any, name: str) -> int:
     """Bits of layers."""
     try:
@@ -76,11 +101,45 @@ def mask(value: Any, name: str) -> int:
     return bits
 
 
-def excluded(value: Any, name: str, count: int) -> np.ndarray:
-    """(m,) ids to leave out, from None, one id, or one for each query (-1: none)."""
-    if value is None:
-        return np.full(count, NO_ENTITY)
+def masks(value: Any, name: str, count: int) -> int | np.ndarray:
+    """Bits of layers for all queries, or (m,)."""
+    if not isinstance(value, (list, tuple)) and not getattr(value, "ndim", 0):
+        return mask(value, name)
     made = np.asarray(value)
-    if made.dtype.kind not in "iu" or made.shape not in ((), (count,)):
-        raise ValueError(f"{name} must be None, an entity or {count} of them, got {value!r}")
-    return np.array(np.broadcast_to(made, count), np.int64)
+    if made.shape != (count,) or (count and (made.dtype.kind not in "iu" or made.max() >= 1 << 63)):
+        raise ValueError(f"{name} must be an integer of 64 bits, one for each layer, or {count} of them, got {value!r}")
+    return made.astype(np.int64)
+
+
+def excluded(value: Any, name: str, count: int | None = None) -> np.ndarray:
+    """(m, k) ids to leave out (-1: none), from None, one id or, for each query, one or several; or, without a count,
+    of one query."""
+    if value is None:
+        return NONE_EXCLUDED
+    many = 1 if count is None else count
+    try:
+        made = np.asarray(value)
+    except ValueError:  # lists of different lengths
+        made = np.empty((0, 0, 0))
+    if made.ndim < 2:
+        made = made.reshape((1, -1) if made.ndim == 0 or count is None else (-1, 1))
+    if made.ndim != 2 or made.shape[0] not in (1, many) or (made.size and made.dtype.kind not in "iu"):
+        several = "several" if count is None else f"{count} of them, or several for each: (1, k) or ({count}, k)"
+        raise ValueError(f"{name} must be None, an entity or {several}, got {value!r}")
+    return np.array(made if len(made) == many else np.broadcast_to(made, (many, made.shape[1])), np.int64)
+
+
+def met_by(colliders: tuple[Any, Any, Any], wanted: Wanted) -> Wanted:
+    """Of what is wanted, what colliders meet with these layers, masks and groups, one for all or (m,)."""
+    layers, own, groups = colliders
+    return Wanted(wanted.masks & own, wanted.excluded, layers, groups)
+
+
+def wanted_of_one(verb: str, mask_of: Any, exclude: Any) -> Wanted:
+    """Of one query of that verb, from its arguments ``mask`` and ``exclude``."""
+    return Wanted(mask(mask_of, f"{verb}: mask"), excluded(exclude, f"{verb}: exclude"))
+
+
+def wanted(verb: str, count: int, masks_of: Any, excludes: Any = None) -> Wanted:
+    """Of many, from ``masks`` and ``excludes``."""
+    return Wanted(masks(masks_of, f"{verb}: masks", count), excluded(excludes, f"{verb}: excludes", count))

@@ -13,9 +13,9 @@ _NAMES = {
     "framework": (
         "Bodies", "CaromError", "CastHit", "CastHits", "Column", "Component", "Contact", "Contacts", "ContactsBetween",
         "Convex", "FaultError", "ForceSystem", "Hits", "MissingComponentError", "NearestHit", "NearestHits",
-        "Neighbours", "NoPhysicsError", "Phase", "PhysicsWarning", "Plan", "Plugin", "PluginError", "ScheduleError",
-        "Settings", "Snapshot", "Stats", "StepError", "System", "UnhandledPairError", "Vector", "World",
-        "array_column", "column", "use_kernels",
+        "Neighbours", "NoPhysicsError", "OverlapHit", "OverlapHits", "Phase", "PhysicsWarning", "Plan", "Plugin",
+        "PluginError", "ScheduleError", "Settings", "Snapshot", "Stats", "StepError", "System", "UnhandledPairError",
+        "Vector", "World", "array_column", "column", "use_kernels",
     ),
     "components": ("ALL_LAYERS", "AABBCollider", "Collider", "Prefab", "RigidBody", "SphereCollider", "Transform"),
     "systems": (

@@ -10,6 +10,7 @@ import numpy as np
 from ...framework.data.component import Component
 from ...framework.jit.records.record import Record, make_record
 from ...framework.plugins.registry import Registry
+from ...framework.world.query_arguments import Wanted
 from ..broad_phase.tree.build import MAX_LEVELS
 from ..shapes.linking.linked_shapes import LinkedShapes, ParameterRecords
 from ..shapes.linking.parameters import bind, make_parameter_record
@@ -26,6 +27,11 @@ def slices_of(count: int) -> Iterator[slice]:
         yield slice(start, min(start + MOST_QUERIES, count))
 
 
+def rows_of(values: Any, some: slice) -> Any:
+    """Those rows of an array; of one value for all, that."""
+    return values[some] if isinstance(values, np.ndarray) else values
+
+
 class QueryBatch:
     """Room for queries, which the verbs write into the columns of ``record``, and for what they find.
 
@@ -36,6 +42,7 @@ class QueryBatch:
         self.record = make_record(QUERY_BATCH, dimensions)
         self.record.slice_level = np.zeros(MAX_LEVELS + 2, np.int64)
         self.record.slice_begin = np.zeros(MAX_LEVELS + 2)
+        self.record.excluded = np.zeros(FIRST_ROOM, np.int64)
         self.queries = self.results = 0  # rows that there is room for
         self.reserve(FIRST_ROOM, FIRST_ROOM)
 
@@ -53,16 +60,26 @@ class QueryBatch:
         self.radius, self.half_extents = np.zeros(self.queries), self.record.half
         return True
 
+    def ask(self, count: int, some: slice, wanted: Wanted) -> int:
+        """Write what those queries look for, to the first rows; returns how many entities each leaves out."""
+        record, each = self.record, wanted.excluded.shape[1]
+        record.mask[:count] = rows_of(wanted.masks, some)
+        if each:
+            if len(record.excluded) < count * each:
+                record.excluded = np.zeros(count * each, np.int64)
+            record.excluded[: count * each] = wanted.excluded[some].ravel()
+        return each
+
     def copied(self, which: slice | np.ndarray, *names: str) -> tuple[np.ndarray, ...]:
         """Copies of some rows of columns of results."""
         return tuple([self._results[name][which].copy() for name in names])
 
 
 class CollectedHits:
-    """Hits of overlaps and neighbours, taken out of a batch call by call."""
+    """Hits of overlaps and neighbours, taken out of a batch call by call: these columns of the results."""
 
-    def __init__(self, batch: QueryBatch, count: int) -> None:
-        self._record = batch.record
+    def __init__(self, batch: QueryBatch, count: int, names: tuple[str, ...] = ("entity", "row")) -> None:
+        self._batch, self._record, self._names = batch, batch.record, names
         self.offsets = np.zeros(count + 1, np.int64)
         self._queries = self._hits = 0  # taken so far
         self._pieces: list[tuple[np.ndarray, ...]] = []
@@ -73,13 +90,13 @@ class CollectedHits:
             ends = self._record.end[first:stop]
             self.offsets[self._queries + 1 : self._queries + 1 + stop - first] = ends + self._hits
             found = int(ends[-1])
-            self._pieces.append((self._record.entity[:found].copy(), self._record.row[:found].copy()))
+            self._pieces.append(self._batch.copied(slice(found), *self._names))
             self._queries += stop - first
             self._hits += found
 
-    def entities_and_rows(self) -> tuple[np.ndarray, np.ndarray]:
+    def columns(self) -> tuple[np.ndarray, ...]:
         """All that was taken."""
-        return joined(self._pieces) if self._pieces else (np.empty(0, np.int64), np.empty(0, np.int64))
+        return joined(self._pieces) if self._pieces else self._batch.copied(slice(0), *self._names)
 
 
 class QueryShape:

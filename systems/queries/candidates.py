@@ -89,15 +89,28 @@ def box_at(tree, place):
 
 
 @inlined
-def has_layer(state, batch, i):
-    """Whether the layer of row i is one of those that the queries look for."""
-    return state.colliders.layer[state.bodies.collider_slot[i], i] & batch.mask != 0
+def has_layer(state, batch, q, i):
+    """Whether the layer of row i is one of those that query q looks for."""
+    return state.colliders.layer[state.bodies.collider_slot[i], i] & batch.mask[q] != 0
+
+
+@part
+def is_selected(state, batch, q, i):
+    """Whether query q does not leave out row i; a collider that asks meets what a body with it would meet."""
+    if batch.query.is_collider:
+        colliders, slot, group = state.colliders, state.bodies.collider_slot[i], batch.group[q]
+        if colliders.mask[slot, i] & batch.layer[q] == 0 or (group != 0 and colliders.group[slot, i] == group):
+            return False
+    count, left_out = batch.excluded_count, False
+    for k in range(count * q, count * q + count):
+        left_out |= batch.excluded[k] == state.bodies.entity[i]
+    return not left_out
 
 
 @inlined
 def is_wanted(state, batch, q, i):
     """Whether query q looks for row i."""
-    return has_layer(state, batch, i) and state.bodies.entity[i] != batch.excluded[q]
+    return has_layer(state, batch, q, i) and (not batch.selects or is_selected(state, batch, q, i))
 
 
 @inlined

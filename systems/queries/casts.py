@@ -17,7 +17,7 @@ from ..broad_phase.uniform_grid import LANES, cells_around, outline
 from ..shapes.query import query_half_extents
 from ..shapes.tolerances import ENDLESS
 from .candidates import box_at, box_rounding, frame_of, is_wanted, may_be_near_at, nan_vector, places_of, row_at
-from .first_touch import LAST_STEP, Path, first_touch_of_cast
+from .first_touch import LAST_STEP, Path, first_touch_of_cast, touch_in_the_way
 
 SLICE_SLACK = 1.0 + 4.0 * LAST_STEP  # so that bodies at the nearest distance are all tested, in whatever order
 
@@ -137,7 +137,10 @@ def cast_at(state, batch, q, path, i, box, between):
     reach = batch.search_limit[q] * SLICE_SLACK
     enter, leave = box_interval(box[0], box[1], path, reach)
     if enter <= leave and between[0] <= enter < between[1] and is_wanted(state, batch, q, i):
-        touches, distance, normal, point = first_touch_of_cast(state, batch, q, i, path, leave, reach)
+        touch = first_touch_of_cast(state, batch, q, i, path, leave, reach)
+        if batch.against:
+            touch = touch_in_the_way(state, batch, q, i, path, leave, reach, touch)
+        touches, distance, normal, point = touch
         if touches:
             keep_hit(state, batch, q, i, path, (distance, normal, point))
 

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ...framework.compilation import inlined, part, pasted
-from ...framework.vectors import add_scaled, dot, length, scale
+from ...framework.vectors import add, add_scaled, dot, item, length, scale, sub
 from ..integration.trajectory import ROUNDING
 from ..shapes.query import evaluate_against, sweep_against
 from .candidates import to_collider
@@ -25,6 +25,8 @@ CAST_STEPS = 100  # a graze takes about 30; what still approaches after that cou
 LAST_STEP = 1e-9  # of the way: the most that rounding is made up for
 LONGEST_SPAN = 1e200  # m; on the way past bodies without end
 SPAN_RATIO = 1e6  # the way that a sweep is given may be so many times longer than needed
+MOST_SHIFTS = 8  # off what is left, before the shape counts as wedged in
+STRIDE, MOST_STRIDES = 0.2, 1000  # of the size of a shape that is wedged in; at most so many
 
 # start: centre of the query's shape; direction: unit vector; inverse: 1 / direction; half: half extents, with room for
 # rounding.
@@ -116,3 +118,58 @@ def sweep_query(state, batch, q, i, d, way):
 
 
 first_touch_of_cast = make_first_touch(evaluate_query, sweep_query)
+
+
+@inlined
+def opposes(path, normal):
+    """Whether a body with this normal, from the shape to the body, is in the way; a slope of rounding errors is not."""
+    return dot(path.direction, normal) > LAST_STEP
+
+
+@part
+def touch_in_the_way(state, batch, q, i, path, leave, reach, touch):
+    """The same for the first touch that opposes the motion; ``touch``: the first of all.
+
+    The path is shifted off what the shape leaves, slides along or grazes, by more than rounding errors and ties. Off a
+    convex body it meets that no more; of another one it meets another side.
+    """
+    start, shape = path.start, state.bodies.shape[i]
+    slack = LAST_STEP * length(path.half) + ROUNDING * (length(start) + length(to_collider(state, start, i)))
+    for _turn in range(MOST_SHIFTS):
+        touches, distance, normal, point = touch
+        if not touches:
+            return touch
+        away = to_collider(state, start, i)
+        _, depth, here, _ = evaluate_against(state, batch.query, q, shape, i, away)
+        if depth < -slack or opposes(path, here):
+            if opposes(path, normal):
+                return touches, distance, normal, add(point, sub(start, path.start))
+            here = normal
+            depth = evaluate_against(
+                state, batch.query, q, shape, i, add_scaled(away, path.direction, 0.0 - distance)
+            )[1]
+        start = add_scaled(start, here, -max(depth, -slack) - 2.0 * slack)
+        shifted = Path(start, path.direction, path.inverse, path.half)
+        touch = first_touch_of_cast(state, batch, q, i, shifted, leave, reach)
+    return touch_of_wedged(state, batch, q, i, path, reach)
+
+
+@part
+def touch_of_wedged(state, batch, q, i, path, reach):
+    """The same of a shape between two sides of a body, both of which it touches all the way: by looks in strides, and
+    bisection between the first that finds what is in the way and the one before."""
+    away, shape, size = to_collider(state, path.start, i), state.bodies.shape[i], math.inf
+    for k in range(len(away)):
+        size = min(size, 2.0 * item(path.half, k))
+    stride = max(STRIDE * size, reach / MOST_STRIDES)
+    low, high, t, looks, inside, normal, point = 0.0, math.inf, 0.0, 0, 0.0, away, away
+    while low < t < high or looks == 0:
+        d = add_scaled(away, path.direction, 0.0 - t)
+        hit, depth, here, place = evaluate_against(state, batch.query, q, shape, i, d)
+        if hit and opposes(path, here):
+            high, inside, normal, point = t, depth / dot(path.direction, here), here, place
+        else:
+            low = t
+        looks += 1
+        t = 0.5 * (low + high) if high < math.inf else min(looks * stride, reach)
+    return high < math.inf, max(high - inside, 0.0), normal, point

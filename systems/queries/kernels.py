@@ -24,8 +24,9 @@ from .records import QUERY_BATCH
 class QueryKernels:
     """Functions of a batch of queries, by address; each compiles or loads when its address is asked for.
 
-    All are called as ``run(function.address, state, batch, moving, static, mask, first, stop)``: addresses of records,
-    the layers, and the queries first..stop-1 of the batch. They return the query to go on with.
+    All are called as ``run(function.address, state, batch, moving, static, excluded, first, stop)``: addresses of
+    records, how many entities each query leaves out, and the queries first..stop-1 of the batch. They return the query
+    to go on with.
     """
 
     def __init__(self, dimensions: int) -> None:
@@ -34,10 +35,10 @@ class QueryKernels:
         state_at, batch_at, tree_at = (record_at(schema, dimensions) for schema in (STATE, QUERY_BATCH, TREE))
         call = linked_call(lambda: signature)
 
-        def run_queries(function, state, batch, moving, static, mask, first, stop):
+        def run_queries(function, state, batch, moving, static, excluded, first, stop):
             known, queries = state_at(state), batch_at(batch)
             known.row_a, known.unsound = NOTHING_TESTED, 0
-            queries.mask = mask
+            queries.excluded_count, queries.selects = excluded, excluded > 0 or queries.query.is_collider
             return call(function, known, queries, tree_at(moving), tree_at(static), first, stop)
 
         self.run: Any = kernel(named(run_queries))

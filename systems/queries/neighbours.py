@@ -23,7 +23,7 @@ def box_of_body(state, batch, q):
 @inlined
 def may_be_near(state, batch, q, centre, i):
     """Whether row i is another body and in the layers; bodies without a collider are in none but all."""
-    in_layers = batch.mask == ALL_LAYERS or (state.bodies.shape[i] >= 0 and has_layer(state, batch, i))
+    in_layers = batch.mask[q] == ALL_LAYERS or (state.bodies.shape[i] >= 0 and has_layer(state, batch, q, i))
     return i != batch.body[q] and in_layers
 
 

@@ -1,24 +1,29 @@
-"""Overlap: which shapes touch the shape of a query."""
+"""Overlap: which shapes touch the shape of a query, and how deep they are in each other."""
 
 from __future__ import annotations
 
-from ...framework.compilation import inlined
+import numpy as np
+
+from ...framework.compilation import inlined, part
+from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, sub
-from ..shapes.query import evaluate_against
-from .candidates import has_layer, make_find_all, to_collider
+from ..shapes.query import evaluate_against, query_half_extents
+from .candidates import is_wanted, make_find_all, to_collider
 
 
 @inlined
 def box_of_query(state, batch, q):
     """(centre, low, high) of the box around the query's shape."""
     centre, half = batch.centre[q], batch.half[q]
+    if batch.query.is_collider:
+        half = query_half_extents(state, batch.query, q)
     return centre, sub(centre, half), add(centre, half)
 
 
 @inlined
 def may_touch(state, batch, q, centre, i):
-    """Whether row i is in one of the layers."""
-    return has_layer(state, batch, i)
+    """Whether query q looks for row i."""
+    return is_wanted(state, batch, q, i)
 
 
 @inlined
@@ -30,6 +35,21 @@ def touches(state, batch, q, centre, i):
 find_touching = make_find_all(box_of_query, may_touch, touches, in_grids=True)
 
 
+@part
+def note_depths(state, batch, q, begin, end):
+    """Of the hits begin..end-1 of query q the depth, the point and the normal, from the body to the query's shape."""
+    for k in range(begin, end):
+        i = batch.row[k]
+        d = to_collider(state, batch.centre[q], i)
+        _, depth, normal, point = evaluate_against(state, batch.query, q, state.bodies.shape[i], i, d)
+        batch.distance[k], batch.normal[k] = -depth, sub(zero_of(state), normal)
+        batch.point[k] = add(batch.centre[q], point)
+
+
 def find_overlaps(state, batch, moving, static, first, stop):
-    """What touches the shapes of queries first..stop-1."""
-    return find_touching(state, batch, moving, static, first, stop)
+    """What touches the shapes of queries first..stop-1; colliders that ask are told how deep."""
+    reached, begin = find_touching(state, batch, moving, static, first, stop), np.int64(0)
+    for q in range(first, reached if batch.query.is_collider else first):
+        note_depths(state, batch, q, begin, batch.end[q])
+        begin = batch.end[q]
+    return reached

@@ -13,7 +13,9 @@ QUERIES = Section(
     direction=vectors(unit="1"),  # casts: unit vector, 0 if the shape does not move
     limit=floats(unit="m"),  # how far to look
     search_limit=floats(unit="m"),  # of a cast: limit, or distance of the nearest hit so far
-    excluded=ints(),  # entity to leave out; -1: none
+    mask=ints(),  # layers to look for
+    layer=ints(),  # of a collider that asks, as its group
+    group=ints(),
     body=ints(),  # neighbours: the row of the body itself
     end=ints(),
 )
@@ -31,8 +33,11 @@ QUERY_BATCH = Schema(
     RESULTS,
     query=QUERY,  # functions and parameters of the query shape
     # options, for all queries
-    mask=integer(),  # layers
+    excluded=ints(),  # entities to leave out, ``excluded_count`` for each query; -1: none
+    excluded_count=integer(),
+    selects=flag(),  # some have a layer that is looked for, and are not wanted all the same
     only_nearest=flag(),  # casts
+    against=flag(),  # only what opposes the motion
     is_ray=flag(),
     radius=number(unit="m"),  # neighbours, m
     # memory of a cast

@@ -13,12 +13,13 @@ from ...framework.data.table import Table
 from ...framework.jit.linking import Linked
 from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Registry
-from ...framework.world.hits import CastHits, Hits, NearestHits, Neighbours
+from ...framework.world.hits import CastHits, Hits, NearestHits, Neighbours, OverlapHits
+from ...framework.world.query_arguments import Wanted
 from ..broad_phase.search import CandidateSearch
 from ..broad_phase.tree.tree import SpatialTree
 from ..scene import Scene
 from ..shapes.attribution import ErrorAttribution
-from .batch import CollectedHits, QueryBatch, QueryShape, joined, slices_of
+from .batch import CollectedHits, QueryBatch, QueryShape, joined, rows_of, slices_of
 from .kernels import query_kernels
 from .neighbours import ALL_LAYERS
 
@@ -32,8 +33,8 @@ class Queries:
     """Answers to queries, from the grids of the step, or trees that the first query after a change builds.
 
     state
-        the record; queries read count, bodies (entity, position, offset, shape, collider_slot), colliders.layer and
-        shapes.parameters
+        the record; queries read count, bodies (entity, position, offset, shape, collider_slot), colliders (layer, mask,
+        group) and shapes.parameters
     table
         tells the rows of entities
     registry
@@ -92,19 +93,39 @@ class Queries:
             centres[0, k], halves[0, k] = (low + high) / 2, (high - low) / 2
         return self._overlaps_of_one(AABBCollider, mask)
 
-    def spheres(self, centres: np.ndarray, radii: np.ndarray, mask: int) -> Hits:
-        return self._overlaps(SphereCollider, centres, radii[:, None], mask)
+    def spheres(self, centres: np.ndarray, radii: np.ndarray, wanted: Wanted) -> Hits:
+        return self._overlaps(SphereCollider, centres, radii[:, None], wanted)
 
-    def boxes(self, lower: np.ndarray, upper: np.ndarray, mask: int) -> Hits:
-        return self._overlaps(AABBCollider, (lower + upper) / 2, (upper - lower) / 2, mask)
+    def boxes(self, lower: np.ndarray, upper: np.ndarray, wanted: Wanted) -> Hits:
+        return self._overlaps(AABBCollider, (lower + upper) / 2, (upper - lower) / 2, wanted)
+
+    def overlaps(
+        self, component: type[Any], columns: dict[str, np.ndarray], positions: np.ndarray, wanted: Wanted
+    ) -> OverlapHits:
+        """What touches colliders, and how deep; the hits of each deepest first."""
+        shape, count = self._query_shape(component, len(positions), own=False), len(positions)
+        collected = CollectedHits(self._batch, count, NEAREST_COLUMNS)
+        for some in slices_of(count if shape is not None else 0):
+            first, stop = 0, some.stop - some.start
+            excluded = self._ask(shape, columns, some, positions, wanted)
+            while first < stop:
+                reached = self._run(self._kernels.overlaps, component, first, stop, excluded)
+                collected.take(first, reached)
+                first = reached
+        entities, rows, distances, points, normals = collected.columns()
+        query = np.repeat(np.arange(count), np.diff(collected.offsets))
+        order = np.lexsort((entities, distances, query))
+        depths = np.maximum(-distances, 0.0)
+        return OverlapHits(collected.offsets, *(column[order] for column in (entities, rows, depths, points, normals)))
 
     def _overlaps_of_one(self, component: type[Any], mask: int) -> list[int]:
         """Ids of the hits of the query in row 0."""
         queries = self._batch.record
-        self._run(self._kernels.overlaps, component, mask, 0, 1)
+        queries.mask[0] = mask
+        self._run(self._kernels.overlaps, component, 0, 1)
         return queries.entity[: queries.end[0]].tolist()
 
-    def _overlaps(self, component: type[Any], centres: np.ndarray, halves: np.ndarray, mask: int) -> Hits:
+    def _overlaps(self, component: type[Any], centres: np.ndarray, halves: np.ndarray, wanted: Wanted) -> Hits:
         if self._query_shape(component, len(centres)) is None:
             return Hits(np.zeros(len(centres) + 1, np.int64), *_no_hits())
         queries, collected = self._batch.record, CollectedHits(self._batch, len(centres))
@@ -112,23 +133,25 @@ class Queries:
             count, first = some.stop - some.start, 0
             queries.centre[:count], queries.half[:count] = centres[some], halves[some]
             self._batch.radius[:count] = halves[some, 0]
+            excluded = self._batch.ask(count, some, wanted)
             while first < count:
-                stop = self._run(self._kernels.overlaps, component, mask, first, count)
+                stop = self._run(self._kernels.overlaps, component, first, count, excluded)
                 collected.take(first, stop)
                 first = stop
-        return Hits(collected.offsets, *collected.entities_and_rows())
+        return Hits(collected.offsets, *collected.columns())
 
     # -- what is near -----------------------------------------------------------------------------
 
-    def nearest(self, points: np.ndarray, limits: np.ndarray, mask: int, excluded: np.ndarray) -> NearestHits:
+    def nearest(self, points: np.ndarray, limits: np.ndarray, wanted: Wanted) -> NearestHits:
         if self._query_shape(SphereCollider, len(points)) is None:
             return NearestHits(*_nothing(len(points), self._dimensions))
         queries, pieces = self._batch.record, []
         for some in slices_of(len(points)):
             count = some.stop - some.start
             queries.centre[:count], queries.limit[:count] = points[some], limits[some]
-            queries.excluded[:count], self._batch.radius[:count] = excluded[some], 0.0
-            self._run(self._kernels.nearest, SphereCollider, mask, 0, count)
+            self._batch.radius[:count] = 0.0
+            excluded = self._batch.ask(count, some, wanted)
+            self._run(self._kernels.nearest, SphereCollider, 0, count, excluded)
             pieces.append(self._batch.copied(slice(count), *NEAREST_COLUMNS))
         return NearestHits(*joined(pieces))
 
@@ -148,14 +171,14 @@ class Queries:
             find, queries.radius = self._kernels.neighbours, radius
             for some in slices_of(len(rows)):
                 count, first = some.stop - some.start, 0
-                queries.body[:count] = rows[some]
+                queries.body[:count], queries.mask[:count] = rows[some], mask
                 while first < count:
                     stop = self._kernels.run(
-                        find.address, state.address, queries.address, points, points, mask, first, count
+                        find.address, state.address, queries.address, points, points, 0, first, count
                     )
                     collected.take(first, stop)
                     first = stop
-        return Neighbours(entity[rows], rows, collected.offsets, *collected.entities_and_rows())
+        return Neighbours(entity[rows], rows, collected.offsets, *collected.columns())
 
     def _points_tree(self) -> int:
         """Address of a tree of the bodies' positions, boxes without size."""
@@ -168,9 +191,8 @@ class Queries:
     # -- what is met on the way -------------------------------------------------------------------
 
     def rays(
-        self, origins: np.ndarray, directions: np.ndarray, limits: np.ndarray, mask: int, excluded: np.ndarray,
-        only_nearest: bool,
-    ) -> CastHits:  # fmt: skip
+        self, origins: np.ndarray, directions: np.ndarray, limits: np.ndarray, wanted: Wanted, only_nearest: bool
+    ) -> CastHits:
         """What rays meet: the nearest, a row for each ray; or everything on one ray, in order."""
         if self._query_shape(SphereCollider, len(origins), sweeps=True) is None:
             return _no_cast_hits(len(origins), self._dimensions, only_nearest)
@@ -178,14 +200,14 @@ class Queries:
         for some in slices_of(len(origins)):
             count = some.stop - some.start
             queries.centre[:count], queries.direction[:count] = origins[some], directions[some]
-            queries.limit[:count], queries.excluded[:count] = limits[some], excluded[some]
-            self._batch.radius[:count] = 0.0
-            pieces.append(self._cast(SphereCollider, count, mask, only_nearest, True))
+            queries.limit[:count], self._batch.radius[:count] = limits[some], 0.0
+            excluded = self._batch.ask(count, some, wanted)
+            pieces.append(self._cast(SphereCollider, count, excluded, only_nearest, True))
         return CastHits(*joined(pieces))
 
     def shapes(
         self, component: type[Any], columns: dict[str, np.ndarray], positions: np.ndarray, displacements: np.ndarray,
-        mask: int, excluded: np.ndarray, only_nearest: bool,
+        wanted: Wanted, only_nearest: bool, against: bool,
     ) -> CastHits:  # fmt: skip
         """What moving shapes meet: the nearest, a row for each shape; or everything that one shape meets, in order."""
         shape = self._query_shape(component, len(positions), own=False, sweeps=True)
@@ -193,20 +215,28 @@ class Queries:
             return _no_cast_hits(len(positions), self._dimensions, only_nearest)
         queries, pieces = self._batch.record, []
         for some in slices_of(len(positions)):
-            count = some.stop - some.start
-            shape.bind({name: column[some] for name, column in columns.items()}, count)
-            queries.centre[:count] = positions[some] + columns["offset"][some]
-            queries.direction[:count], queries.excluded[:count] = displacements[some], excluded[some]
-            pieces.append(self._cast(component, count, mask, only_nearest, False))
+            excluded, count = self._ask(shape, columns, some, positions, wanted), some.stop - some.start
+            queries.direction[:count] = displacements[some]
+            pieces.append(self._cast(component, count, excluded, only_nearest, False, against))
         return CastHits(*joined(pieces))
 
+    def _ask(
+        self, shape: QueryShape, columns: dict[str, np.ndarray], some: slice, positions: np.ndarray, wanted: Wanted
+    ) -> int:
+        """Write those queries of a collider to the first rows; returns how many entities each leaves out."""
+        queries, count = self._batch.record, some.stop - some.start
+        shape.bind({name: column[some] for name, column in columns.items()}, count)
+        queries.centre[:count] = positions[some] + columns["offset"][some]
+        queries.layer[:count], queries.group[:count] = rows_of(wanted.layers, some), rows_of(wanted.groups, some)
+        return self._batch.ask(count, some, wanted)
+
     def _cast(
-        self, component: type[Any], count: int, mask: int, only_nearest: bool, is_ray: bool
+        self, component: type[Any], count: int, excluded: int, only_nearest: bool, is_ray: bool, against: bool = False
     ) -> tuple[np.ndarray, ...]:
         """Columns of what the queries in the first rows meet."""
         queries = self._batch.record
-        queries.only_nearest, queries.is_ray = only_nearest, is_ray
-        found = self._run(self._kernels.hits, component, mask, 0, count)
+        queries.only_nearest, queries.is_ray, queries.against = only_nearest, is_ray, against
+        found = self._run(self._kernels.hits, component, 0, count, excluded)
         which: Any = slice(count if only_nearest else found)
         if not only_nearest and found > 1:
             which = np.lexsort((queries.entity[:found], queries.distance[:found]))
@@ -214,12 +244,12 @@ class Queries:
 
     # -- what the kernels need --------------------------------------------------------------------
 
-    def _run(self, function: Linked, component: type[Any], mask: int, first: int, stop: int) -> int:
+    def _run(self, function: Linked, component: type[Any], first: int, stop: int, excluded: int = 0) -> int:
         """Call a function for the queries first..stop-1; errors name the plugin, the pair and the entity."""
         moving, static = self._trees
         try:
             result = self._kernels.run(
-                function.address, self._state.address, self._batch.record.address, moving, static, mask, first, stop
+                function.address, self._state.address, self._batch.record.address, moving, static, excluded, first, stop
             )
         except Exception as error:
             self._attribute_errors.describe(error, component)
@@ -250,6 +280,7 @@ class Queries:
         if shape is None:
             with self._attribute_errors(query=component):
                 shape = QueryShape(self._registry, scene.linked, scene.parameters, component)
+            shape.record.is_collider = not own
             self._shapes[component, own] = shape
             if own:
                 self._bind(shape)

@@ -17,7 +17,7 @@ from ...framework.compilation import inlined
 from ...framework.data.component import Component
 from ...framework.jit.linking import CACHE_SIZE, Linked
 from ...framework.jit.records.record import Record
-from ...framework.jit.records.schema import Schema, flags, integer, ints
+from ...framework.jit.records.schema import Schema, flag, flags, integer, ints
 from ...framework.plugins.registry import Registry, Shape
 from ...framework.vectors import add, negative
 from .linking.linked_pair import LinkedPair, convex_sides, linked_pair
@@ -29,6 +29,7 @@ QUERY = Schema(
     "Query",
     parameters=integer(),  # address of the parameter record of the query's shape, one row per query
     bounds=integer(),
+    is_collider=flag(),  # it meets what a body with this collider meets: its layer and group count
     # by number of the body's shape
     evaluate=ints(),  # 0: no plugin has the pair
     sweep=ints(),  # 0: no closed form

@@ -78,6 +78,38 @@ def test_rays_and_shapes_pass_close_by_walls():
         np.testing.assert_allclose(hit.normal, (-1, 0), atol=1e-9)
 
 
+@pytest.mark.parametrize(("size", "halves"), [(0.7, (0.3,)), (0.5, (0.3, 0.5))])
+def test_against_the_motion_the_next_wall_counts(size, halves):
+    """Shapes slide along tiles that they touch, and fill corridors; the end of the way is a tile of the same map."""
+    rng, tested = np.random.default_rng(8), 0
+    cells = rng.random((12, 40)) < 0.35
+    cells[[0, -1]] = cells[:, [0, -1]] = True
+    world = make_world(others=True)
+    grid = world.create_entity(Transform((0, 0)), TileGridCollider(cells, size, lower=(0, 0)))
+    for row, column in np.argwhere(~cells).tolist():
+        way = np.array(((1, 0), (-1, 0), (0, 1), (0, -1))[rng.integers(4)])
+        across = rng.choice((-1, 1)) * way[::-1]  # towards the tile that it touches
+
+        def is_tile(k, side, place=(row, column), way=way, across=across):
+            x, y = k * way + side * across
+            return cells[place[0] - y, place[1] + x]
+
+        free = next(k for k in range(40) if is_tile(k + 1, 0))
+        sides = [[is_tile(k, side) for k in range(free + 1)] for side in (1, -1)]
+        for half in halves:
+            if not (np.all(sides) if half == 0.5 else sides[0][0]):
+                continue
+            back = rng.random() * (1 - 2 * half)
+            centre = np.array((column + 0.5, 11.5 - row)) + across * (0.5 - half) - way * (0.5 - half - back)
+            for shape in (AABBCollider(size * half), SphereCollider(size * half)):
+                (hit,) = world.shape_cast(shape, size * centre, 40 * way, against=True)
+                assert hit.entity == grid
+                assert hit.distance == pytest.approx(size * (free + 1 - 2 * half - back), abs=1e-9)
+                np.testing.assert_allclose(hit.normal, -way, rtol=0, atol=1e-9)
+                tested += 1
+    assert tested > 100
+
+
 def test_a_million_cells_and_an_empty_map():
     cells = np.zeros((1000, 1000), bool)
     cells[-1] = True

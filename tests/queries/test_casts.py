@@ -117,7 +117,7 @@ def test_shape_offset_and_adopted_shapes(d):
     (hit,) = world.shape_cast(own, np.zeros(d), 20 * np.eye(d)[0], exclude=player)
     assert (hit.entity, hit.distance) == (wall, 8.75)
     offsets = SphereCollider.many(radius=[0.5, 0.5], offset=[ahead, 0 * ahead])
-    hits = world.shape_casts(offsets, np.zeros((2, d)), 20 * np.eye(d)[0], exclude=player)
+    hits = world.shape_casts(offsets, np.zeros((2, d)), 20 * np.eye(d)[0], excludes=player)
     np.testing.assert_array_equal(hits.distance, [6.5, 8.5])
 
 

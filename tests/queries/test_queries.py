@@ -142,15 +142,15 @@ def test_masks_and_exclusion(d):
     assert along(only_nearest=True, exclude=first) == [second]
     assert along(mask=8) == []
     assert world.ray_cast(origin, way, only_nearest=True)[0].entity == first
-    many = world.ray_casts([origin] * 4, way, exclude=[-1, first, second, 77], mask=1 | 2)
+    many = world.ray_casts([origin] * 4, way, excludes=[-1, first, second, 77], masks=1 | 2)
     assert many.entity.tolist() == [first, second, first, first]
     assert world.bodies.entity[many.row].tolist() == many.entity.tolist()
     assert many.found.all()
-    moved = world.shape_casts(SphereCollider(0.5), [origin] * 2, [100 * way, way], exclude=first)
+    moved = world.shape_casts(SphereCollider(0.5), [origin] * 2, [100 * way, way], excludes=first)
     assert moved.entity.tolist() == [second, -1]
     assert world.query_nearest(origin, mask=4).entity == third
     assert world.query_nearest(origin, mask=8) is None
-    assert world.query_nearests([origin, 6 * way], exclude=[first, second]).entity.tolist() == [second, first]
+    assert world.query_nearests([origin, 6 * way], excludes=[first, second]).entity.tolist() == [second, first]
 
 
 @both_dimensions
@@ -261,7 +261,7 @@ WRONG = {
     "query_nearest: max_distance": lambda w: w.query_nearest((0, 0), max_distance=-1),
     "query_nearests: points": lambda w: w.query_nearests([(0, math.inf)]),
     "query_nearests: max_distances": lambda w: w.query_nearests([(0, 0)], max_distances=[1, 2]),
-    "query_nearests: exclude": lambda w: w.query_nearests([(0, 0)], exclude=[1, 2]),
+    "query_nearests: excludes": lambda w: w.query_nearests([(0, 0)], excludes=[1, 2]),
     "neighbours: radius": lambda w: w.neighbours(math.inf),
     "neighbours: of": lambda w: w.neighbours(1.0, of=3),
     "ray_cast: origin": lambda w: w.ray_cast("here", (1, 0)),
@@ -297,7 +297,7 @@ def answers(world, points, ways):
     ids = np.sort(world.bodies.entity)[::3]
     hits = [world.query_spheres(points, 1.5), world.query_aabbs(points - 0.5, points + 1.0), world.neighbours(2.0)]
     hits.append(world.neighbours(3.0, of=ids))
-    nearest = world.query_nearests(points, max_distances=3.0, exclude=int(ids[0]))
+    nearest = world.query_nearests(points, max_distances=3.0, excludes=int(ids[0]))
     rays, casts = world.ray_casts(points, ways, 9.0), world.shape_casts(SphereCollider(0.3), points, 4.0 * ways)
     found = [column for h in hits for column in (h.offsets, h.entities, h.rows)]
     for h in (nearest, rays, casts):
