@@ -29,6 +29,7 @@ class MaterialFields(TypedDict, total=False):
     layer: int
     mask: int
     group: int
+    one_way: Vector | float
 
 
 class ColliderFields(MaterialFields, total=False):
@@ -52,6 +53,9 @@ class Collider(Component, abstract=True):
         two colliders meet if each one's layer has a bit in the other's mask
     group
         colliders of the same group, a whole number other than 0, never meet
+    one_way
+        (d,) a direction of any length, turned with the body: solid only for what comes from where it points to; 0:
+        from all sides
     """
 
     __slots__ = ()
@@ -60,7 +64,7 @@ class Collider(Component, abstract=True):
     _largest: ClassVar[float] = LONGEST
     stack: ClassVar[str] = "collider"
     stacked_columns: ClassVar[tuple[str, ...]] = (
-        "offset", "restitution", "friction", "sensor", "layer", "mask", "group",
+        "offset", "restitution", "friction", "sensor", "layer", "mask", "group", "one_way",
     )  # fmt: skip
 
     offset: VectorField = special_column(
@@ -82,6 +86,9 @@ class Collider(Component, abstract=True):
     )
     group: int = special_column(
         default=0, dtype=int, kw_only=True, on_demand=True, also=("group_index", "collision_group")
+    )
+    one_way: VectorField = special_column(
+        unit="1", default=0.0, item="vector", kw_only=True, on_demand=True, also=("oneway", "one_way_platform")
     )
 
     rotates: ClassVar[bool] = False  # True if its functions need the body's axes in the world, as ``shape.axes``

@@ -202,6 +202,7 @@ COLLIDERS = Schema(
     layer=ints(stacked=True, default=default_of(Collider.layer)),
     mask=ints(stacked=True, default=default_of(Collider.mask)),
     group=ints(stacked=True, default=default_of(Collider.group)),
+    one_way=vectors(stacked=True, default=default_of(Collider.one_way), unit="1"),
 )
 
 # Linked functions and parameters of the scene's shapes, cheapest first; a pair is at first * count + second, where
@@ -262,7 +263,7 @@ PAIR_COLUMNS = Section(
     found=integer(),  # contacts of the narrow phase: hits
     hits=ints("int32"),
     disabled_count=integer(),
-    disabled=ints("int32"),
+    disabled=flags(),  # the contact counts as none
     rests=flags(),
     resting_count=integer(),
     resting=ints("int32"),

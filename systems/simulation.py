@@ -38,7 +38,7 @@ from .inspection.planned_kernels import planned_kernels
 from .integration.system import Integration
 from .integration.turns import TURNS
 from .linking.preparation import evaluate_forces, keep_ready, link_needed
-from .linking.steps import StepLinks
+from .linking.steps import NEVER_LINKED, StepLinks
 from .narrow_phase.system import NarrowPhase
 from .plugin_stages.plugin_stages import PluginStages
 from .quarantine.quarantine import Quarantine
@@ -233,6 +233,7 @@ class Simulation:
     def _follow_columns(self) -> None:
         """A column on demand has been made."""
         self.scene.bind_columns()
+        self.links.version = NEVER_LINKED  # stages may need it
         if self.state.version == self.table.version:  # else the next refresh does it, when rows are known
             self.quarantine.bind()
 

@@ -85,7 +85,7 @@ WITH_COLLIDERS = frozenset((
 ))  # fmt: skip
 CONDITIONS = (
     "", "dynamic bodies", *sorted(WITH_COLLIDERS), "bodies spin", "bodies spin, no joints", "joints", "parts",
-    "standard", "sleeping", "stages of plugins", "stages query", "on demand",
+    "one-way colliders", "standard", "sleeping", "stages of plugins", "stages query", "on demand",
 )  # fmt: skip
 # What a failed step puts back, in this order: the bit of state.kept that says that the copy is made; the column, its
 # copy, and their rows.

@@ -16,16 +16,17 @@ from .hits import Hits, NearestHit, NearestHits, Neighbours, OverlapHit, Overlap
 class QueryVerbs(CastVerbs):
     """``world.query_...``: arguments checked, answers from the plugin that provides physics; mixed into World.
 
-    All of them find static bodies and sensors too; ``mask`` has a bit for each layer that is asked for.
+    All of them find static bodies and sensors too; ``mask`` has a bit for each layer that is asked for. What touches a
+    point, a box or a sphere leaves out colliders that are solid from one side only, unless ``one_way``.
     """
 
-    def query_point(self, point: Vector, mask: int = -1) -> list[int]:
+    def query_point(self, point: Vector, mask: int = -1, *, one_way: bool = False) -> list[int]:
         """Entities whose collider contains the ``point``, (d,) m, by id."""
         services = self._synchronized()
         centre = check.point(point, "query_point: point", services.dimensions)
-        return services.queries.sphere(centre, 0.0, check.mask(mask, "query_point: mask"))
+        return services.queries.sphere(centre, 0.0, check.mask(mask, "query_point: mask"), one_way)
 
-    def query_aabb(self, lower: Vector, upper: Vector, mask: int = -1) -> list[int]:
+    def query_aabb(self, lower: Vector, upper: Vector, mask: int = -1, *, one_way: bool = False) -> list[int]:
         """Entities whose collider touches the box from ``lower`` to ``upper``, (d,) m, by id.
 
         ValueError if a lower bound exceeds the upper one.
@@ -35,23 +36,24 @@ class QueryVerbs(CastVerbs):
         high = check.point(upper, "query_aabb: upper", services.dimensions)
         if any(a > b for a, b in zip(low, high, strict=True)):
             raise ValueError(f"query_aabb: lower {list(low)} exceeds upper {list(high)}")
-        return services.queries.box(low, high, check.mask(mask, "query_aabb: mask"))
+        return services.queries.box(low, high, check.mask(mask, "query_aabb: mask"), one_way)
 
-    def query_sphere(self, centre: Vector, radius: float, mask: int = -1) -> list[int]:
+    def query_sphere(self, centre: Vector, radius: float, mask: int = -1, *, one_way: bool = False) -> list[int]:
         """Entities whose collider touches the sphere of ``radius`` m around ``centre``, (d,) m, by id."""
         services = self._synchronized()
         place = check.point(centre, "query_sphere: centre", services.dimensions)
         size = check.distance(radius, "query_sphere: radius")
-        return services.queries.sphere(place, size, check.mask(mask, "query_sphere: mask"))
+        return services.queries.sphere(place, size, check.mask(mask, "query_sphere: mask"), one_way)
 
-    def query_spheres(self, centres: Vectors, radii: Numbers, masks: Masks = -1) -> Hits:
+    def query_spheres(self, centres: Vectors, radii: Numbers, masks: Masks = -1, *, one_way: bool = False) -> Hits:
         """For each of m spheres (centres (m, d); radii, masks: one or (m,)) the ids of what it touches, ascending."""
         services = self._synchronized()
         places = check.points(centres, "query_spheres: centres", services.dimensions)
         sizes = check.distances(radii, "query_spheres: radii", len(places))
-        return services.queries.spheres(places, sizes, check.wanted("query_spheres", len(places), masks))
+        wanted = check.wanted("query_spheres", len(places), masks, one_way=one_way)
+        return services.queries.spheres(places, sizes, wanted)
 
-    def query_aabbs(self, lower: Vectors, upper: Vectors, masks: Masks = -1) -> Hits:
+    def query_aabbs(self, lower: Vectors, upper: Vectors, masks: Masks = -1, *, one_way: bool = False) -> Hits:
         """For each of m boxes (``lower`` and ``upper`` (m, d)) the ids of the entities it touches, ascending.
 
         masks: one for all or (m,). ValueError names the first row in which a lower bound exceeds the upper one.
@@ -62,11 +64,12 @@ class QueryVerbs(CastVerbs):
         if (low > high).any():
             row = int(np.argmax((low > high).any(axis=1)))
             raise ValueError(f"query_aabbs: lower {low[row].tolist()} exceeds upper {high[row].tolist()} in row {row}")
-        return services.queries.boxes(low, high, check.wanted("query_aabbs", len(low), masks))
+        return services.queries.boxes(low, high, check.wanted("query_aabbs", len(low), masks, one_way=one_way))
 
     def overlaps(
-        self, shape: Component, position: Vector, mask: int = -1, *, exclude: int | Entities | None = None
-    ) -> list[OverlapHit]:
+        self, shape: Component, position: Vector, mask: int = -1, *, exclude: int | Entities | None = None,
+        one_way: bool = False,
+    ) -> list[OverlapHit]:  # fmt: skip
         """All that a collider touches at a place, the deepest first, ties by id: how deep, where, and the way out.
 
         ``shape``, ``mask`` and ``exclude`` as in :meth:`shape_cast`; ``position``, (d,) m, is where a Transform would
@@ -75,7 +78,7 @@ class QueryVerbs(CastVerbs):
         services = self._synchronized()
         columns, layers = self._asked(shape, "overlaps", services.dimensions)
         place = check.point(position, "overlaps: position", services.dimensions)
-        wanted = check.met_by(layers, check.wanted_of_one("overlaps", mask, exclude))
+        wanted = check.met_by(layers, check.wanted_of_one("overlaps", mask, exclude, one_way))
         hits = services.queries.overlaps(type(shape), columns, np.array((place,)), wanted)
         found = zip(hits.entities.tolist(), hits.depths.tolist(), hits.points, hits.normals, strict=True)
         return [OverlapHit(*hit) for hit in found]
@@ -87,6 +90,7 @@ class QueryVerbs(CastVerbs):
         masks: Masks = -1,
         *,
         excludes: Excludes = None,
+        one_way: bool = False,
     ) -> OverlapHits:
         """:meth:`overlaps` of m colliders, as columns.
 
@@ -96,7 +100,7 @@ class QueryVerbs(CastVerbs):
         services = self._synchronized()
         places = check.points(positions, "shape_overlaps: positions", services.dimensions)
         columns, layers = self._asked(shapes, "shape_overlaps", services.dimensions, len(places))
-        wanted = check.met_by(layers, check.wanted("shape_overlaps", len(places), masks, excludes))
+        wanted = check.met_by(layers, check.wanted("shape_overlaps", len(places), masks, excludes, one_way))
         component = shapes.component if isinstance(shapes, Many) else type(shapes)
         return services.queries.overlaps(component, columns, places, wanted)
 

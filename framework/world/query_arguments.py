@@ -25,12 +25,15 @@ class Wanted(NamedTuple):
         (m, k) ids to leave out, NO_ENTITY: none; NONE_EXCLUDED
     layers, groups
         if colliders ask, theirs, one for all or (m,): masks and groups of bodies count then
+    one_way
+        overlaps: whether also what is solid from one side only
     """
 
     masks: Any
     excluded: np.ndarray
     layers: Any = 0
     groups: Any = 0
+    one_way: bool = False
 
 
 def point(value: Any, name: str, dimensions: int) -> tuple[float, ...]:
@@ -132,14 +135,16 @@ def excluded(value: Any, name: str, count: int | None = None) -> np.ndarray:
 def met_by(colliders: tuple[Any, Any, Any], wanted: Wanted) -> Wanted:
     """Of what is wanted, what colliders meet with these layers, masks and groups, one for all or (m,)."""
     layers, own, groups = colliders
-    return Wanted(wanted.masks & own, wanted.excluded, layers, groups)
+    return wanted._replace(masks=wanted.masks & own, layers=layers, groups=groups)
 
 
-def wanted_of_one(verb: str, mask_of: Any, exclude: Any) -> Wanted:
+def wanted_of_one(verb: str, mask_of: Any, exclude: Any, one_way: Any = False) -> Wanted:
     """Of one query of that verb, from its arguments ``mask`` and ``exclude``."""
-    return Wanted(mask(mask_of, f"{verb}: mask"), excluded(exclude, f"{verb}: exclude"))
+    kept = mask(mask_of, f"{verb}: mask"), excluded(exclude, f"{verb}: exclude")
+    return Wanted(*kept, one_way=flag(one_way, f"{verb}: one_way"))
 
 
-def wanted(verb: str, count: int, masks_of: Any, excludes: Any = None) -> Wanted:
+def wanted(verb: str, count: int, masks_of: Any, excludes: Any = None, one_way: Any = False) -> Wanted:
     """Of many, from ``masks`` and ``excludes``."""
-    return Wanted(masks(masks_of, f"{verb}: masks", count), excluded(excludes, f"{verb}: excludes", count))
+    kept = masks(masks_of, f"{verb}: masks", count), excluded(excludes, f"{verb}: excludes", count)
+    return Wanted(*kept, one_way=flag(one_way, f"{verb}: one_way"))

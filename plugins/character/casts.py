@@ -6,6 +6,7 @@ import math
 
 from ...framework.compilation import inlined, part
 from ...framework.vectors import add, add_scaled, dot, length, negative, scale, sub
+from ...systems.narrow_phase.one_way import front_of, is_from_front, is_one_way
 from ...systems.queries.compiled import Path, box_interval, cast, inverse_of, is_sensor, overlap
 from .records import EXACT
 
@@ -15,7 +16,6 @@ LEAN = 0.1  # of the half extent: how far it leans towards an edge to see what i
 STEEPEST = 0.01  # rise of a normal along up: less is a wall
 EDGE_SINE = 1e-3  # of a normal to up: less is flat
 STEEP_GROUND, SLOPE, EDGE, RIM = range(4)
-ONE_WAY = 0.5  # cosine from which a normal is that of the side that holds
 
 
 @inlined
@@ -25,18 +25,11 @@ def is_dynamic(state, j):
 
 
 @inlined
-def one_way_of(state, j):
-    """The direction to which row j holds alone; 0: to all."""
-    return scale(state.bodies.position[j], 0.0)
-
-
-@inlined
 def holds(state, walker, j, out, distance):
     """Whether row j, met along that normal, is in the way: what is solid from one side is not from others."""
-    side = one_way_of(state, j)
-    if dot(side, side) == 0.0:
+    if not is_one_way(state, j):
         return True
-    return not walker.dropping and dot(out, side) >= ONE_WAY and distance > 0.0
+    return not walker.dropping and is_from_front(front_of(state, j), out) and distance > 0.0
 
 
 @inlined
@@ -94,7 +87,7 @@ def is_inside(state, near, character, walker, at):
     """Whether it is in something that rests."""
     for k in range(walker.near):
         j = near.row[k]
-        if is_sensor(state, j) or j < state.moving or dot(one_way_of(state, j), walker.up) != 0.0:
+        if is_sensor(state, j) or j < state.moving or is_one_way(state, j):
             continue
         if overlap(state, walker.row, j, at)[0] > EXACT:
             return True
@@ -191,10 +184,7 @@ def deepest(state, near, character, walker, at, first, tolerance):
     worst, deep = -1, tolerance
     for k in range(walker.near):
         j = near.row[k]
-        if j < first or is_dynamic(state, j) or is_sensor(state, j) or character.present[j]:
-            continue
-        side = one_way_of(state, j)
-        if dot(side, side) != 0.0:
+        if j < first or is_dynamic(state, j) or is_sensor(state, j) or character.present[j] or is_one_way(state, j):
             continue
         depth, _, _ = overlap(state, walker.row, j, at)
         if depth > deep:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from ...framework.compilation import inlined, part
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, scale, sub
+from ...systems.narrow_phase.one_way import is_one_way
 from ...systems.queries.compiled import is_sensor, overlap
-from .casts import ONE_WAY, REACH, SLOPE, across, cast_near, deepest, ground_kind, is_dynamic, one_way_of
+from .casts import REACH, SLOPE, across, cast_near, deepest, ground_kind, is_dynamic
 from .records import EXACT, MOST_HITS, SLIDES
 
 MOST_PLANES = 32
@@ -149,8 +150,6 @@ def part_out(state, near, character, work, walker, at, rising):
             j = near.row[k]
             if is_dynamic(state, j) or is_sensor(state, j):
                 continue
-            one_way = one_way_of(state, j)
-            is_one_way = dot(one_way, one_way) != 0.0
             depth, out, _ = overlap(state, walker.row, j, at)
             if character.present[j]:
                 if depth > EXACT and turn == 0:
@@ -158,7 +157,7 @@ def part_out(state, near, character, work, walker, at, rising):
                     worst = max(worst, 0.5 * (depth + skin))
                 continue
             if depth <= EXACT:
-                if not is_one_way and depth > -2.0 * skin and turn > 0:
+                if not is_one_way(state, j) and depth > -2.0 * skin and turn > 0:
                     add_plane(work, out, depth + 0.5 * skin)
                     worst = max(worst, depth + 0.5 * skin)
                 continue

@@ -6,6 +6,7 @@ import math
 
 from ...framework.compilation import inlined, part
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, scale, sub
+from ...systems.narrow_phase.one_way import is_one_way
 from ...systems.queries.compiled import is_sensor, make_gather, meets, overlap
 from ...systems.shapes.dispatch import half_extents
 from .casts import (
@@ -16,7 +17,6 @@ from .casts import (
     is_inside,
     lowered,
     meets_on_way,
-    one_way_of,
 )
 from .records import (
     AIR,
@@ -303,10 +303,8 @@ def move_one(state, near, character, ladder, work, i, dt):
         character.since_press[i] = 0.0
     character.held[i] = character.jump[i]
     rising = dot(velocity, up)
-    if character.drop[i] and standing and character.since_drop[i] > DROPS_AGAIN:
-        side = one_way_of(state, floor)
-        if dot(side, side) > 0.0:
-            character.since_drop[i], standing, rising = 0.0, False, 0.0
+    if character.drop[i] and standing and character.since_drop[i] > DROPS_AGAIN and is_one_way(state, floor):
+        character.since_drop[i], standing, rising = 0.0, False, 0.0
     leaves = standing and character.since_press[i] <= character.buffer[i]
     dropping = character.since_drop[i] < DROPS_FOR
     limit = math.cos(character.max_slope[i])

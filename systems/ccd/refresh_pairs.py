@@ -16,7 +16,9 @@ from ..codes import OK
 from ..impacts.heap import heap_push, is_current
 from ..impacts.records import EVENTS
 from ..impacts.worklist import list_pair, most_listed
+from ..integration.trajectory import along, relative_path
 from ..narrow_phase.manifolds import forget_manifold
+from ..narrow_phase.one_way import is_one_way, one_way_holds
 from ..narrow_phase.stages import is_solid_pair, layers_meet, rank_rows
 from ..records import PAIR_COLUMNS
 
@@ -28,7 +30,7 @@ def mark_kept(state):
     """place[c] = SURVIVED for the pairs that something has come of in this step, GONE for the others."""
     pairs = state.pairs
     for c in range(pairs.count):
-        pairs.place[c] = SURVIVED if pairs.crossed[c] or pairs.impulse[c] > 0.0 else GONE
+        pairs.place[c] = SURVIVED if pairs.crossed[c] or pairs.impulse[c] > 0.0 or pairs.disabled[c] else GONE
     for h in range(pairs.found):
         pairs.place[pairs.hits[h]] = SURVIVED
 
@@ -40,22 +42,27 @@ def keep_pair(state, j, found):
     old.place[j] = found
     new.a[found], new.b[found] = old.a[j], old.b[j]
     new.is_solid[found], new.near_contact[found] = old.is_solid[j], old.near_contact[j]
-    new.crossed[found] = old.crossed[j]
+    new.crossed[found], new.disabled[found] = old.crossed[j], old.disabled[j]
     new.impulse[found], new.struck[found], new.parting[found] = old.impulse[j], old.struck[j], old.parting[j]
     new.hit[found], new.early[found], new.at[found] = old.hit[j], old.early[j], old.at[j]
     new.depth[found], new.normal[found], new.point[found] = old.depth[j], old.normal[j], old.point[j]
 
 
 @part
-def add_pair(state, a, b, found):
+def add_pair(state, a, b, found, dt):
     """A candidate becomes pair ``found``; how it stands at the end is not known yet."""
     new = state.merged
     new.a[found], new.b[found] = a, b
     new.is_solid[found] = is_solid_pair(state, a, b)
-    new.near_contact[found], new.crossed[found] = True, False
+    new.near_contact[found], new.crossed[found], new.disabled[found] = True, False, False
     new.early[found], new.impulse[found] = False, 0.0
     new.normal[found] = zero_of(state)
     forget_manifold(new, found)
+    if new.is_solid[found] and (is_one_way(state, a) or is_one_way(state, b)):
+        path, now = relative_path(state, a, b), state.impacts.until
+        if not one_way_holds(state, a, b, along(path, now), along(path, dt), False):
+            new.is_solid[found], new.disabled[found] = False, True
+            new.disabled_count += 1
 
 
 @part
@@ -64,11 +71,9 @@ def renumber(state):
     old, new, impacts = state.pairs, state.merged, state.impacts
     for h in range(old.found):
         new.hits[h] = old.place[old.hits[h]]
-    for k in range(old.disabled_count):
-        new.disabled[k] = old.place[old.disabled[k]]
     for k in range(impacts.logged):
         impacts.log_pair[k] = old.place[impacts.log_pair[k]]
-    new.found, new.disabled_count = old.found, old.disabled_count
+    new.found = old.found
     new.resting_count = new.touching_count = 0
 
 
@@ -96,6 +101,7 @@ def merge_pairs(state, dt):
     candidates are searched for impacts."""
     candidates, old, new, rank = state.candidates, state.pairs, state.merged, state.bodies.rank
     mark_kept(state)
+    new.disabled_count = old.disabled_count
     if state.ranks_version != state.version:
         rank_rows(state)
     n, found, i, j = state.count, 0, 0, 0
@@ -109,7 +115,7 @@ def merge_pairs(state, dt):
             if old.place[j] == SURVIVED:
                 keep_pair(state, j, found)
             elif old_key == new_key:
-                add_pair(state, old.a[j], old.b[j], found)
+                add_pair(state, old.a[j], old.b[j], found, dt)
                 old.place[j] = found
             found += 1 if old.place[j] >= 0 else 0
             i += 1 if old_key == new_key else 0
@@ -118,7 +124,7 @@ def merge_pairs(state, dt):
         a, b = candidates.sorted_a[i], candidates.sorted_b[i]
         i += 1
         if layers_meet(state, a, b):
-            add_pair(state, a, b, found)
+            add_pair(state, a, b, found, dt)
             list_pair(state.impacts, found, state.impacts.until)
             found += 1
     new.count = found

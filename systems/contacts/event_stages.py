@@ -18,17 +18,14 @@ ROOM_FOR_FOUND = (Rows("contacts", CONTACT_ROWS, lambda s: s.pairs.found if s.fo
 def write_contacts(state):
     """The touching pairs as the contacts of the step, in canonical order; disabled pairs count as not touching."""
     pairs, contacts, bodies, entity = state.pairs, state.contacts, state.bodies, state.bodies.entity
-    new, count, next_disabled = 1 - contacts.now, 0, 0
+    new, count = 1 - contacts.now, 0
     for r in range(pairs.touching_count):
         c = pairs.touching[r]
-        while next_disabled < pairs.disabled_count and pairs.disabled[next_disabled] < c:
-            next_disabled += 1
-        enabled = not (next_disabled < pairs.disabled_count and pairs.disabled[next_disabled] == c)
         contacts.entity_a[new, count], contacts.entity_b[new, count] = entity[pairs.a[c]], entity[pairs.b[c]]
         centre = add(bodies.position[pairs.a[c]], bodies.offset[pairs.a[c]])
         contacts.point[new, count], contacts.normal[new, count] = add(centre, pairs.point[c]), pairs.normal[c]
         contacts.depth[new, count], contacts.impulse[new, count] = pairs.depth[c], pairs.impulse[c]
-        contacts.enabled[new, count], contacts.rested[new, count] = enabled, pairs.rests[c]
+        contacts.enabled[new, count], contacts.rested[new, count] = not pairs.disabled[c], pairs.rests[c]
         count += 1
     contacts.counts[new], contacts.steps[new], contacts.stays[new] = count, state.step_number, 0
     contacts.now = new

@@ -179,7 +179,7 @@ class RecordedContacts:
             "depth": pairs.depth[hits],
             "normal_impulse": np.zeros(len(hits)),
             "step": _repeated(state.step_number, len(hits)),
-            "enabled": np.ones(len(hits), bool),
+            "enabled": ~pairs.disabled[hits],
         }
 
 
@@ -199,8 +199,8 @@ def disabled_pairs(state: Record, contacts: Contacts) -> np.ndarray:
     if not state.found_current or enabled is None or enabled.all():
         return np.empty(0, np.int64)
     disabled = pairs.hits[: pairs.found][~enabled]
-    pairs.disabled[: len(disabled)] = disabled
-    pairs.disabled_count = len(disabled)
+    pairs.disabled[disabled] = True
+    pairs.disabled_count = int(pairs.disabled[: pairs.count].sum())
     return disabled
 
 

@@ -29,6 +29,7 @@ from ..narrow_phase.manifolds import (
     depth_bound_on_path,
     evaluate_pair,
 )  # fmt: skip
+from ..narrow_phase.one_way import is_one_way
 from ..narrow_phase.stages import is_solid_pair, layers_meet
 from ..parts.rows import next_row, owner_of
 from ..shapes.tolerances import SAME_PLACE, smaller_extent, way_of_turning
@@ -153,7 +154,9 @@ def push_out_of_all(state, dt, i):
     """Body i against everything that cannot be moved."""
     bodies, moved = state.bodies, False
     for k in range(state.dynamic, state.count):
-        if bodies.shape[k] >= 0 and layers_meet(state, i, k) and is_solid_pair(state, i, k):
+        if bodies.shape[k] < 0 or is_one_way(state, i) or is_one_way(state, k):  # it may have come from behind
+            continue
+        if layers_meet(state, i, k) and is_solid_pair(state, i, k):
             moved |= push_out(state, dt, NO_PAIR, i, k) > 0.0
     return moved
 

@@ -66,6 +66,8 @@ def kind_of_world(scene: Scene, integration: Integration, program: Program) -> K
         return dimensions, stages, conditions, None, ()
     asking = dict.fromkeys((*QUERY_SHAPES, *(shape.component for shape in linked.shapes)))
     queries = tuple(linked_query(registry, linked, component) for component in asking if component in registry.shapes)
+    if len(scene.state.colliders.one_way) > 0:
+        conditions |= {"one-way colliders"}
     if scene.state.sleeping:
         conditions |= {"sleeping"}
     if any("spin" in stage.writes for stage in stages if stage.plugin):

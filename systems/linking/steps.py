@@ -80,7 +80,7 @@ class StepLinks:
         usual = (
             scene.linked, scene.registry.version, scene.table.capacity, force_systems, sweeps, collides,
             state.several_levels, state.dynamic > 0, self._search.needs_grids(), state.sleeping,
-            self._plugin_stages.present(), joined,
+            self._plugin_stages.present(), joined, len(state.colliders.one_way) > 0,
         )  # fmt: skip
         if self._key is not None and usual == self._usual and collides:  # bodies have come or gone, no more
             self.link_shapes()  # there may have been a query meanwhile, with other shapes
@@ -131,6 +131,7 @@ class StepLinks:
             "several levels": collides and state.several_levels,
             "many bodies": collides and self._search.needs_grids(),
             "swept bodies": state.sweeps_ready,
+            "one-way colliders": collides and len(state.colliders.one_way) > 0,
             "sleeping": collides and state.sleeping,
             **dict.fromkeys(self._integration.stages_needed, moves),
         }

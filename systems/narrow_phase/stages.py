@@ -204,7 +204,7 @@ def select_pairs(state, dt):
         a, b = candidates.sorted_a[c], candidates.sorted_b[c]
         if all_meet or layers_meet(state, a, b):
             pairs.a[kept], pairs.b[kept] = a, b
-            pairs.is_solid[kept], pairs.early[kept] = is_solid_pair(state, a, b), False
+            pairs.is_solid[kept], pairs.early[kept], pairs.disabled[kept] = is_solid_pair(state, a, b), False, False
             if several:
                 one, other = min(shape[a], shape[b]), max(shape[a], shape[b])
                 kind[kept] = one * shapes.count + other

@@ -14,6 +14,7 @@ from ..sleeping.stages import find_touched, measure_force_changes
 from ..stage_system import StagedSystem
 from .filters import filtered
 from .level_stages import evaluate_levels
+from .one_way import release_one_way
 from .stages import (
     ROOM_FOR_ORDER,
     ROOM_FOR_PAIRS,
@@ -55,6 +56,10 @@ class NarrowPhase(StagedSystem):
         Stage(
             sweep_pairs, "which pairs touch on their paths only", ("pairs", "path_velocity"), ("pairs",),
             "swept bodies", "pairs are near each other",
+        ),
+        Stage(
+            release_one_way, "which pairs meet the front of what is solid from one side", ("pairs", "one_way"),
+            ("pairs",), "one-way colliders", "pairs are near each other",
         ),
         Stage(
             find_touched, "wakes what an awake body touches", ("pairs", "sleep_state"), ("sleep_state",), "sleeping",

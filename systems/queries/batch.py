@@ -63,7 +63,7 @@ class QueryBatch:
     def ask(self, count: int, some: slice, wanted: Wanted) -> int:
         """Write what those queries look for, to the first rows; returns how many entities each leaves out."""
         record, each = self.record, wanted.excluded.shape[1]
-        record.mask[:count] = rows_of(wanted.masks, some)
+        record.mask[:count], record.one_way = rows_of(wanted.masks, some), wanted.one_way
         if each:
             if len(record.excluded) < count * each:
                 record.excluded = np.zeros(count * each, np.int64)

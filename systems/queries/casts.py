@@ -17,7 +17,7 @@ from ..broad_phase.uniform_grid import LANES, cells_around, outline
 from ..shapes.query import query_half_extents
 from ..shapes.tolerances import ENDLESS
 from .candidates import box_at, box_rounding, frame_of, is_wanted, may_be_near_at, nan_vector, places_of, row_at
-from .first_touch import LAST_STEP, Path, first_touch_of_cast, touch_in_the_way
+from .first_touch import LAST_STEP, Path, first_touch_of_cast, is_met, touch_in_the_way
 
 SLICE_SLACK = 1.0 + 4.0 * LAST_STEP  # so that bodies at the nearest distance are all tested, in whatever order
 
@@ -141,7 +141,7 @@ def cast_at(state, batch, q, path, i, box, between):
         if batch.against:
             touch = touch_in_the_way(state, batch, q, i, path, leave, reach, touch)
         touches, distance, normal, point = touch
-        if touches:
+        if touches and is_met(state, batch, q, i, path, distance, normal):
             keep_hit(state, batch, q, i, path, (distance, normal, point))
 
 

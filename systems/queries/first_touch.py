@@ -16,8 +16,9 @@ from collections.abc import Callable
 from typing import Any
 
 from ...framework.compilation import inlined, part, pasted
-from ...framework.vectors import add, add_scaled, dot, item, length, scale, sub
+from ...framework.vectors import add, add_scaled, dot, item, length, negative, scale, sub
 from ..integration.trajectory import ROUNDING
+from ..narrow_phase.one_way import SLACK, front_of, is_from_front, is_one_way
 from ..shapes.query import evaluate_against, sweep_against
 from .candidates import to_collider
 
@@ -118,6 +119,25 @@ def sweep_query(state, batch, q, i, d, way):
 
 
 first_touch_of_cast = make_first_touch(evaluate_query, sweep_query)
+
+
+@part
+def is_met(state, batch, q, i, path, distance, normal):
+    """Whether a touch counts with row i, which may be solid from one side only: where its front is met, by what does
+    not start in it, nor moves away where it starts at it."""
+    if not is_one_way(state, i):
+        return True
+    front = front_of(state, i)
+    if not is_from_front(front, negative(normal)):
+        return False
+    if distance > 0.0:
+        return True
+    if not dot(front, path.direction) < 0.0:
+        return False
+    away, extent = to_collider(state, path.start, i), math.inf
+    for k in range(len(away)):
+        extent = min(extent, 2.0 * item(path.half, k))
+    return evaluate_against(state, batch.query, q, state.bodies.shape[i], i, away)[1] <= SLACK * extent
 
 
 @inlined

@@ -7,6 +7,7 @@ import numpy as np
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, sub
+from ..narrow_phase.one_way import is_one_way
 from ..shapes.query import evaluate_against, query_half_extents
 from .candidates import is_wanted, make_find_all, to_collider
 
@@ -22,8 +23,8 @@ def box_of_query(state, batch, q):
 
 @inlined
 def may_touch(state, batch, q, centre, i):
-    """Whether query q looks for row i."""
-    return is_wanted(state, batch, q, i)
+    """Whether query q looks for row i, which is solid from all sides unless others are asked for too."""
+    return is_wanted(state, batch, q, i) and (batch.one_way or not is_one_way(state, i))
 
 
 @inlined

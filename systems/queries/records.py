@@ -35,6 +35,7 @@ QUERY_BATCH = Schema(
     # options, for all queries
     excluded=ints(),  # entities to leave out, ``excluded_count`` for each query; -1: none
     excluded_count=integer(),
+    one_way=flag(),  # overlaps: also with what is solid from one side only
     selects=flag(),  # some have a layer that is looked for, and are not wanted all the same
     only_nearest=flag(),  # casts
     against=flag(),  # only what opposes the motion

@@ -74,7 +74,7 @@ class Queries:
 
     # -- what touches a shape ---------------------------------------------------------------------
 
-    def sphere(self, centre: Point, radius: float, mask: int) -> list[int]:
+    def sphere(self, centre: Point, radius: float, mask: int, one_way: bool = False) -> list[int]:
         if self._query_shape(SphereCollider, 1) is None:
             return []
         queries = self._batch.record
@@ -82,16 +82,16 @@ class Queries:
         for k, value in enumerate(centre):
             centres[0, k], halves[0, k] = value, radius
         self._batch.radius[0] = radius
-        return self._overlaps_of_one(SphereCollider, mask)
+        return self._overlaps_of_one(SphereCollider, mask, one_way)
 
-    def box(self, lower: Point, upper: Point, mask: int) -> list[int]:
+    def box(self, lower: Point, upper: Point, mask: int, one_way: bool = False) -> list[int]:
         if self._query_shape(AABBCollider, 1) is None:
             return []
         queries = self._batch.record
         centres, halves = queries.centre, queries.half
         for k, (low, high) in enumerate(zip(lower, upper, strict=True)):
             centres[0, k], halves[0, k] = (low + high) / 2, (high - low) / 2
-        return self._overlaps_of_one(AABBCollider, mask)
+        return self._overlaps_of_one(AABBCollider, mask, one_way)
 
     def spheres(self, centres: np.ndarray, radii: np.ndarray, wanted: Wanted) -> Hits:
         return self._overlaps(SphereCollider, centres, radii[:, None], wanted)
@@ -118,10 +118,10 @@ class Queries:
         depths = np.maximum(-distances, 0.0)
         return OverlapHits(collected.offsets, *(column[order] for column in (entities, rows, depths, points, normals)))
 
-    def _overlaps_of_one(self, component: type[Any], mask: int) -> list[int]:
+    def _overlaps_of_one(self, component: type[Any], mask: int, one_way: bool) -> list[int]:
         """Ids of the hits of the query in row 0."""
         queries = self._batch.record
-        queries.mask[0] = mask
+        queries.mask[0], queries.one_way = mask, one_way
         self._run(self._kernels.overlaps, component, 0, 1)
         return queries.entity[: queries.end[0]].tolist()
 

@@ -293,9 +293,9 @@ def join_islands(state, dt, needed):
         low, high = min(a, b), max(a, b)
         if low >= state.first and high < state.dynamic:
             join_roots(root, low, high)
-    for k in range(pairs.disabled_count):
-        for i in (pairs.a[pairs.disabled[k]], pairs.b[pairs.disabled[k]]):
-            if i < state.dynamic:
+    for c in range(pairs.count if pairs.disabled_count > 0 else 0):
+        for i in (pairs.a[c], pairs.b[c]):
+            if i < state.dynamic and pairs.disabled[c] and pairs.near_contact[c]:
                 keeps_awake[i] = True
     for i in range(state.first, state.dynamic):
         if keeps_awake[i]:

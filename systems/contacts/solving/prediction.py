@@ -28,8 +28,9 @@ def mark_disabled(state):
     now, m = memory.now, 0
     for k in range(memory.counts[now]):
         memory.off[k] = memory.first[now, k] < 0 or memory.second[now, k] < 0
-    for q in range(pairs.disabled_count):
-        c = pairs.disabled[q]
+    for c in range(pairs.count if pairs.disabled_count > 0 else 0):
+        if not pairs.disabled[c]:
+            continue
         a, b = entity[pairs.a[c]], entity[pairs.b[c]]
         while m < memory.counts[now] and (
             memory.entity_a[now, m] < a or (memory.entity_a[now, m] == a and memory.entity_b[now, m] < b)

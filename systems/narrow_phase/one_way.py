@@ -1,0 +1,110 @@
+"""One-way colliders: solid for what comes from the front, as if they were not there for all else.
+
+A contact acts if its normal, away from the one-way collider, leans by at most UPRIGHT from the direction of its
+``one_way``, which turns with the body; and if the two did not overlap when the step began, or touched in the step
+before. So what has come from behind or from the side passes until it has left, and what stands on it stays supported,
+however deep a load presses it. Whether that is so is decided once in a step.
+"""
+
+from __future__ import annotations
+
+from ...framework.compilation import inlined, part
+from ...framework.jit.records.record_type import zero_of
+from ...framework.vectors import add_scaled, dot, length, negative, replace, sub
+from ..codes import OK
+from ..shapes.dispatch import both_convex
+from ..shapes.poses import row_of_axes
+from ..shapes.tolerances import SAME_PLACE
+from .manifolds import centre_offset, centre_offset_at_start, evaluate_pair
+
+UPRIGHT = 0.5  # cosine of the most that a normal leans from the direction: what leans farther is met from the side
+SLACK = 0.02  # of its extent: what is no deeper in at the start of the step comes from the front, as off a floor beside
+ADVANCES = 20  # evaluations on the way to a touch; boxes take 2, round shapes 5
+
+
+@inlined
+def is_one_way(state, i):
+    """Whether row i is solid from one side only."""
+    ways, slot = state.colliders.one_way, state.bodies.collider_slot[i]
+    return len(ways) > 0 and dot(ways[slot, i], ways[slot, i]) > 0.0
+
+
+@part
+def front_of(state, i):
+    """The direction of row i's ``one_way`` in the world, of any length; 0 if it is solid from all sides."""
+    if not is_one_way(state, i):
+        return zero_of(state)
+    way = state.colliders.one_way[state.bodies.collider_slot[i], i]
+    if len(state.bodies.axes) == 0:
+        return way
+    turned = way
+    for k in range(len(way)):
+        turned = replace(turned, k, dot(row_of_axes(state, i, k), way))
+    return turned
+
+
+@inlined
+def is_from_front(front, normal):
+    """Whether a contact with that normal, away from a one-way collider, is with its front."""
+    return dot(front, normal) >= UPRIGHT * length(front)
+
+
+@part
+def normal_ahead(state, a, b, start, end):
+    """(depth where the step starts, normal where the two first touch on the straight way, else where they are nearest
+    to it), from a to b; of concave shapes the normal at the end, if they touch there."""
+    hit, first, normal, _ = evaluate_pair(state, a, b, start)
+    travel, depth, share = sub(end, start), first, 0.0
+    shape, near = state.bodies.shape, SAME_PLACE * (length(start) + length(end))
+    if first >= 0.0:
+        return first, normal
+    if not both_convex(state, shape[a], shape[b]):
+        hit, _, there, _ = evaluate_pair(state, a, b, end)
+        return first, there if hit else normal
+    for _ in range(ADVANCES):
+        rate = dot(travel, normal)
+        if not depth < -near or not rate < 0.0:
+            break
+        share += depth / rate
+        if not share < 1.0:
+            break
+        _, depth, normal, _ = evaluate_pair(state, a, b, add_scaled(start, travel, share))
+    return first, normal
+
+
+@part
+def one_way_holds(state, a, b, start, end, touched):
+    """Whether a and b push each other, of which one is one-way or both are; start, end: from the centre of a's shape to
+    that of b's; touched: in the step before."""
+    front_a, front_b, extents = front_of(state, a), front_of(state, b), state.bodies.min_extent
+    depth, normal = normal_ahead(state, a, b, start, end)
+    holds, opposite = True, negative(normal)
+    if is_one_way(state, a):
+        holds = (touched or depth <= SLACK * extents[b]) and is_from_front(front_a, normal)
+    if is_one_way(state, b):
+        holds &= (touched or depth <= SLACK * extents[a]) and is_from_front(front_b, opposite)
+    return holds
+
+
+def release_one_way(state, dt):
+    """Pairs with a one-way collider that do not meet its front count as disabled. Pairs and the contacts of the step
+    before are in canonical order."""
+    pairs, contacts, entity, now, k = state.pairs, state.contacts, state.bodies.entity, state.contacts.now, 0
+    count = contacts.counts[now] if state.moved else 0
+    for c in range(pairs.count):
+        a, b = pairs.a[c], pairs.b[c]
+        if not pairs.is_solid[c] or not (is_one_way(state, a) or is_one_way(state, b)):
+            continue
+        first, second = entity[a], entity[b]
+        while k < count and (
+            contacts.entity_a[now, k] < first
+            or (contacts.entity_a[now, k] == first and contacts.entity_b[now, k] < second)
+        ):
+            k += 1
+        touched = k < count and contacts.entity_a[now, k] == first and contacts.entity_b[now, k] == second
+        touched = touched and contacts.enabled[now, k]
+        start, end = centre_offset_at_start(state.bodies, a, b), centre_offset(state.bodies, a, b)
+        if not one_way_holds(state, a, b, start if state.moved else end, end, touched):
+            pairs.is_solid[c], pairs.disabled[c] = False, True
+            pairs.disabled_count += 1
+    return OK
