@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...framework.compilation import inlined, part
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, scale, sub
-from ...systems.narrow_phase.one_way import is_one_way
+from ...systems.narrow_phase.one_way import front_of, is_from_front, is_one_way
 from ...systems.queries.compiled import is_sensor, overlap
 from .casts import REACH, SLOPE, across, cast_near, deepest, ground_kind, is_dynamic
 from .records import EXACT, MOST_HITS, SLIDES
@@ -161,10 +161,13 @@ def part_out(state, near, character, work, walker, at, rising):
                     add_plane(work, out, depth + 0.5 * skin)
                     worst = max(worst, depth + 0.5 * skin)
                 continue
-            if is_one_way:  # picked up by one that rises, and by that way at most
-                rise = dot(sub(state.bodies.position[j], state.bodies.previous_position[j]), one_way)
-                side = dot(out, one_way)
-                if walker.dropping or side < ONE_WAY or not rise > 0.0 or depth > rise + EXACT or rising > 0.0:
+            if is_one_way(state, j):  # picked up by one that rises, and by that way at most
+                front = front_of(state, j)
+                moved = sub(state.bodies.position[j], state.bodies.previous_position[j])
+                rise = dot(moved, front) / length(front)
+                if walker.dropping or rising > 0.0 or not rise > 0.0 or depth > rise + EXACT:
+                    continue
+                if not is_from_front(front, out):
                     continue
             add_plane(work, out, depth + skin)
             worst = max(worst, depth + skin)
