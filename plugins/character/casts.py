@@ -59,7 +59,7 @@ def meet_character(state, walker, j, at, way):
 
 
 @part
-def cast_near(state, near, character, walker, at, way, reach, ignored):
+def cast_near(state, near, character, work, walker, at, way, reach, ignored):
     """(row, distance, out, point) of what opposes a way first; row -1: it is free."""
     best, first, normal, touch = -1, reach, way, at
     path = Path(at, way, inverse_of(way), walker.half_extents)
@@ -78,20 +78,9 @@ def cast_near(state, near, character, walker, at, way, reach, ignored):
             continue
         if distance <= 0.0 and is_dynamic(state, j) and along > -0.5:
             continue
+        work.inside |= distance <= 0.0 and j >= state.moving
         best, first, normal, touch = j, distance, out, point
     return best, first, normal, touch
-
-
-@part
-def is_inside(state, near, character, walker, at):
-    """Whether it is in something that rests."""
-    for k in range(walker.near):
-        j = near.row[k]
-        if is_sensor(state, j) or j < state.moving or is_one_way(state, j):
-            continue
-        if overlap(state, walker.row, j, at)[0] > EXACT:
-            return True
-    return False
 
 
 @part
@@ -120,7 +109,7 @@ def ground_kind(state, walker, j, out, at, point):
 
 
 @part
-def floor_below(state, near, character, walker, at, reach):
+def floor_below(state, near, character, work, walker, at, reach):
     """(row, gap, out, height) of the floor that it can walk on within reach, and how far it may go down; row -1: none.
     height: of the touch along up, nan where something else keeps it from getting there.
 
@@ -145,6 +134,7 @@ def floor_below(state, near, character, walker, at, reach):
         rise = dot(out, up)
         if not touches or rise <= EXACT or not holds(state, walker, j, out, distance):
             continue
+        work.inside |= distance <= 0.0 and j >= state.moving
         here = distance - skin / max(rise, 0.1)
         kind = SLOPE if rise >= walker.limit else STEEP_GROUND
         if not character.present[j]:
@@ -168,12 +158,12 @@ def floor_below(state, near, character, walker, at, reach):
 
 
 @part
-def lowered(state, near, character, walker, at, gap):
+def lowered(state, near, character, work, walker, at, gap):
     """Where it is after going down by the gap; up, where that is negative, only as far as there is room."""
     if gap >= 0.0 or gap > -1e-12:
         return add_scaled(at, walker.up, 0.0 - gap) if gap > 1e-12 else at
     skin = walker.skin
-    j, distance, _, _ = cast_near(state, near, character, walker, at, walker.up, 0.5 * skin - gap, -1)
+    j, distance, _, _ = cast_near(state, near, character, work, walker, at, walker.up, 0.5 * skin - gap, -1)
     rise = 0.0 - gap if j < 0 else min(0.0 - gap, max(0.0, distance - 0.5 * skin))
     return add_scaled(at, walker.up, rise)
 

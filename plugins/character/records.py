@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import collections
 
-from ...framework.jit.records.schema import Schema, floats, integer, ints, vectors
+from ...framework.jit.records.schema import Schema, flag, floats, integer, ints, vectors
 
 STATES = ("air", "floor", "steep", "climb")
 AIR, FLOOR, STEEP, CLIMB = range(4)
@@ -35,6 +35,7 @@ WORK = Schema(
     normal=vectors(unit="1"),
     speed=floats(unit="m/s"),
     blocked=integer(),  # row that the character at work has walked against; -1: none
+    inside=flag(),  # it is in something that rests
     hits=integer(),  # what it has met
     hit_row=ints(),
     hit_out=vectors(unit="1"),

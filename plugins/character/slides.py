@@ -91,7 +91,7 @@ def slide(state, near, character, work, walker, at, wish, is_walking, is_carried
         if size < EXACT:
             break
         way = divided(left, size)
-        j, distance, out, point = cast_near(state, near, character, walker, at, way, size + REACH * skin, ignored)
+        j, distance, out, point = cast_near(state, near, character, work, walker, at, way, size + REACH * skin, ignored)
         if j < 0:
             return add(at, left)
         slope = 0.0 - dot(out, way)

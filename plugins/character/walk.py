@@ -14,7 +14,6 @@ from .casts import (
     deepest,
     floor_below,
     is_dynamic,
-    is_inside,
     lowered,
     meets_on_way,
 )
@@ -191,7 +190,7 @@ def step_over(state, near, character, work, walker, at, wish, done, height):
     over = slide(state, near, character, work, walker, top, scale(ahead, size), False, False, -1)
     if dot(sub(over, top), ahead) <= dot(done, ahead) + EXACT:
         return False, at
-    j, gap, _, floor_height = floor_below(state, near, character, walker, over, raised)
+    j, gap, _, floor_height = floor_below(state, near, character, work, walker, over, raised)
     foot = dot(at, up) - walker.skin
     for k in range(len(up)):
         foot -= abs(item(up, k)) * item(walker.half_extents, k)
@@ -293,7 +292,7 @@ def move_one(state, near, character, ladder, work, i, dt):
         low = replace(low, k, item(start, k) - item(extents, k) - reach)
         high = replace(high, k, item(start, k) + item(extents, k) + reach)
     found = gather(state, near, i, low, high)
-    work.hits = 0
+    work.hits, work.inside = 0, False
     # times
     character.since_floor[i] = 0.0 if standing else character.since_floor[i] + dt
     character.since_press[i] += dt
@@ -389,9 +388,9 @@ def move_one(state, near, character, ladder, work, i, dt):
         if not taken and work.hits > carried_hits and length(gone) < (1.0 - SLOWER) * length(way):
             ahead = across(gone, up)  # as fast as it got along the floor
             level = scale(ahead, length(gone) / (dt * max(length(ahead), EXACT)))
-        j, gap, found_out, _ = floor_below(state, near, character, walker, at, character.snap[i])
+        j, gap, found_out, _ = floor_below(state, near, character, work, walker, at, character.snap[i])
         if j >= 0:
-            at = lowered(state, near, character, walker, at, gap)
+            at = lowered(state, near, character, work, walker, at, gap)
             state_now, ground, out = FLOOR, j, found_out
         else:
             velocity = along_floor(level, normal, up)
@@ -420,16 +419,16 @@ def move_one(state, near, character, ladder, work, i, dt):
                 velocity = add_scaled(velocity, hit, 0.0 - min(0.0, dot(velocity, hit)))
         level, rising = across(velocity, up), dot(velocity, up)
         if not jumped and rising <= EXACT:
-            j, gap, found_out, _ = floor_below(state, near, character, walker, at, 2.0 * skin)
+            j, gap, found_out, _ = floor_below(state, near, character, work, walker, at, 2.0 * skin)
             stayed = abs(dot(sub(at, begin), up)) < 1e-3 * abs(2.0 * mean) * dt + 1e-6
             if j >= 0:
-                at = lowered(state, near, character, walker, at, gap)
+                at = lowered(state, near, character, work, walker, at, gap)
                 state_now, ground, out = FLOOR, j, found_out
             elif wedge and stayed:  # between two slopes that are both too steep
                 state_now, ground, out = FLOOR, work.hit_row[work.hits - 1], scale(up, 0.0)
             elif steep:
                 state_now = STEEP
-    if not disturbed and is_inside(state, near, character, walker, at):  # it was put there, or came from behind a chain
+    if work.inside:  # it was put into what rests, or came from behind a chain
         at, crusher = part_out(state, near, character, work, walker, at, rising)
     # what it knows in the end
     if state_now == FLOOR:
