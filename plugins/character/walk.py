@@ -421,7 +421,7 @@ def move_one(state, near, character, ladder, work, i, dt):
         if not jumped and (rising <= EXACT or work.hits > first):
             j, gap, found_out, _ = floor_below(state, near, character, work, walker, at, 2.0 * skin)
             stayed = abs(dot(sub(at, begin), up)) < 1e-3 * abs(2.0 * mean) * dt + 1e-6
-            if j >= 0 and dot(velocity, found_out) <= EXACT:
+            if j >= 0 and dot(velocity, found_out) <= gravity * dt + EXACT:  # no more than falls back in a step
                 at = lowered(state, near, character, work, walker, at, gap)
                 state_now, ground, out = FLOOR, j, found_out
             elif rising > EXACT:
