@@ -26,6 +26,7 @@ class MaterialFields(TypedDict, total=False):
     restitution: float
     friction: float | None
     sensor: bool
+    enabled: bool
     layer: int
     mask: int
     group: int
@@ -49,6 +50,8 @@ class Collider(Component, abstract=True):
         coefficient; None: use the other body's coefficient
     sensor
         reports contacts and does not react to them
+    enabled
+        False: it meets nothing, and no query finds it
     layer, mask
         two colliders meet if each one's layer has a bit in the other's mask
     group
@@ -64,7 +67,7 @@ class Collider(Component, abstract=True):
     _largest: ClassVar[float] = LONGEST
     stack: ClassVar[str] = "collider"
     stacked_columns: ClassVar[tuple[str, ...]] = (
-        "offset", "restitution", "friction", "sensor", "layer", "mask", "group", "one_way",
+        "offset", "restitution", "friction", "sensor", "enabled", "layer", "mask", "group", "one_way",
     )  # fmt: skip
 
     offset: VectorField = special_column(
@@ -77,6 +80,7 @@ class Collider(Component, abstract=True):
         unit="1", default=None, optional=True, minimum=0.0, kw_only=True, on_demand=True
     )
     sensor: bool = special_column(default=False, dtype=bool, kw_only=True, on_demand=True, also=("trigger",))
+    enabled: bool = special_column(default=True, dtype=bool, kw_only=True, on_demand=True, also=("active",))
     layer: int = special_column(
         default=1, dtype=int, kw_only=True, on_demand=True, also=("category",),
         nonzero="in no layer it meets nothing; mask=0 says so", cure=BITS,

@@ -163,6 +163,7 @@ BODIES = Schema(
     Section(
         "body", "shapes", "which shapes a body has, and where they are",
         levels=ints("int8", stacked=True),  # shapes, cheapest first, the last one repeated
+        own_levels=ints("int8", stacked=True),  # the same with those that are not enabled: they have inertia
         level_offsets=vectors(stacked=True, unit="m"),
     ),
     Section(

@@ -31,6 +31,7 @@ from .shapes.rotation import axes_of
 # What is kept of bodies from step to step, and moves with their rows: static bodies are not boxed again for others. The
 # shape comes first: it tells which bodies have arrived.
 KEPT_COLUMNS = ("shape", "collider_slot", "offset", "half_extents", "min_extent", "lower", "upper", "origin")
+ENABLED = f"{Collider.stack}.enabled"
 ARRIVED = np.array([-2], np.int8)  # in place of the shape of a body that has come since the last refresh
 # Static bodies do not move: what stands in their rows of these stays 0.
 ZERO_WHERE_STATIC = (
@@ -57,9 +58,12 @@ class Scene:
         self.version = 0
         self.linked: LinkedShapes | None = None
         self.parameters: ParameterRecords | None = None
-        self.levels = np.empty((1, 0), np.int8)
+        self.levels = self.own_levels = np.empty((1, 0), np.int8)
+        self._colliders: list[type[Any]] = []  # that are present, cheapest first
         self._masks: list[np.ndarray] = []  # of the linked shapes: which bodies have them
-        self._excluded = np.empty(0, np.int64), self.levels  # rows without their shapes, and these
+        self._excluded = np.empty(0, np.int64)  # rows that are taken out
+        self._off = np.empty((0, 0), bool)  # (rows, colliders): which of those that bodies have are not enabled
+        self._off_known = True  # whether all that follows from that is up to date
         self.stretches = np.zeros(0, bool)  # bodies whose box is stretched by rotation inside of a cheaper level
         self.rotated = False
         self.structure = self.static_version = -1  # of the table and the registry, when they were followed last
@@ -145,6 +149,7 @@ class Scene:
         self._bind_shapes()
         self.state.rotation_stale = True
         self.state.statics_version += 1
+        self.state.warm_start.rows_version[:] = -1  # what has lost its shape bears nothing
 
     # -- bodies that come and go ------------------------------------------------------------------
 
@@ -168,16 +173,21 @@ class Scene:
         kept = [column for column in kept if len(column)]  # without colliders there is the first alone
         if len(self._axes) == capacity:  # else they are made again, see refresh_rotation
             kept += [self._axes, bodies.axes_rotation.reshape(capacity, -1)]
+        fresh: list[np.ndarray | None] = [ARRIVED, *[None] * (len(kept) - 1)]
+        if self._off.size:
+            kept, fresh = [*kept, self._off], [*fresh, np.zeros_like(self._off[:1])]
+        if self.own_levels is not self.levels:
+            kept, fresh = [*kept, self.own_levels[-1]], [*fresh, None]
         self._keeps = bool(kept) and not self._several and all(len(column) == capacity for column in kept)
         if self._keeps:
-            self._moved.bind(kept, [ARRIVED, *[None] * (len(kept) - 1)])
+            self._moved.bind(kept, fresh)
         self._kept_version = self._columns_made, capacity
 
     def _place_arrivals(self) -> bool:
         """Find the shapes of the bodies that have come since the last time; False if all has to be made again."""
         state, table, count, moving = self.state, self.table, self.table.count, self.table.stops[1]
         bodies, linked = state.bodies, self.linked
-        if len(self._excluded[0]) or (linked and count - moving > len(bodies.static_position)):
+        if len(self._excluded) or (linked and count - moving > len(bodies.static_position)):
             return False
         if linked and self._shapes_version != table.columns_version:
             self._bind_shapes()
@@ -203,6 +213,8 @@ class Scene:
                 shapes[rows] = index
             if linked:
                 bodies.collider_slot[arrived] = slots[shapes[arrived]]
+        if self.own_levels is not self.levels:
+            self.own_levels[-1, arrived] = shapes[arrived]  # those that are not enabled are found afterwards
         state.collides = collides or bool(moving and shapes[:moving].max() >= 0)
         spins = self.spins()  # then each step sees which axes are old
         if linked and (self.rotated != spins or (linked.needs_axes and not spins)):
@@ -255,41 +267,89 @@ class Scene:
     def _place_levels(self, present: list[type[Any]]) -> list[type[Any]]:
         """Which shapes each body has, cheapest first; returns the shapes that are tested."""
         table, state, count = self.table, self.state, self.table.count
-        masks = [table.has_mask(component)[:count] for component in present]
-        levels = arrange(np.array(masks).reshape(len(present), count))
+        self._colliders = present
+        has, off = self._owned(slice(0, count)), self._off_now()
+        own, some_off = arrange(has), bool(off.any())
+        levels = self._arranged(has & ~off.T, len(own)) if some_off else own
         self._several = len(levels) > 1
         slots = np.array([table.slot_of(component) for component in present], np.int64)
         if present:
             state.bodies.collider_slot[:count] = slots[levels[-1]]
         if self._world.settings.geometry == "bounds" and len(levels) > 1:  # shapes that are never tested cost nothing
-            levels = levels[:1]
-            used = [index for index, c in enumerate(present) if c in self.prepared or (levels == index).any()]
+            own, levels = own[:1], levels[:1]
+            tested = np.union1d(own, levels)
+            used = [index for index, c in enumerate(present) if c in self.prepared or index in tested]
             levels = np.where(levels < 0, -1, np.searchsorted(used, levels)).astype(np.int8)
+            own = np.where(own < 0, -1, np.searchsorted(used, own)).astype(np.int8) if some_off else levels
             present, slots = [present[index] for index in used], slots[used]
         state.shapes.slots = slots
-        self._set_levels(levels, self.table.capacity if present else 0)
-        boxes = present.index(AABBCollider) if AABBCollider in present else len(present)
+        self._set_levels(levels, own, self.table.capacity if present else 0)
+        if off.size:
+            self._off[: len(off)], self._off_known = off, self._off_known and not some_off
         if len(levels) > 1:
-            self.stretches = (levels[1:] == boxes).any(axis=0) & (levels[0] != boxes)
+            self.stretches = self._stretches(levels)
         return present
 
-    def _set_levels(self, levels: np.ndarray, rows: int) -> None:
-        """The last level decides; it is also known as the body's shape.
+    def _owned(self, rows: Any) -> np.ndarray:
+        """(colliders, n): which of the colliders that are present these rows have."""
+        masks = [self.table.has_mask(component)[rows] for component in self._colliders]
+        return np.array(masks, bool).reshape(len(masks), len(self.table.arrays["entity"][rows]))
+
+    def _off_now(self) -> np.ndarray:
+        """(n, colliders): which of these the rows have, and are not enabled; none if all colliders ever were."""
+        enabled, count = self.table.stacks.get(ENABLED), self.table.count
+        if enabled is None:
+            return np.zeros((0, 0), bool)
+        slots = np.array([self.table.slot_of(component) for component in self._colliders], np.int64)
+        return (self._owned(slice(0, count)) & ~enabled[slots, :count]).T
+
+    @staticmethod
+    def _arranged(has: np.ndarray, count: int) -> np.ndarray:
+        """As :func:`arrange`, that many levels."""
+        levels = arrange(has)
+        return levels[np.minimum(np.arange(count), len(levels) - 1)]
+
+    def _stretches(self, levels: np.ndarray) -> np.ndarray:
+        """Mask of the bodies that have a box inside of a cheaper level."""
+        boxes = self._colliders.index(AABBCollider) if AABBCollider in self._colliders else len(self._colliders)
+        return (levels[1:] == boxes).any(axis=0) & (levels[0] != boxes)
+
+    def _set_levels(self, levels: np.ndarray, own: np.ndarray, rows: int) -> None:
+        """The last level decides; it is also known as the body's shape. own: the same of all colliders, enabled or not.
 
         rows: that many have places of their shapes, none while there is no shape, present or prepared.
         """
         state, bodies, capacity = self.state, self.state.bodies, self.table.capacity
         several = len(levels) > 1
         self._columns_made += 1
-        self.levels = np.full((len(levels), capacity), -1, np.int8)
+        self.levels = self.own_levels = bodies.own_levels = np.full((len(levels), capacity), -1, np.int8)
         self.levels[:, : levels.shape[1]] = levels
-        self._excluded = np.empty(0, np.int64), self.levels[:, :0]
+        self._excluded = np.empty(0, np.int64)
+        self._off = np.zeros((capacity if ENABLED in self.table.stacks else 0, len(self._colliders)), bool)
+        if own is not levels:
+            self._part_levels()
+            self.own_levels[:, : own.shape[1]] = own
         offsets = np.zeros((len(levels), rows, state.dimensions))
         bodies.levels, bodies.level_offsets = self.levels, offsets
         bodies.shape, bodies.offset = self.levels[-1], offsets[-1]
         bodies.level_not_enclosing = np.zeros(capacity if several else 0, bool)
         self.stretches = np.zeros(levels.shape[1] if several else 0, bool)
         state.several_levels, state.level_count = several, len(levels)
+
+    def _part_levels(self) -> None:
+        """Something is not enabled: the shapes that bodies have are others than those that are tested."""
+        self.own_levels = self.state.bodies.own_levels = self.levels.copy()
+        self._columns_made += 1
+
+    def _place(self, rows: np.ndarray) -> None:
+        """Find the shapes of these rows again: of what is taken out none, of others the colliders that are enabled."""
+        has = self._owned(rows) & ~np.isin(rows, self._excluded)
+        for levels in (self.own_levels, self.levels):  # the same if all are enabled
+            if levels is self.levels and self._off.size:
+                has &= ~self._off[rows].T
+            levels[:, rows] = self._arranged(has, len(levels))
+        if self.state.several_levels:
+            self.stretches[rows] = self._stretches(self.levels[:, rows])
 
     def exclude(self, out: np.ndarray) -> None:
         """Bodies (count,) that take no part: they have no shape as long as that is so, and no say in what all share."""
@@ -298,11 +358,41 @@ class Scene:
             self.reserve("quarantined")
         self.state.statics_version += int((bodies.quarantined[moving:count] != out[moving:]).any())
         bodies.quarantined[:count] = out
-        rows, shapes = self._excluded
-        self.levels[:, rows] = shapes
-        rows = np.flatnonzero(out)
-        self._excluded = rows, self.levels[:, rows]
-        self.levels[:, rows] = -1
+        rows, self._excluded = self._excluded, np.flatnonzero(out)
+        self._place(np.union1d(rows, self._excluded))
+
+    def follow_enabled(self) -> bool:
+        """Colliders that are not enabled have no shape among those that are tested; False if all has to be made again
+        for that."""
+        state, bodies, moving, off = self.state, self.state.bodies, self.table.stops[1], self._off_now()
+        if off.size and not self._off.size:
+            self._off = np.zeros((self.table.capacity, len(self._colliders)), bool)
+            self._columns_made += 1
+        rows = (off != self._off[: len(off)]).any(axis=1).nonzero()[0]
+        if self._off_known and not len(rows):
+            return True
+        if len(rows) and self._several and self._world.settings.geometry == "bounds":
+            self._off_known = False
+            return False  # other shapes may have to be tested
+        self._off[rows], self._off_known = off[rows], True
+        if len(rows):
+            if self.own_levels is self.levels:
+                self._part_levels()
+            self._place(rows)
+            shapes = self.levels[-1, rows]
+            bodies.collider_slot[rows[shapes >= 0]] = state.shapes.slots[shapes[shapes >= 0]]
+            state.statics_version += int(rows[0] < state.first or rows[-1] >= moving)
+        state.rotation_stale |= state.several_levels
+        state.warm_start.rows_version[:] = -1  # what has lost its shape bears nothing
+        state.collides = bool((self.levels[0, :moving] >= 0).any())
+        if not state.collides:
+            state.warm_start.counts[:] = 0
+        self.version += 1
+        return True
+
+    def forget_enabled(self) -> None:
+        """The records are those of another time: see once more to what follows from colliders that are not enabled."""
+        self._off_known = False
 
     def _bind_shapes(self) -> None:
         """The parameter columns of each shape: as the components have them, and as they are in the world."""
@@ -378,7 +468,7 @@ class Scene:
 
     def _sound_rotation(self) -> np.ndarray:
         """The column, none for bodies that are taken out."""
-        rotation, rows = self.table.column("rotation"), self._excluded[0]
+        rotation, rows = self.table.column("rotation"), self._excluded
         if len(rows):
             rotation = rotation.copy()
             rotation[rows] = self.table.default_of("rotation") if rotation.ndim == 1 else (1.0, 0.0, 0.0, 0.0)

@@ -45,7 +45,7 @@ from .quarantine.quarantine import Quarantine
 from .queries.system import Queries
 from .record_buffers import reserve_fixed
 from .records import CONTACT_ROWS, STATE
-from .scene import Scene, make_table
+from .scene import ENABLED, Scene, make_table
 from .settings import check_settings, gravity_vector, write_settings
 from .shapes.attribution import ErrorAttribution
 from .shapes.geometry_levels import LevelCheck, check_sensors
@@ -193,6 +193,7 @@ class Simulation:
         if self._structure() != scene.structure or table.static_version != scene.static_version:
             self._refresh()
         if self.must_check:
+            self._follow_enabled()
             self._check()
         if not self.links.follows(self.forces.kind()):
             self.link()
@@ -223,17 +224,30 @@ class Simulation:
             table.frames_applied = True
             if not state.collides:
                 state.warm_start.counts[:] = 0
-            linked = scene.linked
-            self.must_check = linked is not None and (state.several_levels or bool(linked.unhandled))
+            self._find_checks()
             self.quarantine.bind()
         scene.refresh_statics()
         if table.generation != self._generation:
             self._generation, state.ids_changed = table.generation, True
 
+    def _find_checks(self) -> None:
+        """Whether something has to be looked at in every step, see ``_follow_enabled`` and ``_check``."""
+        linked = self.scene.linked
+        checked = linked is not None and (self.state.several_levels or bool(linked.unhandled))
+        self.must_check = checked or (linked is not None and ENABLED in self.table.stacks)
+
+    def _follow_enabled(self) -> None:
+        """Which colliders are enabled may change at any time, also in place."""
+        if ENABLED in self.table.stacks and self.scene.linked is not None and not self.scene.follow_enabled():
+            self.scene.forget()
+            self._refresh()
+            self.scene.follow_enabled()
+
     def _follow_columns(self) -> None:
         """A column on demand has been made."""
         self.scene.bind_columns()
         self.links.version = NEVER_LINKED  # stages may need it
+        self._find_checks()
         if self.state.version == self.table.version:  # else the next refresh does it, when rows are known
             self.quarantine.bind()
 
@@ -268,6 +282,8 @@ class Simulation:
         if self.table.in_step:
             return
         self._refresh()
+        if self.must_check:
+            self._follow_enabled()
         self.links.link_shapes()
 
     def _box_now(self) -> None:
@@ -391,6 +407,7 @@ class Simulation:
         self._generation, state.ids_changed = self.table.generation, saved["ids_changed"]
         if self.quarantine.take_back(saved["quarantine"]) or moved or not saved["followed"]:
             self.scene.forget()
+        self.scene.forget_enabled()
         set_counters(state, saved["counters"])
         state.impacts.logged = 0
         state.found_current = state.moved = False

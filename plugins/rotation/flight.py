@@ -46,7 +46,7 @@ def inertia_of(state, spin, i):
         if d == 2:
             return 0.0, 0.0, spin.inertia[i, 0], 0.0, 0.0, 0.0
         return spin.inertia[i, 0], spin.inertia[i, 1], spin.inertia[i, 2], 0.0, 0.0, 0.0
-    shape = bodies.levels[0, i] if state.collides else -1
+    shape = bodies.own_levels[0, i]
     lost = shape < 0 and spin.gyration[i, 0] == spin.gyration[i, 0]
     if has_parts(state, i):
         return inertia_with_parts(state, i, gyration_of(state, spin, i) if lost else NO_EXTENT)
@@ -54,7 +54,7 @@ def inertia_of(state, spin, i):
         xx, yy, zz, xy, xz, yz = gyration_of(state, spin, i)
         m = bodies.mass[i]
         return m * xx, m * yy, m * zz, m * xy, m * xz, m * yz
-    several = state.collides and state.several_levels and bodies.levels[state.level_count - 1, i] != shape
+    several = state.several_levels and bodies.own_levels[state.level_count - 1, i] != shape
     if shape < 0 or several or state.shapes.moments[shape] == 0:
         state.blamed = i + 1
         raise ValueError(UNKNOWN)

@@ -58,7 +58,7 @@ def spin_of(state, spin, i):
 
 
 TURNS_BY = (
-    "mass", "quarantined", "sleep_state", "levels", "shapes", "spin.inertia", "spin.angular_damping",
+    "mass", "quarantined", "sleep_state", "own_levels", "shapes", "spin.inertia", "spin.angular_damping",
     "spin.max_angular_speed", "spin.constant_torque", "spin.applied_torque", "spin.gyration", "spin.gyration_products",
 )  # fmt: skip
 
@@ -148,7 +148,7 @@ def write_inverse_inertia(state, spin, i):
 @spinning.stage(
     after="check_flight", records=(Spin,),
     reads=(
-        "mass", "quarantined", "shapes", "levels", "offset", "rotation", "spin.inertia", "spin.angular_velocity",
+        "mass", "quarantined", "shapes", "own_levels", "offset", "rotation", "spin.inertia", "spin.angular_velocity",
         "spin.rolling_friction", "spin.gyration", "spin.gyration_products",
     ),
     writes=("spin", "inverse_inertia", "inverse_products", "rolling_radius", "rolling_friction", "turn", "reach"),
@@ -171,14 +171,14 @@ def share_spins(state, dt, spin):
 
 @spinning.stage(
     after="check_flight", records=(Spin, SphereCollider),
-    reads=("quarantined", "shapes", "levels", "offset", "inverse_inertia", "sphere_collider.radius"),
+    reads=("shapes", "levels", "offset", "inverse_inertia", "sphere_collider.radius"),
     writes=("rolling_radius",), needed="colliders",
 )  # fmt: skip
 def find_round(state, dt, spin, sphere):
     """which bodies roll: contacts push on their centre, and turn them by friction alone"""
     bodies, d = state.bodies, len(zero_of(state))
     for i in range(state.first, state.moving):
-        if bodies.quarantined[i] or not (spin.present[i] and sphere.present[i]):  # of the first there is no shape
+        if bodies.levels[0, i] < 0 or not (spin.present[i] and sphere.present[i]):
             continue
         shape, inverse, others = bodies.levels[0, i], bodies.inverse_inertia[i], bodies.inverse_products[i]
         several = state.several_levels and bodies.levels[state.level_count - 1, i] != shape  # another one decides

@@ -14,7 +14,7 @@ OF_PART = "its PartOf has a mass, and it has no collider that tells its inertia:
 @part
 def has_own_inertia(state, i):
     """Whether row i has a shape with second moments."""
-    shape = state.bodies.levels[state.level_count - 1, i] if state.collides else -1
+    shape = state.bodies.own_levels[state.level_count - 1, i]
     return shape >= 0 and state.shapes.moments[shape] != 0
 
 
@@ -24,7 +24,7 @@ def inertia_of_row(state, i, mass):
     if not has_own_inertia(state, i):
         state.blamed = i + 1
         raise ValueError(UNKNOWN)
-    shape = state.bodies.levels[state.level_count - 1, i]
+    shape = state.bodies.own_levels[state.level_count - 1, i]
     return inertia_about(second_moments(state, shape, i), state.colliders.offset[state.shapes.slots[shape], i], mass)
 
 
@@ -43,14 +43,15 @@ def inertia_with_parts(state, i, gyration):
         own, share = 0.0, bodies.mass[i] / of_parts
     xx, yy, zz, xy, xz, yz = gyration
     xx, yy, zz, xy, xz, yz = own * xx, own * yy, own * zz, own * xy, own * xz, own * yz
-    if own > 0.0 and state.collides and bodies.levels[state.level_count - 1, i] >= 0:
+    if own > 0.0 and bodies.own_levels[state.level_count - 1, i] >= 0:
         xx, yy, zz, xy, xz, yz = inertia_of_row(state, i, own)
     k = bodies.next_part[i]
     while k >= 0:
         p = bodies.part[k]
         if parts.mass[p] > 0.0:
             m, kept = share * parts.mass[p], parts.kept
-            lost = not (state.collides and bodies.levels[state.level_count - 1, k] >= 0) and kept[p, 2] == kept[p, 2]
+            lost = not bodies.own_levels[state.level_count - 1, k] >= 0
+            lost &= kept[p, 2] == kept[p, 2]
             if lost:  # its collider, for a moment: as it was
                 tensor = m * kept[p, 0], m * kept[p, 1], m * kept[p, 2], m * kept[p, 3], m * kept[p, 4], m * kept[p, 5]
             elif has_own_inertia(state, k):

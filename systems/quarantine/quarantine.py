@@ -162,7 +162,7 @@ class Quarantine:
         self._tell_of_distance(np.flatnonzero(~out[:moving]), dt)
         self._scene.exclude(out)
         if out.any():
-            self._forget_contacts(out)
+            state.warm_start.rows_version[:] = -1  # contacts at rest with these bodies count as those with none
         still = set(arrays["entity"][: table.count][out].tolist())
         self.told = {entity: field for entity, field in self.told.items() if entity in still}
         state.quarantining = bool(self.told)
@@ -225,14 +225,3 @@ class Quarantine:
                     f"{apart:.3g} m apart; bring the scene nearer to the origin, or take longer steps",
                     kind="far", entity=entity,
                 )  # fmt: skip
-
-    def _forget_contacts(self, out: np.ndarray) -> None:
-        """Contacts at rest of the last step with these bodies count as those with bodies that are gone."""
-        memory, version = self._state.warm_start, self._state.version
-        now = memory.now
-        count = int(memory.counts[now])
-        for rows, entities in ((memory.first, memory.entity_a), (memory.second, memory.entity_b)):
-            found = self._table.rows_of(entities[now, :count])
-            rows[now, :count] = np.where((found >= 0) & out[found], -1, found)
-        if count:
-            memory.rows_version[now] = version

@@ -101,7 +101,7 @@ class ErrorAttribution:
         state, shapes = self._state, self._shapes()
         if not shapes or max(a, b) >= state.count:
             return ""
-        entity, levels = state.bodies.entity, state.bodies.levels
+        entity, levels = state.bodies.entity, state.bodies.own_levels
         if b == ALONE:
             shape = shapes[int(levels[-1][a])]
             return f"plugin {shape.plugin}: bounds of {shape.component.__name__}, entity {entity[a]}"
@@ -127,7 +127,7 @@ class ErrorAttribution:
         for row, other in ((b, a), (a, b)):  # the body is the second, unless the pair is registered that way round
             if not 0 <= row < state.count:
                 continue
-            body = shapes[int(state.bodies.levels[-1][row])].component
+            body = shapes[int(state.bodies.own_levels[-1][row])].component
             pair = self._registry.pair(query, body)
             if pair is not None and (pair.first is query) == (row == b and other == a):
                 found[f"{self._pair(query, body)} of a query, entity {state.bodies.entity[row]}"] = None

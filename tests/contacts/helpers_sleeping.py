@@ -84,6 +84,9 @@ CAUSES = {  # what wakes the tower of these boxes
     "other layer": lambda world, boxes: setattr(part(world, boxes[0], AABBCollider), "layer", 4),
     "one group": lambda world, boxes: [setattr(part(world, box, AABBCollider), "group", 3) for box in boxes],
     "sensor": lambda world, boxes: setattr(part(world, boxes[1], AABBCollider), "sensor", True),
+    "not enabled": lambda world, boxes: setattr(part(world, boxes[1], AABBCollider), "enabled", False),
+    "not enabled in a column": lambda world, boxes: write(world, boxes[0], "aabb_collider.enabled", lambda _: False),
+    "floor not enabled": lambda world, boxes: setattr(part(world, ground(world), AABBCollider), "enabled", False),
     "lighter": lambda world, boxes: setattr(part(world, boxes[1], RigidBody), "gravity_scale", 0.5),
     "gravity": lambda world, boxes: setattr(world, "gravity", (0.0, -5.0)),
     "settings": lambda world, boxes: setattr(world, "settings", world.settings.replace(dt=1 / 120)),
@@ -99,4 +102,7 @@ CAUSES = {  # what wakes the tower of these boxes
     "touched by kinematic": lambda world, boxes: box(world, (-1.6, 2.5), (3.0, 0.0), kind="kinematic"),
     "told": lambda world, boxes: world.wake(boxes[1]),
 }
-EVERYWHERE = {"gravity", "settings", "floor deleted", "floor moved", "floor in a column", "floor without collider"}
+EVERYWHERE = {
+    "gravity", "settings", "floor deleted", "floor moved", "floor in a column", "floor without collider",
+    "floor not enabled",
+}  # fmt: skip

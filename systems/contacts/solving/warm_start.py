@@ -43,14 +43,22 @@ def row_of(state, wanted):
 
 
 @part
+def row_of_shape(state, wanted):
+    """The row of an entity; -1 if it is no body, or has no shape any more."""
+    row = row_of(state, wanted)
+    return row if row >= 0 and state.bodies.shape[row] >= 0 else -1
+
+
+@part
 def find_rows(state):
-    """The rows of the remembered pairs, -1 for bodies that are gone. They hold until rows move."""
+    """The rows of the remembered pairs, -1 for bodies that are gone, or have lost their shape. They hold until rows
+    move or shapes go."""
     memory, now = state.warm_start, state.warm_start.now
     if memory.rows_version[now] == state.version:
         return
     for m in range(memory.counts[now]):
-        memory.first[now, m] = row_of(state, memory.entity_a[now, m])
-        memory.second[now, m] = row_of(state, memory.entity_b[now, m])
+        memory.first[now, m] = row_of_shape(state, memory.entity_a[now, m])
+        memory.second[now, m] = row_of_shape(state, memory.entity_b[now, m])
     memory.rows_version[now] = state.version
 
 
