@@ -15,7 +15,7 @@ import numpy as np
 from carom.components import AABBCollider, Collider, RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Plugin, Settings, World, column
 from carom.framework.vectors import item, replace, scale
-from carom.plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, terrain, tile_grid
+from carom.plugins import Physics, capsule, convex_polygon, half_space, terrain, tile_grid
 from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Motor, MousePull, Slider, Weld
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 from carom.plugins.springs import Springs
@@ -101,10 +101,10 @@ def mixed(d: int, mode: str, count: int = 14, **settings) -> World:
 
 
 def platformer(mode: str) -> World:
-    plugins = (capsule.plugin, one_way_segment.plugin, tile_grid.plugin, convex_polygon.plugin)
+    plugins = (capsule.plugin, tile_grid.plugin, convex_polygon.plugin)
     world = World(Physics(2, gravity=(0.0, -9.81)), *plugins, settings=Settings(collision=mode))
     world.create_entity(Transform((0.0, 0.0)), tile_grid.TileGridCollider(["#....#", "#.#..#", "######"], 1.0))
-    world.create_entity(Transform((0.0, 1.0)), one_way_segment.OneWaySegmentCollider((-1.0, 0.0), (1.0, 0.0)))
+    world.create_entity(Transform((0.0, 1.0)), AABBCollider((1.0, 0.0), one_way=(0.0, 1.0)))
     for k, collider in enumerate((capsule.CapsuleCollider(0.2, 0.3), SphereCollider(0.2), AABBCollider((0.2, 0.2)))):
         body = RigidBody(linear_velocity=(2.0 - k, -6.0 * k))
         world.create_entity(Transform((-0.8 + 0.7 * k, 1.6 + 0.3 * k)), body, collider)

@@ -29,7 +29,6 @@ from carom.plugins import Physics, capsule
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider
 from carom.plugins.half_space import HalfSpaceCollider
-from carom.plugins.one_way_segment import OneWaySegmentCollider
 from carom.plugins.paths import Path
 from carom.plugins.springs import Springs
 from carom.plugins.tile_grid import TileGridCollider
@@ -105,7 +104,7 @@ def colliders() -> list[Component]:
         HalfSpaceCollider((0.0, 1.0)),
         ConvexPolygonCollider(((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)), corner_radius=0.1),
         ConvexPolygonCollider.box((1.0, 2.0), restitution=0.1),
-        OneWaySegmentCollider((0.0, 0.0), (1.0, 0.0), front="right"),
+        AABBCollider((1.0, 0.0), one_way=(0.0, -1.0)),
         TileGridCollider(((1, 0), (1, 1)), 0.5, faces="floors", restitution=0.5),
         Health(80.0, lives=2, path=((0.0, 0.0), (1.0, 1.0))),
         RigidBody(2.0, (1.0, 0.0), kind="kinematic", max_linear_speed=None, ccd=True),

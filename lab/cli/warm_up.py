@@ -25,7 +25,7 @@ from ...framework import Plugin, Settings, World
 from ...framework.compilation import log
 from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_folder, clear_cache, used
 from ...framework.jit.prebuilt import INDEX, OFF, PORTABLE, write_index
-from ...plugins import Physics, capsule, convex_hull, convex_polygon, half_space, one_way_segment, terrain, tile_grid
+from ...plugins import Physics, capsule, convex_hull, convex_polygon, half_space, terrain, tile_grid
 from ...plugins.joints import Joints
 from ...plugins.rotation import BoxCollider, Rotation, Spin
 from ..reporting.progress import Progress
@@ -35,7 +35,7 @@ from .options import json_option, traceback_option
 from .usage_errors import Problem
 
 # The plugins that ship and bring shapes.
-SHIPPED_SHAPES = capsule, convex_hull, convex_polygon, half_space, one_way_segment, tile_grid
+SHIPPED_SHAPES = capsule, convex_hull, convex_polygon, half_space, tile_grid
 SHIPPED = tuple(module.plugin for module in SHIPPED_SHAPES)
 STEPS = 10  # of a scene, to compile what its own systems call
 

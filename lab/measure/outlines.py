@@ -15,7 +15,6 @@ from ...plugins.capsule import CapsuleCollider
 from ...plugins.convex_hull import ConvexHullCollider, around, faces_of
 from ...plugins.convex_polygon import ConvexPolygonCollider
 from ...plugins.half_space import HalfSpaceCollider
-from ...plugins.one_way_segment import OneWaySegmentCollider
 from ...plugins.rotation import BoxCollider
 from ...plugins.terrain.segment import ChainSegmentCollider
 from ...plugins.terrain.triangle import TerrainTriangleCollider
@@ -113,7 +112,7 @@ OUTLINES = {
     BoxCollider: _box, CapsuleCollider: _capsule, ConvexPolygonCollider: _polygon, ChainSegmentCollider: _segment,
 }  # fmt: skip
 ONLY_DRAWN = {
-    OneWaySegmentCollider: _segment, HalfSpaceCollider: _half_space, TileGridCollider: _tiles,
+    HalfSpaceCollider: _half_space, TileGridCollider: _tiles,
     ConvexHullCollider: _hull, TerrainTriangleCollider: _triangle,
 }  # fmt: skip
 

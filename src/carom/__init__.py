@@ -30,7 +30,6 @@ _NAMES = {
     "plugins.joints": (
         "Ball", "Cone", "Distance", "Hinge", "JointState", "Joints", "Motor", "MousePull", "Slider", "Weld", "Wheel",
     ),
-    "plugins.one_way_segment": ("OneWaySegmentCollider",),
     "plugins.parts": ("PartOf", "Parts", "parts_from_outline"),
     "plugins.paths": ("Path", "Paths"),
     "plugins.rotation": ("BoxCollider", "Rotation", "Spin"),

@@ -16,7 +16,6 @@ from .plugins.joints import MousePull as MousePull
 from .plugins.joints import Slider as Slider
 from .plugins.joints import Weld as Weld
 from .plugins.joints import Wheel as Wheel
-from .plugins.one_way_segment import OneWaySegmentCollider as OneWaySegmentCollider
 from .plugins.parts import PartOf as PartOf
 from .plugins.parts import Parts as Parts
 from .plugins.parts import parts_from_outline as parts_from_outline

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import runpy
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -422,3 +424,31 @@ def test_it_can_be_set_at_any_time():
     world.component_for_entity(1, AABBCollider).one_way = (0, 1)
     world.component_for_entity(below, RigidBody).linear_velocity = (0, 9.0)
     assert run(world, 0.5, below).max() > 0.7
+
+
+@each_shape
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_twenty_jumps_of_any_height_end_on_it(shape, restitution):
+    """Free flight up through it, for any gap at the end of a step; then at rest on it, with one begin."""
+    world = make_world((Transform((0, 0)), platform(30.0)))
+    speeds = 9.0 + 0.1 * np.arange(20)
+    jumpers = [throw(world, (2.5 * k - 25, -2), (0, speed), shape, restitution=restitution)
+               for k, speed in enumerate(speeds)]  # fmt: skip
+    heights, begun = [], []
+    for _ in range(240):
+        world.step()
+        heights.append([position(world, each)[1] for each in jumpers])
+        begun += list(world.contacts.begin)
+    steps = np.arange(1, 51)[:, None]
+    free = -2 + speeds * steps / 60 - G * steps * (steps + 1) / 2 / 60**2
+    np.testing.assert_allclose(heights[:50], free, atol=1e-12)
+    np.testing.assert_allclose(heights[-1], 0.5, atol=REST)
+    if restitution == 0.0:
+        assert sorted((contact.entity_a, contact.entity_b) for contact in begun) == [(1, each) for each in jumpers]
+
+
+def test_the_example_runs(capsys):
+    runpy.run_path(str(Path(__file__).resolve().parents[2] / "examples" / "one_way_platform.py"), run_name="__main__")
+    lines = capsys.readouterr().out.splitlines()
+    assert ["stands on the platform" in line for line in lines[-3:]] == [True, False, False]
+    assert "stands on the floor" in lines[-1]

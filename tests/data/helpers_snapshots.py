@@ -6,7 +6,7 @@ import numpy as np
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Component, Phase, Settings, System, World, column
-from carom.plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
+from carom.plugins import Physics, capsule, convex_polygon, half_space, tile_grid
 from carom.plugins.springs import Springs
 
 EVENTS = ("contact_begin", "contact_stay", "contact_end", "impact", "spring_lost")
@@ -54,7 +54,7 @@ class Churn(System):
 
 
 def plugins(d, springs=True):
-    flat = [capsule.plugin, half_space.plugin, convex_polygon.plugin, one_way_segment.plugin, tile_grid.plugin]
+    flat = [capsule.plugin, half_space.plugin, convex_polygon.plugin, tile_grid.plugin]
     return [Physics(dimensions=d, gravity=(0.0, -9.81, 0.0)[:d]), *(flat if d == 2 else flat[:2]), Springs()][
         : None if springs else -1
     ]
@@ -82,7 +82,7 @@ def fill(world):
         Transform(at(-3, 2)), RigidBody(kind="kinematic", linear_velocity=at(0.3, 0)), AABBCollider((1.0, 0.2, 1.0)[:d])
     )
     if d == 2:
-        world.create_entity(Transform((6, 2)), one_way_segment.OneWaySegmentCollider((-2, 0), (2, 0)))
+        world.create_entity(Transform((6, 2)), AABBCollider((2, 0), one_way=(0, 1)))
         world.create_entity(Transform((-8, 3)), *[tile_grid.TileGridCollider(((1, 0, 1), (1, 1, 1)), 1.0)])
         world.create_entity(
             Transform((0, 6)), RigidBody(), convex_polygon.ConvexPolygonCollider(((0, 0), (1, 0), (0.5, 0.8)))

@@ -23,16 +23,16 @@ from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
 from carom.framework.compilation import log
-from carom.plugins import Physics, capsule, convex_polygon, one_way_segment, tile_grid
+from carom.plugins import Physics, capsule, convex_polygon, tile_grid
 
 STEPS = 200
 
 def platformer(mode):
-    plugins = capsule.plugin, convex_polygon.plugin, one_way_segment.plugin, tile_grid.plugin
+    plugins = capsule.plugin, convex_polygon.plugin, tile_grid.plugin
     world = World(Physics(2, gravity=(0.0, -9.81)), *plugins, settings=Settings(collision=mode))
     ground = ["#........#", "#........#", "#..##....#", "##########"]
     world.create_entity(Transform((0.0, 0.0)), tile_grid.TileGridCollider(ground, 1.0))
-    world.create_entity(Transform((0.0, 1.0)), one_way_segment.OneWaySegmentCollider((-1.0, 0.0), (1.0, 0.0)))
+    world.create_entity(Transform((0.0, 1.0)), AABBCollider((1.0, 0.0), one_way=(0.0, 1.0)))
     for k in range(3):
         place = Transform((-1.0 + k, 4.0 + k))
         world.create_entity(place, RigidBody(linear_velocity=(1.0, 0.0)), capsule.CapsuleCollider(0.2, 0.3))

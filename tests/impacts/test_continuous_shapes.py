@@ -11,10 +11,9 @@ from worlds import position, velocity
 
 from carom.components import AABBCollider, SphereCollider, Transform
 from carom.framework import Settings, World
-from carom.plugins import Physics, capsule, convex_polygon, one_way_segment
+from carom.plugins import Physics, capsule, convex_polygon
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider
-from carom.plugins.one_way_segment import OneWaySegmentCollider
 
 pytestmark = pytest.mark.slow  # each set of shapes compiles for long
 DT = 1 / 60
@@ -97,13 +96,13 @@ def test_every_pair_meets_where_it_should(mode):
 
 @each_sweep
 @pytest.mark.parametrize("e", [0.0, 1.0])
-def test_a_one_way_segment_in_the_way_of_bullets(mode, e):
+def test_a_one_way_platform_in_the_way_of_bullets(mode, e):
     """From the front at 600 m/s, 10 m per step: stopped or reflected. From behind: the same bits as without it."""
     for start, speed in ((6.0, -600.0), (-6.0, 600.0)):
-        world = shaped_world(mode, one_way_segment.plugin)
-        free = shaped_world(mode, one_way_segment.plugin)
-        world.create_entity(Transform((0.0, 0.0)), OneWaySegmentCollider((-2.0, 0.0), (2.0, 0.0), restitution=e))
-        free.create_entity(Transform((0.0, 1e6)), OneWaySegmentCollider((-2.0, 0.0), (2.0, 0.0)))
+        world = shaped_world(mode)
+        free = shaped_world(mode)
+        world.create_entity(Transform((0.0, 0.0)), AABBCollider((2.0, 0.0), one_way=(0.0, 1.0), restitution=e))
+        free.create_entity(Transform((0.0, 1e6)), AABBCollider((2.0, 0.0), one_way=(0.0, 1.0)))
         for shape, x in (("ball", -1.0), ("box", 1.0)):
             for w in (world, free):
                 bullet(w, (x, start), (0.0, speed), collider=SHAPES[shape](0.0))

@@ -10,7 +10,7 @@ from worlds import METHODS, MODES
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
-from carom.plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
+from carom.plugins import Physics, capsule, convex_polygon, half_space, tile_grid
 
 DT = 1 / 60
 GRAVITIES = (1e-6, 1e-3, 0.05, 0.3, 1.0, 3.0, 10.0, 100.0, 1e4, 1e6)  # g dt^2 of a size
@@ -28,10 +28,10 @@ FLOORS = {
     "box": (-1.0, lambda d: AABBCollider((WIDE, 1.0, WIDE)[:d])),
     "half_space": (0.0, lambda d: half_space.HalfSpaceCollider((0.0, 1.0, 0.0)[:d])),
     "tile_grid": (-1.0, lambda d: tile_grid.TileGridCollider(["#" * 20] * 2, 1.0)),
-    "one_way": (0.0, lambda d: one_way_segment.OneWaySegmentCollider((-WIDE, 0.0), (WIDE, 0.0))),
+    "one_way": (0.0, lambda d: AABBCollider((WIDE, 0.0), one_way=(0.0, 1.0))),
 }
 PLUGINS = (capsule.plugin, half_space.plugin)
-PLUGINS_2D = (convex_polygon.plugin, tile_grid.plugin, one_way_segment.plugin)
+PLUGINS_2D = (convex_polygon.plugin, tile_grid.plugin)
 SHIPPED = [
     (2, "capsule", "box"), (2, "polygon", "box"), (2, "box", "half_space"), (2, "box", "tile_grid"),
     (2, "ball", "one_way"), (3, "capsule", "half_space"),

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import runpy
-from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers_filters import DT, listen, pairs, up
 from worlds import ball, both_dimensions, box, floor, make_world, position, run, velocity
 
-from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.components import RigidBody, Transform
 from carom.framework import Phase, System
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 class Disable(System):
@@ -149,52 +145,3 @@ def test_enabled_holds_for_its_step_only():
         assert pairs(world.contacts.end if step % 2 else world.contacts.begin) == [(one, two)]
         assert len(world.contacts.stay) == 0
         assert len(world.contacts.of(one)) == (step + 1) % 2
-
-
-# -- a one-way platform, as an example has it -------------------------------------------------------
-
-
-def one_way_world(**settings):
-    """The example's system, a platform whose upper side is at y = 2, and a floor."""
-    example = runpy.run_path(str(ROOT / "examples" / "one_way_platform.py"), run_name="example")
-    world = make_world(gravity=20.0, **settings)
-    ground = floor(world)
-    platform = world.create_entity(Transform((0, 1.75)), AABBCollider((2, 0.25)), example["Platform"]())
-    world.add_system(example["OneWay"]())
-    return world, ground, platform, example
-
-
-@pytest.mark.parametrize("collider", [AABBCollider((0.4, 0.5)), SphereCollider(0.5)], ids=["box", "sphere"])
-@pytest.mark.parametrize("restitution", [0.0, 0.5])
-def test_a_jump_through_a_platform_from_below_ends_on_it(collider, restitution):
-    """Free flight up through it, for any gap at the end of a step; then at rest on it, with one begin."""
-    world, _, platform, _ = one_way_world()
-    world.component_for_entity(platform, AABBCollider).half_extents = (30, 0.25)
-    players, speeds = [], 11 + 0.1 * np.arange(20)
-    for k, speed in enumerate(speeds):
-        shape = collider.copy()
-        shape.restitution = restitution
-        players.append(
-            world.create_entity(Transform((2.5 * k - 25, 0.5)), RigidBody(linear_velocity=(0, speed)), shape)
-        )
-    told = listen(world)
-    world.step()
-    told.clear()
-    for step in range(2, 33):  # nearly to their apexes, 3.5 to 4.8 m up
-        world.step()
-        for player, speed in zip(players, speeds, strict=True):
-            assert velocity(world, player)[1] == pytest.approx(speed - 20 * DT * step, abs=1e-9)
-    assert not [event for event in told if platform in event]
-    run(world, 200)
-    for player in players:
-        assert position(world, player)[1] == pytest.approx(2.5, abs=0.01)
-        assert abs(velocity(world, player)[1]) < 0.01
-        assert [contact.entity_b for contact in world.contacts.of(player)] == [platform]
-    if restitution == 0:
-        begun = [event for event in told if event[0] != "stay" and platform in event]
-        assert sorted(begun) == [("begin", platform, player) for player in players]
-
-
-def test_the_example_runs(capsys):
-    runpy.run_path(str(ROOT / "examples" / "one_way_platform.py"), run_name="__main__")
-    assert "stands on the platform" in capsys.readouterr().out

@@ -8,11 +8,10 @@ from scipy.optimize import nnls
 
 from carom.components import AABBCollider, SphereCollider, Transform
 from carom.framework import World
-from carom.plugins import Physics, capsule, convex_hull, convex_polygon, one_way_segment
+from carom.plugins import Physics, capsule, convex_hull, convex_polygon
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_hull import ConvexHullCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider
-from carom.plugins.one_way_segment import OneWaySegmentCollider
 from carom.systems.shapes.rotation import axes_of
 
 pytestmark = pytest.mark.slow  # its shapes take long to compile
@@ -30,7 +29,6 @@ SHAPES = {  # by name and dimension: the collider, the corners of its core, how 
     ("polygon", 2): (ConvexPolygonCollider(KITE), KITE, 0.0),
     ("rounded polygon", 2): (ConvexPolygonCollider(KITE, corner_radius=0.2), KITE, 0.2),
     ("hull", 3): (ConvexHullCollider(CORNERS), CORNERS, 0.0),
-    ("segment", 2): (OneWaySegmentCollider(*KITE[:2]), KITE[:2], 0.0),
 }
 FAR = 6.0
 NEAR = 1e-6
@@ -48,7 +46,7 @@ def gap(points, corners, reach):
 def test_queries_and_casts_meet_a_shape_where_it_is(name, d):
     collider, core, reach = SHAPES[name, d]
     rng, place = np.random.default_rng(d), np.array((3.0, -40.0, 7.0))[:d]
-    plugins = capsule.plugin, convex_polygon.plugin, convex_hull.plugin, one_way_segment.plugin
+    plugins = capsule.plugin, convex_polygon.plugin, convex_hull.plugin
     with World(Physics(dimensions=d), *plugins) as world:
         entity = world.create_entity(Transform(place), collider.copy())
         for turned in (False, True):

@@ -11,7 +11,7 @@ from worlds import ball, make_world
 from carom.components import Collider, RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Plugin, System, UnhandledPairError, World, column
 from carom.framework.compilation import log
-from carom.plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
+from carom.plugins import Physics, capsule, convex_polygon, half_space, tile_grid
 from carom.plugins.springs import Springs
 
 # A whole game in a separate process: kernels already loaded would hide what prepare has missed.
@@ -199,7 +199,7 @@ def test_worlds_with_every_plugin_can_be_prepared_and_no_system_is_made_or_run()
     game = Plugin("game")
     game.system(Counting)
     springs = Springs()
-    shapes = [module.plugin for module in (capsule, convex_polygon, half_space, one_way_segment, tile_grid)]
+    shapes = [module.plugin for module in (capsule, convex_polygon, half_space, tile_grid)]
     world = World(Physics(dimensions=2), game, springs, *shapes)
     world.add_system(Counting())
     springs.connect(ball(world, (0, 0)), ball(world, (3, 0)), stiffness=10.0)

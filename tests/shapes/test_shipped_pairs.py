@@ -13,24 +13,20 @@ from carom.components import AABBCollider, SphereCollider
 from carom.framework.plugins.laws import size_of
 from carom.lab.plugins.kernels import PairCode
 from carom.lab.plugins.samples import WIDTH, Poses, Rows, poses
-from carom.plugins import capsule, convex_hull, convex_polygon, half_space, one_way_segment
+from carom.plugins import capsule, convex_hull, convex_polygon, half_space
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_hull import FIRST, ConvexHullCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider
 from carom.plugins.half_space import HalfSpaceCollider
-from carom.plugins.one_way_segment import OneWaySegmentCollider
 
 SHAPES = (
-    AABBCollider, CapsuleCollider, ConvexHullCollider, ConvexPolygonCollider, HalfSpaceCollider, OneWaySegmentCollider,
-    SphereCollider,
+    AABBCollider, CapsuleCollider, ConvexHullCollider, ConvexPolygonCollider, HalfSpaceCollider, SphereCollider,
 )  # fmt: skip
 DIRECTIONS = 24  # per pose: half of them anywhere, half near the normal
 ROUNDING = 1e-12  # of distance and sizes
 
 
-REGISTRY = registry(
-    capsule.plugin, convex_hull.plugin, convex_polygon.plugin, half_space.plugin, one_way_segment.plugin
-)  # fmt: skip
+REGISTRY = registry(capsule.plugin, convex_hull.plugin, convex_polygon.plugin, half_space.plugin)
 PAIRS = [
     (first, second, d)
     for first, second in itertools.combinations_with_replacement(SHAPES, 2)
@@ -55,9 +51,6 @@ def reach(rows: Rows, n: np.ndarray) -> np.ndarray:
     if component is CapsuleCollider:
         along = np.abs(np.einsum("pkd,pd->pk", n, rows.axes[:, :, 1]))
         return along * arrays["half_height"][:, None] + arrays["radius"][:, None]
-    if component is OneWaySegmentCollider:
-        ends = [np.einsum("pkd,pd->pk", n, turned(rows, arrays[name])) for name in ("start", "end")]
-        return np.maximum(*ends)
     name, first = ("hull", FIRST) if component is ConvexHullCollider else ("vertices", 0)
     result = np.empty(n.shape[:2])
     for number in np.unique(arrays[name]):
