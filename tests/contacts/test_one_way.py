@@ -369,7 +369,7 @@ def test_what_stands_on_it_sleeps_and_is_held_when_it_wakes():
     inside = throw(world, (0.0, -0.1), layer=2)  # on another floor, through the platform
     stands = throw(world, (1.5, 0.5))
     run(world, 3.0)
-    assert world.physics.state.asleep > 0
+    assert all(world.component_for_entity(body, RigidBody).asleep for body in (stands, inside))
     assert velocity(world, stands)[1] == 0.0
     world.component_for_entity(stands, RigidBody).linear_velocity = (0.0, 3.0)
     heights = run(world, 2.0, stands, inside)

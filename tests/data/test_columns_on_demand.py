@@ -18,11 +18,12 @@ ON_DEMAND = {
     "rotation", "constant_force", "gravity_scale", "linear_damping", "max_linear_speed", "ccd", "applied_force",
     "applied_frame", "step_force", "force", "sphere_collider.offset", "sphere_collider.restitution",
     "sphere_collider.friction", "sphere_collider.sensor", "sphere_collider.layer", "sphere_collider.mask",
-    "sphere_collider.group",
+    "sphere_collider.group", "sphere_collider.one_way",
 }  # fmt: skip
 # Another value of each field that a handle or a constructor takes.
 BODY = {"constant_force": 2.0, "gravity_scale": 0.5, "linear_damping": 0.25, "max_linear_speed": 3.0, "ccd": True}
-BALL = {"offset": 0.1, "restitution": 0.5, "friction": 0.25, "sensor": True, "layer": 2, "mask": 6, "group": 3}
+BALL = {"offset": 0.1, "restitution": 0.5, "friction": 0.25, "sensor": True, "layer": 2, "mask": 6, "group": 3,
+        "one_way": 0.5}  # fmt: skip
 OTHERS = {**{name: (RigidBody, value) for name, value in BODY.items()},
           **{name: (SphereCollider, value) for name, value in BALL.items()}}  # fmt: skip
 
