@@ -40,6 +40,7 @@ _NAMES = {
     ),
     "plugins.tile_grid": ("TileGridCollider", "cells_of_text"),
     "plugins.timers": ("Timer", "Timers"),
+    "plugins.zones": ("Field", "Water", "Wind", "Zones", "explode"),
 }  # fmt: skip
 _MODULES = {name: module for module, names in _NAMES.items() for name in names}
 __all__ = sorted(_MODULES)  # pyright: ignore[reportUnsupportedDunderAll]

@@ -35,6 +35,11 @@ from .plugins.tile_grid import TileGridCollider as TileGridCollider
 from .plugins.tile_grid import cells_of_text as cells_of_text
 from .plugins.timers import Timer as Timer
 from .plugins.timers import Timers as Timers
+from .plugins.zones import Field as Field
+from .plugins.zones import Water as Water
+from .plugins.zones import Wind as Wind
+from .plugins.zones import Zones as Zones
+from .plugins.zones import explode as explode
 from .systems import *
 
 __version__: str

@@ -51,7 +51,7 @@ def is_pushed_otherwise(state, i, dt):
     """Whether another force acts on a sleeper than in the step before.
 
     In its first step that force is noted. Its velocity has just become 0, so that what depends on velocities may differ
-    a little: force systems, and code of the game.
+    a little: force systems, and code of the game. What floats is held by such forces alone.
     """
     bodies, free = state.bodies, state.has_force_systems or state.others_write
     if len(bodies.force) == 0:
@@ -60,7 +60,8 @@ def is_pushed_otherwise(state, i, dt):
         return not is_same_vector(bodies.force[i], bodies.rest_force[i])
     push = length(sub(bodies.force[i], bodies.rest_force[i])) * bodies.inverse_mass[i] * dt
     bodies.rest_force[i] = bodies.force[i]
-    return not push <= (FIRST_SHARE * bodies.force_speed_change[i] if free else 0.0)
+    unmoved = UNMOVED_SIZES * least_extent(state, i) / dt
+    return not push <= (max(FIRST_SHARE * bodies.force_speed_change[i], unmoved) if free else 0.0)
 
 
 def look_at_sleepers(state, dt):
