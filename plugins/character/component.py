@@ -29,6 +29,12 @@ class SlopeColumn(Column):
 class UpColumn(Column):
     """A direction, of any length but 0."""
 
+    def checked(self, value: Any, entity: int | None = None) -> Any:
+        made = super().checked(value, entity)
+        if not np.any(made):
+            raise self._error(value, "must be a direction, not 0", entity)
+        return made
+
     def check_numbers(self, array: np.ndarray, shown: Any, entity: int | None) -> None:
         super().check_numbers(array, shown, entity)
         if not np.all(np.any(array, axis=-1)):
@@ -157,8 +163,8 @@ class Character(Component):
     wall_entity: int = known(-1, dtype=int)
     on_ceiling: bool = known(default=False, dtype=bool)
     crushed: int = known(-1, dtype=int)
-    # Its memory: seconds since, whether the key was held, what others have given it, with what force it pushes what,
-    # and what the floor was like when it was last seen.
+    # Its memory: seconds since, whether the key was held, where it was left, what others have given it, with what force
+    # it pushes what, and what the floor was like when it was last seen.
     since_floor: float = known(NEVER, unit="s")
     since_press: float = known(NEVER, unit="s")
     since_wall: float = known(NEVER, unit="s")
@@ -166,6 +172,7 @@ class Character(Component):
     held: bool = known(default=False, dtype=bool)
     jumping: bool = known(default=False, dtype=bool)
     air_jumped: int = known(0, dtype=int)
+    place: VectorField = known(item="vector", unit="m")
     pushed: VectorField = known(item="vector", unit="m/s")
     push: VectorField = known(item="vector", unit="N")
     push_entity: int = known(-1, dtype=int)

@@ -137,7 +137,7 @@ def pushed_by_planes(work):
 
 
 @part
-def part_out(state, near, character, work, walker, at, rising):
+def part_out(state, near, character, work, walker, at, rising, ignored):
     """(place, row of what crushes it): out of static and kinematic bodies, the planes of all that overlap together.
 
     rising
@@ -148,7 +148,7 @@ def part_out(state, near, character, work, walker, at, rising):
         work.planes, worst = 0, 0.0
         for k in range(walker.near):
             j = near.row[k]
-            if is_dynamic(state, j) or is_sensor(state, j):
+            if j == ignored or is_dynamic(state, j) or is_sensor(state, j):
                 continue
             depth, out, _ = overlap(state, walker.row, j, at)
             if character.present[j]:

@@ -46,6 +46,7 @@ def move_characters(state, dt, character, near, work, ladder):
     for i in range(state.dynamic, state.moving):
         if character.present[i] and bodies.shape[i] >= 0:
             bodies.position[i], character.velocity[i] = work.place[i], work.velocity[i]
+            character.place[i] = work.place[i]
             character.pushed[i] = scale(work.place[i], 0.0)
     limit_pushes(state, character, work)
     work.statics_version = state.statics_version

@@ -305,19 +305,21 @@ def move_one(state, near, character, ladder, work, i, dt):
     if character.drop[i] and standing and character.since_drop[i] > DROPS_AGAIN and is_one_way(state, floor):
         character.since_drop[i], standing, rising = 0.0, False, 0.0
     leaves = standing and character.since_press[i] <= character.buffer[i]
+    left = floor if leaves and dot(ride, ride) > 0.0 else -1  # it jumps as the step begins, and what moves stays behind
     dropping = character.since_drop[i] < DROPS_FOR
     limit = math.cos(character.max_slope[i])
     walker = Walker(i, start, extents, half, up, skin, limit, dropping, found)
     # ride, and out of what has moved into it
     at = start
-    if dot(ride, ride) > 0.0 and not leaves:  # it jumps as the step begins
+    if dot(ride, ride) > 0.0 and not leaves:
         at = slide(state, near, character, work, walker, at, ride, False, True, floor)
     carried_hits, crusher = work.hits, -1
-    disturbed = state.statics_version != work.statics_version or work.hits > 0 or character.since_floor[i] > 0.1 * NEVER
+    disturbed = work.hits > 0 or state.statics_version != work.statics_version
+    disturbed |= differs(bodies.position[i], character.place[i])
     for k in range(found):  # beside what rests nothing can have moved into it
         disturbed |= state.dynamic <= near.row[k] < state.moving
     if disturbed:
-        at, crusher = part_out(state, near, character, work, walker, at, rising)
+        at, crusher = part_out(state, near, character, work, walker, at, rising, left)
     if crusher >= 0:
         into_static, _ = deepest(state, near, character, walker, at, state.moving, 1e-6)
         if into_static >= 0:
@@ -406,7 +408,8 @@ def move_one(state, near, character, ladder, work, i, dt):
         begin, first, fell = at, work.hits, rising
         mean = 0.5 * (start_rising + rising)
         tried = add_scaled(level, up, mean)
-        at = slide(state, near, character, work, walker, at, scale(add_scaled(level, up, mean), dt), False, False, -1)
+        way = scale(add_scaled(level, up, mean), dt)
+        at = slide(state, near, character, work, walker, at, way, False, False, left)
         velocity, wedge, steep = add_scaled(level, up, rising), False, False
         for k in range(first, work.hits):
             hit, rise = work.hit_out[k], dot(work.hit_out[k], up)
@@ -430,8 +433,8 @@ def move_one(state, near, character, ladder, work, i, dt):
                 state_now, ground, out = FLOOR, work.hit_row[work.hits - 1], scale(up, 0.0)
             elif steep:
                 state_now = STEEP
-    if work.inside:  # it was put into what rests, or came from behind a chain
-        at, crusher = part_out(state, near, character, work, walker, at, rising)
+    if work.inside or left >= 0:  # it was put into what rests, or came from behind a chain
+        at, crusher = part_out(state, near, character, work, walker, at, rising, -1)
     # what it knows in the end
     if state_now == FLOOR:
         character.since_floor[i], rising = 0.0, 0.0
