@@ -17,11 +17,14 @@ class QueryVerbs(CastVerbs):
     """``world.query_...``: arguments checked, answers from the plugin that provides physics; mixed into World.
 
     All of them find static bodies and sensors too; ``mask`` has a bit for each layer that is asked for. What touches a
-    point, a box or a sphere leaves out colliders that are solid from one side only, unless ``one_way``.
+    point, a box or a sphere leaves out colliders that are solid from one side only, unless ``one_way`` is True.
     """
 
     def query_point(self, point: Vector, mask: int = -1, *, one_way: bool = False) -> list[int]:
-        """Entities whose collider contains the ``point``, (d,) m, by id."""
+        """Entities whose collider contains the ``point``, (d,) m, by id.
+
+        one_way: also what is solid from one side only.
+        """
         services = self._synchronized()
         centre = check.point(point, "query_point: point", services.dimensions)
         return services.queries.sphere(centre, 0.0, check.mask(mask, "query_point: mask"), one_way)
@@ -29,7 +32,7 @@ class QueryVerbs(CastVerbs):
     def query_aabb(self, lower: Vector, upper: Vector, mask: int = -1, *, one_way: bool = False) -> list[int]:
         """Entities whose collider touches the box from ``lower`` to ``upper``, (d,) m, by id.
 
-        ValueError if a lower bound exceeds the upper one.
+        one_way: also what is solid from one side only. ValueError if a lower bound exceeds the upper one.
         """
         services = self._synchronized()
         low = check.point(lower, "query_aabb: lower", services.dimensions)
@@ -39,14 +42,20 @@ class QueryVerbs(CastVerbs):
         return services.queries.box(low, high, check.mask(mask, "query_aabb: mask"), one_way)
 
     def query_sphere(self, centre: Vector, radius: float, mask: int = -1, *, one_way: bool = False) -> list[int]:
-        """Entities whose collider touches the sphere of ``radius`` m around ``centre``, (d,) m, by id."""
+        """Entities whose collider touches the sphere of ``radius`` m around ``centre``, (d,) m, by id.
+
+        one_way: also what is solid from one side only.
+        """
         services = self._synchronized()
         place = check.point(centre, "query_sphere: centre", services.dimensions)
         size = check.distance(radius, "query_sphere: radius")
         return services.queries.sphere(place, size, check.mask(mask, "query_sphere: mask"), one_way)
 
     def query_spheres(self, centres: Vectors, radii: Numbers, masks: Masks = -1, *, one_way: bool = False) -> Hits:
-        """For each of m spheres (centres (m, d); radii, masks: one or (m,)) the ids of what it touches, ascending."""
+        """For each of m spheres (centres (m, d); radii, masks: one or (m,)) the ids of what it touches, ascending.
+
+        one_way: also what is solid from one side only.
+        """
         services = self._synchronized()
         places = check.points(centres, "query_spheres: centres", services.dimensions)
         sizes = check.distances(radii, "query_spheres: radii", len(places))
@@ -56,7 +65,8 @@ class QueryVerbs(CastVerbs):
     def query_aabbs(self, lower: Vectors, upper: Vectors, masks: Masks = -1, *, one_way: bool = False) -> Hits:
         """For each of m boxes (``lower`` and ``upper`` (m, d)) the ids of the entities it touches, ascending.
 
-        masks: one for all or (m,). ValueError names the first row in which a lower bound exceeds the upper one.
+        masks: one for all or (m,); one_way: also what is solid from one side only. ValueError names the first row in
+        which a lower bound exceeds the upper one.
         """
         services = self._synchronized()
         low = check.points(lower, "query_aabbs: lower", services.dimensions)
