@@ -10,6 +10,7 @@ from ...framework.vectors import dot, item, length, sub
 from ..codes import LOOK, OK, WAKE, WAKE_TOUCHED
 from ..forces.stages import is_zero
 from ..islands import join_roots, root_of
+from ..narrow_phase.one_way import is_one_way
 from ..parts.rows import has_parts, next_row, owner_of
 from ..shapes.tolerances import contact_margin
 
@@ -295,8 +296,11 @@ def join_islands(state, dt, needed):
         if low >= state.first and high < state.dynamic:
             join_roots(root, low, high)
     for c in range(pairs.count if pairs.disabled_count > 0 else 0):
-        for i in (pairs.a[c], pairs.b[c]):
-            if i < state.dynamic and pairs.disabled[c] and pairs.near_contact[c]:
+        a, b = pairs.a[c], pairs.b[c]
+        if not pairs.disabled[c] or is_one_way(state, a) or is_one_way(state, b):  # of these no system decides
+            continue
+        for i in (a, b):
+            if i < state.dynamic:
                 keeps_awake[i] = True
     for i in range(state.first, state.dynamic):
         if keeps_awake[i]:
