@@ -304,6 +304,8 @@ def asked(d: int) -> list[str]:
                     world.shape_cast(SphereCollider(0.2), point, way),
                     world.shape_cast(AABBCollider((0.2,) * d), point, way, only_nearest=True),
                     world.shape_casts(SphereCollider(0.2), points, np.array([way, way])),
+                    world.shape_casts(SphereCollider(0.2), points, np.array([way, way]), masks=[1, 2], against=True),
+                    world.overlaps(AABBCollider((0.5,) * d), point), world.shape_overlaps(SphereCollider(0.8), points),
                 )
             ]  # fmt: skip
     return [hashlib.sha256(text.encode()).hexdigest()[:16] for text in found]
