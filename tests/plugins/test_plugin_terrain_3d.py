@@ -175,6 +175,43 @@ def test_rays_see_fronts_only():
     assert hit.normal == pytest.approx((0, 1, 0))
 
 
+@pytest.mark.parametrize("rough", [0.02, 0.05, 0.3])
+def test_balls_cast_down_stop_where_they_touch(rough):
+    """On smooth and on rough hills, many right over edges: never deeper, and less than a thousandth of a cell too
+    high."""
+    rng, world = np.random.default_rng(3), make_world()
+    i, j = np.indices((12, 12))
+    heights = 0.5 * np.sin(0.5 * i) + 0.4 * np.cos(0.7 * j) + rough * rng.uniform(0, 1, (12, 12))
+    create_height_field(world, heights, 1.0)
+    world.step()
+    corners = np.stack((i, heights, j), axis=-1)
+    a, b, c, d = corners[:-1, :-1], corners[1:, :-1], corners[:-1, 1:], corners[1:, 1:]
+    faces = np.concatenate([np.stack(face, axis=-2).reshape(-1, 3, 3) for face in ((a, c, b), (b, c, d))])
+    for radius in (0.3, 0.7):
+        starts = rng.uniform(1, 10, (300, 3))
+        starts[:, 1] = 2.5
+        starts[:150, 0] = np.round(starts[:150, 0]) + 0.03 * rng.normal(size=150)
+        hits = world.shape_casts(SphereCollider(radius), starts, (0.0, -5.0, 0.0))
+        ends = starts - hits.distance[:, None] * (0.0, 1.0, 0.0)
+        gaps = [distance_to(faces, end) - radius for end in ends]
+        assert hits.found.all()
+        assert min(gaps) > -1e-6
+        assert max(gaps) < 1e-3
+
+
+def distance_to(faces, point):
+    """From a point to the nearest of triangles (n, 3, 3)."""
+    corners, edges = faces, np.roll(faces, -1, axis=1) - faces
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    heights = ((point - corners[:, 0]) * normals).sum(1)
+    arms = point - heights[:, None, None] * normals[:, None] - corners
+    over = (np.cross(edges, arms) * normals[:, None]).sum(2).min(1) >= 0
+    t = np.clip(((point - corners) * edges).sum(2) / (edges**2).sum(2), 0, 1)
+    to_edges = np.linalg.norm(point - corners - t[..., None] * edges, axis=2).min(1)
+    return np.where(over, abs(heights), to_edges).min()
+
+
 @pytest.mark.parametrize(
     ("vertices", "triangles", "message"),
     [
