@@ -64,6 +64,7 @@ class Scene:
         self._excluded = np.empty(0, np.int64)  # rows that are taken out
         self._off = np.empty((0, 0), bool)  # (rows, colliders): which of those that bodies have are not enabled
         self._off_known = True  # whether all that follows from that is up to date
+        self._enabled, self._enabled_version = np.empty((0, 0), bool), -1  # when that was found, and the scene's version
         self.stretches = np.zeros(0, bool)  # bodies whose box is stretched by rotation inside of a cheaper level
         self.rotated = False
         self.structure = self.static_version = -1  # of the table and the registry, when they were followed last
@@ -364,12 +365,17 @@ class Scene:
     def follow_enabled(self) -> bool:
         """Colliders that are not enabled have no shape among those that are tested; False if all has to be made again
         for that."""
+        enabled = self.table.stacks[ENABLED][:, : self.table.count]
+        if self._off_known and self._enabled_version == self.version and np.array_equal(enabled, self._enabled):
+            return True  # usual
+        self._enabled = enabled.copy()
         state, bodies, moving, off = self.state, self.state.bodies, self.table.stops[1], self._off_now()
         if off.size and not self._off.size:
             self._off = np.zeros((self.table.capacity, len(self._colliders)), bool)
             self._columns_made += 1
         rows = (off != self._off[: len(off)]).any(axis=1).nonzero()[0]
         if self._off_known and not len(rows):
+            self._enabled_version = self.version
             return True
         if len(rows) and self._several and self._world.settings.geometry == "bounds":
             self._off_known = False
@@ -388,6 +394,7 @@ class Scene:
         if not state.collides:
             state.warm_start.counts[:] = 0
         self.version += 1
+        self._enabled_version = self.version
         return True
 
     def forget_enabled(self) -> None:
