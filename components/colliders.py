@@ -31,6 +31,7 @@ class MaterialFields(TypedDict, total=False):
     mask: int
     group: int
     one_way: Vector | float
+    surface_velocity: Vector | float
 
 
 class ColliderFields(MaterialFields, total=False):
@@ -59,6 +60,9 @@ class Collider(Component, abstract=True):
     one_way
         (d,) a direction of any length, turned with the body: solid only for what comes from where it points to; 0:
         from all sides
+    surface_velocity
+        (d,) m/s along the body's own axes, relative to the body: friction drives what touches it to that, along the
+        surface
     """
 
     __slots__ = ()
@@ -68,6 +72,7 @@ class Collider(Component, abstract=True):
     stack: ClassVar[str] = "collider"
     stacked_columns: ClassVar[tuple[str, ...]] = (
         "offset", "restitution", "friction", "sensor", "enabled", "layer", "mask", "group", "one_way",
+        "surface_velocity",
     )  # fmt: skip
 
     offset: VectorField = special_column(
@@ -94,6 +99,10 @@ class Collider(Component, abstract=True):
     one_way: VectorField = special_column(
         unit="1", default=0.0, item="vector", kw_only=True, on_demand=True, also=("oneway", "one_way_platform")
     )
+    surface_velocity: VectorField = special_column(
+        unit="m/s", default=0.0, item="vector", kw_only=True, on_demand=True,
+        also=("tangent_speed", "tangent_velocity", "conveyor_velocity"),
+    )  # fmt: skip
 
     rotates: ClassVar[bool] = False  # True if its functions need the body's axes in the world, as ``shape.axes``
     dimensions: ClassVar[tuple[int, ...]] = (2, 3)  # dimensions of the worlds that support it

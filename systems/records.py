@@ -204,6 +204,7 @@ COLLIDERS = Schema(
     mask=ints(stacked=True, default=default_of(Collider.mask)),
     group=ints(stacked=True, default=default_of(Collider.group)),
     one_way=vectors(stacked=True, default=default_of(Collider.one_way), unit="1"),
+    surface_velocity=vectors(stacked=True, default=default_of(Collider.surface_velocity), unit="m/s"),
 )
 
 # Linked functions and parameters of the scene's shapes, cheapest first; a pair is at first * count + second, where
@@ -309,10 +310,11 @@ _fields.pop("joints")
 _fields.pop("direct")
 SOLVER_ARMS = Section("contact", "rotation", "bodies spin", **{name: _fields.pop(name) for name in ARM_COLUMNS})
 SOLVER_SPINS = Section("body at rest", "rotation", "bodies spin", **{name: _fields.pop(name) for name in TURN_COLUMNS})
+SOLVER_SURFACES = Section("contact", "contacts at rest", "surfaces run", surface_slip=_fields.pop("surface_slip"))
 _split = list(_fields).index("bodies")
 SOLVER_CONTACTS = Section("contact", "contacts at rest", RESTED, **dict(list(_fields.items())[:_split]))
 SOLVER_BODIES = Section("body at rest", "contacts at rest", RESTED, **dict(list(_fields.items())[_split:]))
-SOLVER.sections = SOLVER_CONTACTS, SOLVER_ARMS, SOLVER_BODIES, SOLVER_SPINS
+SOLVER.sections = SOLVER_CONTACTS, SOLVER_ARMS, SOLVER_SURFACES, SOLVER_BODIES, SOLVER_SPINS
 
 STATE = Schema(
     "State",

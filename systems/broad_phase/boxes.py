@@ -12,6 +12,7 @@ from ..codes import OK
 from ..integration.turning import size_of_turn
 from ..linking.parts import BOUND_SEARCHES, call_bound_searches
 from ..shapes.dispatch import half_extents, write_rotated
+from ..shapes.surfaces import along_world
 from ..shapes.tolerances import driven_travel, reach_of
 from .brute_force import BRUTE_FORCE_MAX
 from .records import HIGHEST, LARGEST_EXTENT, LOWEST
@@ -31,19 +32,6 @@ def fixed_count(state):
 def fixed_row(state, k):
     """The row of the k-th of these."""
     return k if k < state.first else k - state.first + state.moving
-
-
-@part
-def rotated_offset(state, i, local):
-    """An offset of body i, as it is in the world."""
-    axes, d = state.bodies.axes, len(local)
-    result = local
-    for k in range(d):
-        total = 0.0
-        for j in range(d):
-            total += axes[(i * d + k) * d + j] * item(local, j)
-        result = replace(result, k, total)
-    return result
 
 
 @part
@@ -67,7 +55,7 @@ def find_extents(state, level, start, stop):
         if shape >= 0:
             at = offset[slots[shape], i]
             if state.rotated:
-                at = rotated_offset(state, i, at)
+                at = along_world(state, i, at)
                 write_rotated(state, shape, i, state.rotated)
             bodies.level_offsets[level, i] = at
             half = half_extents(state, shape, i)

@@ -14,7 +14,8 @@ from ..joints.bodies import build_joint_rows
 from ..joints.records import DIRECT_BODIES
 from ..parts.rows import has_parts, next_row, owner_of, place_of
 from ..parts.stages import copy_to_parts
-from ..records import REST_COLUMNS, SOLVER_ARMS, SOLVER_BODIES, SOLVER_CONTACTS, SOLVER_SPINS
+from ..records import REST_COLUMNS, SOLVER_ARMS, SOLVER_BODIES, SOLVER_CONTACTS, SOLVER_SPINS, SOLVER_SURFACES
+from ..shapes.surfaces import any_surface_runs
 from .constants import FREQUENCY, SAG, TIPPING_FREQUENCY, TIPPING_SAG
 from .points import points_of
 from .solving.islands import order_rows
@@ -83,6 +84,7 @@ ROOM_AT_REST = (
     Rows("solver", SOLVER_CONTACTS, rows_at_rest),
     Rows("solver", SOLVER_BODIES, bodies_at_rest),
     Rows("solver", SOLVER_ARMS, lambda s: rows_at_rest(s) if s.spinning else 0),
+    Rows("solver", SOLVER_SURFACES, lambda s: rows_at_rest(s) if any_surface_runs(s) else 0),
     Rows("solver.direct", DIRECT_BODIES, lambda s: bodies_at_rest(s) if s.solver.joints.active > 0 else 0),
     Rows("solver", SOLVER_SPINS, lambda s: bodies_at_rest(s) if s.spinning else 0),
 )  # fmt: skip

@@ -10,6 +10,7 @@ from ...framework.vectors import add_scaled, dot, item, length, replace, sub
 from ..ccd.search_bounds import FAST, is_swept, turns_far
 from ..ccd.turning_touch import first_touch_of_turn, is_followed
 from ..codes import OK
+from ..forces.stages import is_zero
 from ..impacts.impulses import STOPPED, is_beyond_cap, is_trapped
 from ..integration.turning import arms_to, closing_by_spin, size_of_turn
 from ..narrow_phase.manifolds import (
@@ -27,6 +28,7 @@ from ..narrow_phase.manifolds import (
 )  # fmt: skip
 from ..parts.rows import owner_of
 from ..shapes.dispatch import both_convex, friction_of, restitution_of
+from ..shapes.surfaces import any_surface_runs, slip_of
 from ..shapes.tolerances import (
     SAME_PLACE,
     contact_margin,
@@ -220,20 +222,23 @@ def normal_varies(state, a, b, d, normal):
 
 
 @inlined
-def repeat_row(solver, one, k):
+def repeat_row(solver, one, k, surfaces):
     """What the points of a pair have in common."""
     solver.normal[k], solver.gap[k], solver.apart[k] = solver.normal[one], solver.gap[one], solver.apart[one]
     solver.varies[k], solver.parting[k] = solver.varies[one], solver.parting[one]
     solver.extent[k], solver.friction[k] = solver.extent[one], solver.friction[one]
+    if surfaces:
+        solver.surface_slip[k] = solver.surface_slip[one]
 
 
 def linearise(state, dt):
     """Of each contact at rest the normal and the gap where the step starts, and what the solver needs of its bodies."""
     pairs, bodies, solver, has_friction = state.pairs, state.bodies, state.solver, False
+    surfaces, solver.surfaces_run = any_surface_runs(state), False
     for r in range(solver.contacts):  # in the order of the pairs, for the caches
         c, k = solver.pair[r], solver.slot[r]
         if solver.point[r] > 0:
-            repeat_row(solver, solver.slot[r - 1], k)
+            repeat_row(solver, solver.slot[r - 1], k, surfaces)
             continue
         a, b, parting = pairs.a[c], pairs.b[c], pairs.parting[c]
         extent, d = smaller_extent(bodies, a, b), centre_offset_at_start(bodies, a, b)
@@ -262,6 +267,9 @@ def linearise(state, dt):
         mu = friction_of(state, a, b)
         solver.friction[k] = mu
         has_friction |= mu != 0.0
+        if surfaces:
+            solver.surface_slip[k] = slip_of(state, a, b, zero_of(state))
+            solver.surfaces_run |= mu != 0.0 and not is_zero(solver.surface_slip[k])
     solver.has_friction = has_friction
     solver.has_rolling = False
     for r in range(solver.contacts if state.spinning else 0):

@@ -28,6 +28,7 @@ from ..narrow_phase.stages import rank_rows
 from ..parts.rows import owner_of
 from ..shapes.dispatch import both_convex, evaluate, friction_of, has_corner_rule, is_corner_touch, restitution_of
 from ..shapes.poses import advance_pose, motion_of, set_motion
+from ..shapes.surfaces import slip_of
 from ..shapes.tolerances import is_turning, slop_of, smaller_extent, turning_travel
 from .heap import heap_push
 from .impulses import (
@@ -255,10 +256,10 @@ def queue_event(state, c, kind, path, touch, speed, restitution):
     impacts, pairs, bodies, (t, normal, point, _) = state.impacts, state.pairs, state.bodies, touch
     a, b = pairs.a[c], pairs.b[c]
     change, pull, mu = -(1.0 + restitution) * speed, zero_of(state), friction_of(state, a, b)
+    w = slip_of(state, a, b, rate_along(path, t))
     if state.spinning and kind != CROSSING:
-        change, pull = respond_at_arms(state, (a, b), touch, (rate_along(path, t), speed), restitution, mu)
+        change, pull = respond_at_arms(state, (a, b), touch, (w, speed), restitution, mu)
     elif mu > 0.0:  # Coulomb: stops what slides, with at most mu times the normal impulse
-        w = rate_along(path, t)
         sliding = add_scaled(w, normal, -dot(w, normal))
         fast = length(sliding)
         if fast > 0.0:

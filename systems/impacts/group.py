@@ -20,6 +20,7 @@ from ..integration.trajectory import rate_along, relative_path
 from ..integration.turning import compliance, is_turned, velocity_by_spin
 from ..parts.rows import owner_of
 from ..shapes.dispatch import friction_of
+from ..shapes.surfaces import slip_of
 from .exact_sum import exact_sum
 from .impulses import count_impact, deflect, is_counted, is_immovable, log_impact, note_trapped
 from .turning import arms_of, turn_by_impact
@@ -211,7 +212,7 @@ def solve_group_friction(state, count):
         a, b, normal = pairs.a[c], pairs.b[c], impacts.event_normal[impacts.member[m]]
         mu, impacts.friction_impulse[m] = friction_of(state, a, b), zero_of(state)
         if mu > 0.0 and impacts.ahead[m] > 0.0:
-            w = rate_along(relative_path(state, a, b), impacts.now)
+            w = slip_of(state, a, b, rate_along(relative_path(state, a, b), impacts.now))
             w = add(w, sub(impacts.gained[owner_of(state, b)], impacts.gained[owner_of(state, a)]))
             arms = normal, normal
             if state.spinning:

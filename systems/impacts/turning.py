@@ -72,7 +72,8 @@ def impulses_of(masses, speeds, e, mu):
 def respond_at_arms(state, sides, touch, motion, e, mu):
     """(change of the speed of b as a sees it, along the normal; change of its velocity along the surface) by an impact.
 
-    motion: (velocity of b's body as that of a sees it, speed of the point along the normal).
+    motion: (velocity of b's body as that of a sees it, with what runs of their surfaces; speed of the point along the
+    normal).
     """
     bodies, (a, b), (_, normal, point, apart) = state.bodies, sides, touch
     velocity, speed = motion

@@ -87,6 +87,10 @@ CAUSES = {  # what wakes the tower of these boxes
     "not enabled": lambda world, boxes: setattr(part(world, boxes[1], AABBCollider), "enabled", False),
     "not enabled in a column": lambda world, boxes: write(world, boxes[0], "aabb_collider.enabled", lambda _: False),
     "floor not enabled": lambda world, boxes: setattr(part(world, ground(world), AABBCollider), "enabled", False),
+    "floor runs": lambda world, boxes: setattr(part(world, ground(world), AABBCollider), "surface_velocity", 1.0),
+    "floor runs in a column": lambda world, boxes: write(
+        world, ground(world), "aabb_collider.surface_velocity", lambda _: (1.0, 0.0)
+    ),
     "lighter": lambda world, boxes: setattr(part(world, boxes[1], RigidBody), "gravity_scale", 0.5),
     "gravity": lambda world, boxes: setattr(world, "gravity", (0.0, -5.0)),
     "settings": lambda world, boxes: setattr(world, "settings", world.settings.replace(dt=1 / 120)),
@@ -104,5 +108,5 @@ CAUSES = {  # what wakes the tower of these boxes
 }
 EVERYWHERE = {
     "gravity", "settings", "floor deleted", "floor moved", "floor in a column", "floor without collider",
-    "floor not enabled",
+    "floor not enabled", "floor runs", "floor runs in a column",
 }  # fmt: skip

@@ -11,6 +11,7 @@ import math
 
 from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, dot, scale, sub
+from ...forces.stages import is_zero
 from ...integration.turning import cross_spin, momentum_of_spin
 from ...joints.custom import rates_of_custom
 from ...joints.records import CUSTOM, POINT, TURN
@@ -79,24 +80,30 @@ def close_solved(solver, arms):
 
 @part
 def list_driven(solver, span):
-    """The rows of a range to which what moves by itself may give energy."""
+    """The rows of a range to which what moves by itself may give energy, or a surface that runs."""
     island, count = solver.island, 0
-    for k in range(span[0], span[1] if solver.movers > 0 else span[0]):
+    for k in range(span[0], span[1] if solver.movers > 0 or solver.surfaces_run else span[0]):
         solver.driven_row[count] = k
-        count += min(island[solver.first[k]], island[solver.second[k]]) < 0
+        runs = solver.surfaces_run and not is_zero(solver.surface_slip[k])
+        count += runs or min(island[solver.first[k]], island[solver.second[k]]) < 0
     solver.driven_rows = count
 
 
 @part
 def work_of_mover(solver, k, arms):
-    """The work of a row of ``driven_row`` on what moves by itself, J; what that gives to the island is minus this."""
+    """The work of a row of ``driven_row`` on what moves by itself, or drives a surface, J; what that gives to the
+    island is minus this."""
     a, b = solver.first[k], solver.second[k]
-    push = scale(solver.normal[k], solver.impulse[k])
+    push, work = scale(solver.normal[k], solver.impulse[k]), 0.0
     if solver.has_friction:
         push = add(push, solver.tangent[k])
-    if solver.island[a] >= 0:
-        return dot(push, velocity_at(solver, b, solver.arm_b, k, arms))
-    return -dot(push, velocity_at(solver, a, solver.arm_a, k, arms))
+    if solver.island[b] < 0:
+        work = dot(push, velocity_at(solver, b, solver.arm_b, k, arms))
+    elif solver.island[a] < 0:
+        work = -dot(push, velocity_at(solver, a, solver.arm_a, k, arms))
+    if solver.surfaces_run:
+        work += dot(solver.tangent[k], solver.surface_slip[k])
+    return work
 
 
 @part

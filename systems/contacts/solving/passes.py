@@ -18,7 +18,8 @@ def solve_pass(solver, bias, pushes, over, span):
     """One pass over the rows of a range, normals and friction. over: see FRICTION_OVERRELAXATION."""
     if len(span[4]) > 0 and solver.has_rolling:
         solve_rolling(solver, span)
-    if len(span[4]) > 0 and (solver.end_chunk - solver.first_chunk) * FEW_ROWS < span[1] - span[0]:
+    chunked = (solver.end_chunk - solver.first_chunk) * FEW_ROWS < span[1] - span[0] and not solver.surfaces_run
+    if len(span[4]) > 0 and chunked:
         solve_chunks(solver, bias, pushes, span)
     else:
         solve_normals(solver, bias, pushes, span)

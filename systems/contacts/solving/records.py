@@ -63,6 +63,9 @@ SOLVER = Schema(
     tangent_mass=floats(unit="kg"),  # that an impulse along the surface moves
     rolling=floats(unit="m"),  # of rolling friction
     rolled=vectors(unit="N m s"),  # in a substep, by that
+    # where surfaces run:
+    surfaces_run=flag(),
+    surface_slip=vectors(unit="m/s"),  # of the second body's surface, as the first one's sees it
     # of the bodies of each pair while its chunk is solved, where the row of its first point is:
     mass_a=floats(unit="1/kg"),  # inverse masses,
     mass_b=floats(unit="1/kg"),

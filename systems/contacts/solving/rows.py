@@ -194,7 +194,7 @@ def solve_normals(solver, bias, pushes, span):
 
     bias: speed at which each row may close, below 0 at which it is to open; softly where this pass ``pushes``.
     """
-    impulse, soft = solver.impulse, solver.soft
+    impulse, soft, runs = solver.impulse, solver.soft, solver.surfaces_run
     start, stop, _, _, arms = span
     for k in range(start, stop):
         old = impulse[k]
@@ -205,14 +205,16 @@ def solve_normals(solver, bias, pushes, span):
         apply_impulse(solver, k, scale(solver.normal[k], new - old), arms)
         impulse[k] = new
         if len(arms) > 0 and solver.friction[k] != 0.0:
-            solve_friction_of(solver, k, 1.0, arms)
+            solve_friction_of(solver, k, 1.0, arms, runs)
 
 
 @inlined
-def solve_friction_of(solver, k, over, arms):
+def solve_friction_of(solver, k, over, arms, runs):
     """Stop what slides at row k, with at most ``friction`` times the normal impulse (Coulomb). over: times the impulse
-    that stops it; see FRICTION_OVERRELAXATION."""
+    that stops it; see FRICTION_OVERRELAXATION. runs: whether some surface does."""
     n, old, w = solver.normal[k], solver.tangent[k], relative_velocity(solver, k, arms)
+    if runs:
+        w = add(w, solver.surface_slip[k])
     mass = over * (solver.tangent_mass[k] if len(arms) > 0 else solver.mass[k])
     limit = solver.friction[k] * solver.impulse[k]
     if len(n) == 2:  # a number along the one direction there is
@@ -231,9 +233,10 @@ def solve_friction_of(solver, k, over, arms):
 def solve_friction(solver, over, span):
     """One pass along their surfaces, where nothing spins."""
     start, stop, _, _, arms = span
+    runs = solver.surfaces_run
     for k in range(start, stop):
         if solver.friction[k] != 0.0:
-            solve_friction_of(solver, k, over, arms)
+            solve_friction_of(solver, k, over, arms, runs)
 
 
 @inlined
@@ -274,5 +277,5 @@ def relax_listed(solver, count, arms):
         apply_impulse(solver, k, scale(solver.normal[k], new - old), arms)
         solver.impulse[k] = new
         if solver.friction[k] != 0.0:
-            solve_friction_of(solver, k, 1.0, arms)
+            solve_friction_of(solver, k, 1.0, arms, solver.surfaces_run)
     solver.visits += count
