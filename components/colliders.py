@@ -9,7 +9,7 @@ import numpy as np
 
 from ..framework.data.columns import REQUIRED, Column, special_column
 from ..framework.data.component import Component
-from ..framework.typing import Vector, VectorField
+from ..framework.typing import LayerField, Layers, Vector, VectorField
 from ..framework.vectors import item, replace, scale
 
 ALL_LAYERS = -1  # every bit set
@@ -27,8 +27,8 @@ class MaterialFields(TypedDict, total=False):
     friction: float | None
     sensor: bool
     enabled: bool
-    layer: int
-    mask: int
+    layer: Layers
+    mask: Layers
     group: int
     one_way: Vector | float
     surface_velocity: Vector | float
@@ -54,7 +54,7 @@ class Collider(Component, abstract=True):
     enabled
         False: it meets nothing, and no query finds it
     layer, mask
-        two colliders meet if each one's layer has a bit in the other's mask
+        two colliders meet if each one's layer has a bit in the other's mask; bits, or names that the world has
     group
         colliders of the same group, a whole number other than 0, never meet
     one_way
@@ -86,12 +86,12 @@ class Collider(Component, abstract=True):
     )
     sensor: bool = special_column(default=False, dtype=bool, kw_only=True, on_demand=True, also=("trigger",))
     enabled: bool = special_column(default=True, dtype=bool, kw_only=True, on_demand=True, also=("active",))
-    layer: int = special_column(
+    layer: LayerField = special_column(
         default=1, dtype=int, kw_only=True, on_demand=True, also=("category",),
-        nonzero="in no layer it meets nothing; mask=0 says so", cure=BITS,
+        nonzero="in no layer it meets nothing; mask=0 says so", cure=BITS, layers=True,
     )  # fmt: skip
-    mask: int = special_column(
-        default=ALL_LAYERS, dtype=int, kw_only=True, on_demand=True, also=("collides_with",), cure=BITS
+    mask: LayerField = special_column(
+        default=ALL_LAYERS, dtype=int, kw_only=True, on_demand=True, also=("collides_with",), cure=BITS, layers=True
     )
     group: int = special_column(
         default=0, dtype=int, kw_only=True, on_demand=True, also=("group_index", "collision_group")

@@ -13,8 +13,9 @@ Integers: TypeAlias = NDArray[np.int64]
 Vector: TypeAlias = Sequence[float] | NDArray[Any]  # d numbers, in whatever holds them
 Vectors: TypeAlias = Sequence[Vector] | NDArray[Any]  # m of them
 Numbers: TypeAlias = float | Sequence[float] | NDArray[Any]  # m numbers, or one for all
+Layers: TypeAlias = int | str | tuple[int | str, ...] | set[int | str] | frozenset[int | str]  # bits, or names of them
 Entities: TypeAlias = Sequence[int] | NDArray[np.integer[Any]]
-Masks: TypeAlias = int | Sequence[int] | NDArray[np.integer[Any]]  # bits of layers, m of them or one for all
+Masks: TypeAlias = Layers | Sequence[Layers] | NDArray[np.integer[Any]]  # m of them or one for all
 Excludes: TypeAlias = int | Entities | Sequence[Entities] | None  # for all queries, one for each, several for each
 
 if TYPE_CHECKING:
@@ -40,6 +41,13 @@ if TYPE_CHECKING:
 
         def __set__(self, component: object, value: Sequence[Vector] | Vector) -> None: ...
 
+    class LayerField:
+        """Takes bits of layers, or names of ``World(layers=...)``, one or several; gives bits."""
+
+        def __get__(self, component: object, owner: type[Any] | None = None) -> int: ...
+
+        def __set__(self, component: object, value: Layers) -> None: ...
+
     class BodiesColumn:
         """A column of the bodies: an array (n, ...); what is assigned is written into it."""
 
@@ -48,9 +56,9 @@ if TYPE_CHECKING:
         def __set__(self, bodies: object, value: Numbers | Vectors) -> None: ...
 
 else:
-    VectorField = RotationField = ArrayField = BodiesColumn = Any
+    VectorField = RotationField = ArrayField = LayerField = BodiesColumn = Any
 
 __all__ = [
-    "Array", "ArrayField", "BodiesColumn", "Entities", "Excludes", "Integers", "Masks", "Numbers", "RotationField",
-    "Vector", "VectorField", "Vectors",
+    "Array", "ArrayField", "BodiesColumn", "Entities", "Excludes", "Integers", "LayerField", "Layers", "Masks",
+    "Numbers", "RotationField", "Vector", "VectorField", "Vectors",
 ]  # fmt: skip

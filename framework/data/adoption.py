@@ -272,6 +272,8 @@ class Adoption:
                 self._check_owner(component, handle, entity)
             if handle._version != fits:
                 handle.check_dimensions(dimensions, entity)
+            if component._layers:
+                handle.take_bits(handle.bits_by_name(table.layer_names, entity))
         if changes.several:
             self._check_together(changes.several)
         for arrival, ids in changes.arrivals:

@@ -13,6 +13,7 @@ from .columns import Column
 from .component import Component
 from .driven import drive
 from .interpolation import interpolated
+from .layers import resolved_rows
 from .table import DYNAMIC, KINDS, KINEMATIC, STATIC, Table
 
 
@@ -153,7 +154,7 @@ class Bodies:
         if name in Bodies.__slots__:
             object.__setattr__(self, name, value)
         else:  # also what ``bodies.force += f`` ends with
-            _write(getattr(self, name), value, name)
+            _write(getattr(self, name), _bits(self._table, name, value), name)
 
     def column_names(self) -> list[str]:
         """The names of all columns there are, sorted."""
@@ -189,7 +190,8 @@ class Fields:
         return getattr(self._bodies, self._prefix + name)
 
     def __setattr__(self, name: str, value: Any) -> None:
-        _write(getattr(self, name), value, self._prefix + name)
+        key = self._prefix + name
+        _write(getattr(self, name), _bits(self._bodies._table, key, value), key)
 
 
 class SelectedBodies:
@@ -249,6 +251,12 @@ def _no_column(name: str, known: list[str]) -> AttributeError:
         f"bodies have no column {name!r}{did_you_mean(name, known)}; they have {', '.join(known)}; those of a "
         f"component that no body has had yet are there after world.register(...) with its class"
     )
+
+
+def _bits(table: Table, key: str, value: Any) -> Any:
+    """Bits for layers that are given by name."""
+    column = table.on_demand.get(key)
+    return value if column is None or not column.layers else resolved_rows(value, table.layer_names, f"bodies.{key}")
 
 
 def _write(view: Any, value: Any, name: str) -> None:

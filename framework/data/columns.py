@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..units import warn_of_degrees
+from .layers import Unresolved, is_named, resolved, unresolved
 
 LARGEST = float(np.finfo(float).max)
 SMALLEST_WITH_INVERSE = 1 / LARGEST  # 5.6e-309, a denormal
@@ -38,6 +39,7 @@ class Column:
     minimum: float | None = None
     nonzero: str = ""  # why 0 is refused
     cure: str = ""  # what is said of several numbers in place of one
+    layers: bool = False  # bits of layers, also by their names in a world
     largest: float = LARGEST  # magnitude
     optional: bool = False  # None is allowed and stored as nan
     choices: tuple[str, ...] = ()  # stored as the index into it
@@ -126,6 +128,9 @@ class Column:
         usual = self._usual(value)
         if usual is not None:
             return usual
+        if self.layers and is_named(value):
+            named = unresolved(value)
+            return named if type(named) is Unresolved else self.checked(named, entity)
         array = self._as_numbers(value, entity)
         if array.ndim > (0 if self.item == "scalar" else 1):
             kind = "number or vector" if self.item == "angular" else self.item
@@ -262,11 +267,10 @@ class Column:
             raise self._error(value if shown is None else shown, rule, entity) from None
 
     def _error(self, value: Any, rule: str, entity: int | None) -> ValueError:
-        prefix = "" if entity is None else f"entity {entity}: "
         shown = value.tolist() if isinstance(value, np.ndarray) else value
         text = shown if isinstance(shown, str) and shown.startswith(("a ", "an array")) else repr(shown)
         text = text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
-        return ValueError(f"{prefix}{self.owner}.{self.name} {rule}, got {text}")
+        return ValueError(f"{self.title(entity)} {rule}, got {text}")
 
     # -- descriptor -------------------------------------------------------------------------------
 
@@ -280,7 +284,7 @@ class Column:
                 value = self.stored_default
             if type(value) is float and handle._version < -1 and self.item_shape(-handle._version):
                 value = handle._values[self.name] = self.whole(value, -handle._version)
-            return self.shown(value)
+            return value.given if type(value) is Unresolved else self.shown(value)
         row = handle._row if handle._version == store.version else handle._locate()
         array = store.arrays.get(self.key)
         if array is None:
@@ -304,12 +308,18 @@ class Column:
             handle._version = -1
             return
         self.check_dimensions(value, store.dimensions, handle._entity)
+        if type(value) is Unresolved:
+            value = resolved(value, store.layer_names, self.title(handle._entity))
         row = handle._row if handle._version == store.version else handle._locate()
         if store.on_written is not None:
             store.on_written(row, self.key, value)
         array = store.arrays.get(self.key)
         (store.make(self.key) if array is None else array)[row] = value
         store.written(self, row)
+
+    def title(self, entity: int | None) -> str:
+        """What messages call the field."""
+        return f"{'' if entity is None else f'entity {entity}: '}{self.owner}.{self.name}"
 
     def value_of(self, handle: Any) -> Any:
         """The value of a ``handle`` for reading only: a column on demand stays without memory."""
@@ -403,6 +413,7 @@ def special_column(
     largest: float = LARGEST,
     nonzero: str = "",
     cure: str = "",
+    layers: bool = False,
     also: tuple[str, ...] = (),
     **options: Any,
 ) -> Any:
@@ -410,5 +421,5 @@ def special_column(
     return replace(
         column(default, kw_only=kw_only, **options),
         constructor=init, on_demand=on_demand, on_write=on_write, largest=largest, nonzero=nonzero,
-        cure=cure, also=also,
+        cure=cure, layers=layers, also=also,
     )  # fmt: skip

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
 
@@ -14,6 +14,7 @@ from ..names import did_you_mean, near_names, snake_case
 from .arrays.column import ArrayColumn, array_column, hold_arrays
 from .columns import LARGEST, REQUIRED, Column, special_column
 from .columns import column as plain_column
+from .layers import LayerNames, Unresolved, resolved, resolved_rows
 
 NOTHING: Mapping[type[Any], Any] = MappingProxyType({})  # beside a component that is given alone
 
@@ -48,6 +49,7 @@ class Component:
     _required: ClassVar[tuple[str, ...]] = ()
     _defaults: ClassVar[dict[str, Any]] = {}  # what a component holds that has been given nothing
     _pooled: ClassVar[tuple[ArrayColumn, ...]] = ()  # columns whose values stand in a pool
+    _layers: ClassVar[tuple[Column, ...]] = ()  # columns of layers, which may have names
 
     def __init_subclass__(cls, *, abstract: bool = False, flat: bool = False, **kwargs: Any) -> None:
         """``abstract`` bases may be derived from; ``flat`` columns carry no prefix in the table."""
@@ -85,6 +87,7 @@ class Component:
         cls._positional = tuple(name for name, field in cls._arguments.items() if not field.kw_only)
         cls._required = tuple(name for name, field in cls._arguments.items() if field.default is REQUIRED)
         cls._pooled = tuple(field for field in fields.values() if isinstance(field, ArrayColumn))
+        cls._layers = tuple(field for field in fields.values() if field.layers)
         cls._defaults = {name: field.stored_default for name, field in fields.items()}  # ValueError for a wrong one
         cls._held = tuple(
             field.name for field in cls._shaped
@@ -204,6 +207,19 @@ class Component:
         if self._store is None:
             self._version = -dimensions  # single numbers become whole vectors when they are read
 
+    def bits_by_name(self, names: LayerNames | None, entity: int | None = None) -> dict[str, int]:
+        """By field the bits of the layers that it has by name, in a world with these names; ValueError for others."""
+        values, found = self._values or {}, {}
+        for field in self._layers:
+            if type(value := values.get(field.name)) is Unresolved:
+                found[field.name] = field.checked(resolved(value, names, field.title(entity)), entity)
+        return found
+
+    def take_bits(self, bits: dict[str, int]) -> None:
+        """Have bits of layers in place of names."""
+        if bits and self._values is not None:
+            self._values.update(bits)
+
     def copy(self) -> Self:
         """An unbound component with the same values, for another entity (prefabs)."""
         other = type(self).__new__(type(self))
@@ -233,9 +249,16 @@ class Component:
         """Pickled with its values, as a component that belongs to no entity."""
         return _unpickled, (type(self), self._read()), getattr(self, "__dict__", None)
 
+    def _shown(self) -> Iterator[tuple[str, Any]]:
+        """The arguments of its constructor as they are printed, layers by their names in its world."""
+        names = getattr(self._store, "layer_names", None)
+        for name, column in self.columns.items():
+            if column.constructor:
+                value = column.value_of(self)
+                yield name, names.names(value) if column.layers and names is not None else value
+
     def __repr__(self) -> str:
-        shown = ((n, c.value_of(self)) for n, c in self.columns.items() if c.constructor)
-        fields = ", ".join(f"{n}={v.tolist() if isinstance(v, np.ndarray) else v!r}" for n, v in shown)
+        fields = ", ".join(f"{n}={v.tolist() if isinstance(v, np.ndarray) else v!r}" for n, v in self._shown())
         return f"{type(self).__name__}({fields})"
 
     @classmethod
@@ -263,26 +286,30 @@ class Many:
         self.values = values
         self.like = like
 
-    def store(self, count: int, dimensions: int) -> RowStore:
+    def store(self, count: int, dimensions: int, names: LayerNames | None = None) -> RowStore:
         """Checked columns of ``count`` rows, or one value for all; ValueError names field and row."""
         arrays, constants = {}, {}
+        like = {} if self.like is None else {**(self.like._values or {}), **self.like.bits_by_name(names)}
         for name, column in self.component.columns.items():
             if name not in self.values:
-                stored = None if self.like is None else (self.like._values or {}).get(name)
-                constants[column.key] = column, column.of_all(stored, dimensions)
+                constants[column.key] = column, column.of_all(like.get(name), dimensions)
                 continue
-            array = column.checked_many(self.values[name], count, dimensions)
+            values = self.values[name]
+            if column.layers:
+                values = resolved_rows(values, names, column.title(None))
+            array = column.checked_many(values, count, dimensions)
             if count > 1 and array.strides[0] == 0:  # one value for all
                 constants[column.key] = column, array[0].copy() if array.ndim > 1 else array[0].item()
             else:
                 arrays[column.key] = np.require(array, requirements=("C", "W"))
         store = RowStore(arrays, dimensions, constants, count)
+        store.layer_names = names
         hold_arrays(store, self.component._pooled)
         return store
 
-    def arrays(self, count: int, dimensions: int) -> dict[str, np.ndarray]:
+    def arrays(self, count: int, dimensions: int, names: LayerNames | None = None) -> dict[str, np.ndarray]:
         """The same, all of it as arrays (count, ...)."""
-        store = self.store(count, dimensions)
+        store = self.store(count, dimensions, names)
         return {column.key: store.make(column.key) for column in self.component.columns.values()}
 
 
@@ -294,6 +321,7 @@ class RowStore:
 
     version = 0
     on_written = None
+    layer_names: LayerNames | None = None  # of the world
 
     def __init__(
         self, arrays: dict[str, np.ndarray], dimensions: int, constants: dict[str, tuple[Column, Any]], count: int

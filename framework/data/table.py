@@ -228,6 +228,7 @@ class Table(TableColumns):
         made = {key: self.arrays[key][rows] for key in columns if key in self.arrays}
         constants = {key: (column, self._fills[key]) for key, column in columns.items() if key not in made}
         store = RowStore(made, self.dimensions, constants, len(rows))
+        store.layer_names = self.layer_names
         hold_arrays(store, component._pooled)
         return store
 

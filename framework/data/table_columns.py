@@ -10,6 +10,7 @@ import numpy as np
 from .arrays.column import hold_arrays
 from .columns import Column
 from .component import Component
+from .layers import LayerNames
 
 # Attributes of Bodies:
 RESERVED = (
@@ -27,6 +28,7 @@ class TableColumns:
 
     def __init__(self, dimensions: int) -> None:
         self.dimensions = dimensions
+        self.layer_names: LayerNames | None = None
         self.count = 0
         self.capacity = 64
         self.arrays: dict[str, np.ndarray] = {}  # those there are

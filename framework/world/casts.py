@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..data.component import Component, Many
+from ..data.layers import LayerNames, resolved, resolved_rows
 from ..plugins.registry import Registry
-from ..typing import Entities, Excludes, Masks, Numbers, Vector, Vectors
+from ..typing import Entities, Excludes, Layers, Masks, Numbers, Vector, Vectors
 from . import query_arguments as check
 from .hits import CastHit, CastHits
 from .services import PhysicsServices
@@ -20,6 +21,7 @@ class CastVerbs:
     """``world.ray_cast`` and its kin, which look at the bodies where they stand now."""
 
     registry: Registry
+    _layer_names: LayerNames | None
     _synchronized: Callable[[], PhysicsServices]  # up to date with what was created and deleted
 
     def ray_cast(
@@ -27,7 +29,7 @@ class CastVerbs:
         origin: Vector,
         direction: Vector,
         max_distance: float = math.inf,
-        mask: int = -1,
+        mask: Layers = -1,
         *,
         exclude: int | Entities | None = None,
         only_nearest: bool = False,
@@ -45,7 +47,7 @@ class CastVerbs:
         if not any(way):
             raise ValueError(f"ray_cast: direction must not be zero, got {direction!r}")
         limit = np.array((check.distance(max_distance, "ray_cast: max_distance", endless=True),))
-        wanted = check.wanted_of_one("ray_cast", mask, exclude)
+        wanted = self._wanted_of_one("ray_cast", mask, exclude)
         hits = services.queries.rays(np.array((start,)), np.array((way,)), limit, wanted, only_nearest)
         return _listed(hits)
 
@@ -71,7 +73,7 @@ class CastVerbs:
         if zero.any():
             raise ValueError(f"ray_casts: directions must not be zero, as row {int(np.argmax(zero))} is")
         limits = check.distances(max_distances, "ray_casts: max_distances", len(starts), endless=True)
-        wanted = check.wanted("ray_casts", len(starts), masks, excludes)
+        wanted = self._wanted("ray_casts", len(starts), masks, excludes)
         return services.queries.rays(starts, ways, limits, wanted, True)
 
     def shape_cast(
@@ -79,7 +81,7 @@ class CastVerbs:
         shape: Component,
         position: Vector,
         displacement: Vector,
-        mask: int = -1,
+        mask: Layers = -1,
         *,
         exclude: int | Entities | None = None,
         only_nearest: bool = False,
@@ -99,7 +101,7 @@ class CastVerbs:
         columns, layers = self._asked(shape, "shape_cast", services.dimensions)
         start = check.point(position, "shape_cast: position", services.dimensions)
         way = check.point(displacement, "shape_cast: displacement", services.dimensions)
-        wanted = check.met_by(layers, check.wanted_of_one("shape_cast", mask, exclude))
+        wanted = check.met_by(layers, self._wanted_of_one("shape_cast", mask, exclude))
         opposing = check.flag(against, "shape_cast: against")
         hits = services.queries.shapes(
             type(shape), columns, np.array((start,)), np.array((way,)), wanted, only_nearest, opposing
@@ -126,7 +128,7 @@ class CastVerbs:
         starts = check.points(positions, "shape_casts: positions", services.dimensions)
         ways = check.points(displacements, "shape_casts: displacements", services.dimensions, len(starts))
         columns, layers = self._asked(shapes, "shape_casts", services.dimensions, len(starts))
-        wanted = check.met_by(layers, check.wanted("shape_casts", len(starts), masks, excludes))
+        wanted = check.met_by(layers, self._wanted("shape_casts", len(starts), masks, excludes))
         component = shapes.component if isinstance(shapes, Many) else type(shapes)
         opposing = check.flag(against, "shape_casts: against")
         return services.queries.shapes(component, columns, starts, ways, wanted, True, opposing)
@@ -144,7 +146,7 @@ class CastVerbs:
         names = (*registered.columns, "offset")
         count = 1 if many is None else many
         if isinstance(shape, Many):
-            arrays = shape.arrays(count, dimensions)
+            arrays = shape.arrays(count, dimensions, self._layer_names)
             layer, mask, group = (arrays[component.columns[name].key] for name in ("layer", "mask", "group"))
             return {name: arrays[component.columns[name].key] for name in names}, (layer, mask, group)
         shape.check_dimensions(dimensions)
@@ -154,7 +156,20 @@ class CastVerbs:
             value = np.asarray(field.unshared(getattr(shape, name)), field.dtype)
             made[name] = np.empty((count, *field.item_shape(dimensions)), field.dtype)
             made[name][:] = value
-        return made, (shape.layer, shape.mask, shape.group)
+        names_of = self._layer_names
+        layer, mask = (resolved(getattr(shape, each), names_of, f"{verb}: {each}") for each in ("layer", "mask"))
+        return made, (layer, mask, shape.group)
+
+    def _mask(self, value: Any, name: str) -> int:
+        """Bits of layers, which may be given by name."""
+        return check.mask(resolved(value, self._layer_names, name), name)
+
+    def _wanted_of_one(self, verb: str, mask: Any, exclude: Any, one_way: Any = False) -> check.Wanted:
+        return check.wanted_of_one(verb, resolved(mask, self._layer_names, f"{verb}: mask"), exclude, one_way)
+
+    def _wanted(self, verb: str, count: int, masks: Any, excludes: Any = None, one_way: Any = False) -> check.Wanted:
+        rows = resolved_rows(masks, self._layer_names, f"{verb}: masks")
+        return check.wanted(verb, count, rows, excludes, one_way)
 
 
 def _listed(hits: CastHits) -> list[CastHit]:

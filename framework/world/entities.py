@@ -12,6 +12,7 @@ import numpy as np
 
 from ..data import esper_bridge
 from ..data.component import Component, Many
+from ..data.layers import LayerNames
 from ..errors import NoPhysicsError
 from ..plugins.registry import Registry
 from .services import PhysicsServices
@@ -26,6 +27,7 @@ class EntityVerbs:
     _contents: Callable[[], esper_bridge.Contents]  # what is in it, to read without making it the current one
     physics: PhysicsServices | None
     registry: Registry
+    _layer_names: LayerNames | None
 
     @property
     def dimensions(self) -> int | None:
@@ -70,7 +72,8 @@ class EntityVerbs:
             for other, values in one.component.brings.items():
                 if other not in types:
                     many = *many, other.many(**values(dimensions))
-        return self._contents().create_many({one.component: one.store(count, dimensions) for one in many}, count)
+        stores = {one.component: one.store(count, dimensions, self._layer_names) for one in many}
+        return self._contents().create_many(stores, count)
 
     def delete_entity(self, entity: int, immediate: bool = False) -> None:
         """Delete at the start of the next step, or at once if ``immediate``; KeyError if there is no such entity."""
@@ -199,3 +202,6 @@ class EntityVerbs:
                 raise TypeError(f"components are instances: {component.__name__}(...), got the class itself")
             elif isinstance(component, (list, tuple, Many)):
                 raise TypeError(f"components are given one by one, got {component!r}")
+        named = [c for c in components if isinstance(c, Component) and c._layers]
+        for component, bits in [(c, c.bits_by_name(self._layer_names, entity)) for c in named]:
+            component.take_bits(bits)  # all are known

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ..data.component import Component, Many
-from ..typing import Entities, Excludes, Masks, Numbers, Vector, Vectors
+from ..typing import Entities, Excludes, Layers, Masks, Numbers, Vector, Vectors
 from . import query_arguments as check
 from .casts import CastVerbs
 from .hits import Hits, NearestHit, NearestHits, Neighbours, OverlapHit, OverlapHits
@@ -20,16 +20,16 @@ class QueryVerbs(CastVerbs):
     point, a box or a sphere leaves out colliders that are solid from one side only, unless ``one_way`` is True.
     """
 
-    def query_point(self, point: Vector, mask: int = -1, *, one_way: bool = False) -> list[int]:
+    def query_point(self, point: Vector, mask: Layers = -1, *, one_way: bool = False) -> list[int]:
         """Entities whose collider contains the ``point``, (d,) m, by id.
 
         one_way: also what is solid from one side only.
         """
         services = self._synchronized()
         centre = check.point(point, "query_point: point", services.dimensions)
-        return services.queries.sphere(centre, 0.0, check.mask(mask, "query_point: mask"), one_way)
+        return services.queries.sphere(centre, 0.0, self._mask(mask, "query_point: mask"), one_way)
 
-    def query_aabb(self, lower: Vector, upper: Vector, mask: int = -1, *, one_way: bool = False) -> list[int]:
+    def query_aabb(self, lower: Vector, upper: Vector, mask: Layers = -1, *, one_way: bool = False) -> list[int]:
         """Entities whose collider touches the box from ``lower`` to ``upper``, (d,) m, by id.
 
         one_way: also what is solid from one side only. ValueError if a lower bound exceeds the upper one.
@@ -39,9 +39,9 @@ class QueryVerbs(CastVerbs):
         high = check.point(upper, "query_aabb: upper", services.dimensions)
         if any(a > b for a, b in zip(low, high, strict=True)):
             raise ValueError(f"query_aabb: lower {list(low)} exceeds upper {list(high)}")
-        return services.queries.box(low, high, check.mask(mask, "query_aabb: mask"), one_way)
+        return services.queries.box(low, high, self._mask(mask, "query_aabb: mask"), one_way)
 
-    def query_sphere(self, centre: Vector, radius: float, mask: int = -1, *, one_way: bool = False) -> list[int]:
+    def query_sphere(self, centre: Vector, radius: float, mask: Layers = -1, *, one_way: bool = False) -> list[int]:
         """Entities whose collider touches the sphere of ``radius`` m around ``centre``, (d,) m, by id.
 
         one_way: also what is solid from one side only.
@@ -49,7 +49,7 @@ class QueryVerbs(CastVerbs):
         services = self._synchronized()
         place = check.point(centre, "query_sphere: centre", services.dimensions)
         size = check.distance(radius, "query_sphere: radius")
-        return services.queries.sphere(place, size, check.mask(mask, "query_sphere: mask"), one_way)
+        return services.queries.sphere(place, size, self._mask(mask, "query_sphere: mask"), one_way)
 
     def query_spheres(self, centres: Vectors, radii: Numbers, masks: Masks = -1, *, one_way: bool = False) -> Hits:
         """For each of m spheres (centres (m, d); radii, masks: one or (m,)) the ids of what it touches, ascending.
@@ -59,7 +59,7 @@ class QueryVerbs(CastVerbs):
         services = self._synchronized()
         places = check.points(centres, "query_spheres: centres", services.dimensions)
         sizes = check.distances(radii, "query_spheres: radii", len(places))
-        wanted = check.wanted("query_spheres", len(places), masks, one_way=one_way)
+        wanted = self._wanted("query_spheres", len(places), masks, one_way=one_way)
         return services.queries.spheres(places, sizes, wanted)
 
     def query_aabbs(self, lower: Vectors, upper: Vectors, masks: Masks = -1, *, one_way: bool = False) -> Hits:
@@ -74,10 +74,10 @@ class QueryVerbs(CastVerbs):
         if (low > high).any():
             row = int(np.argmax((low > high).any(axis=1)))
             raise ValueError(f"query_aabbs: lower {low[row].tolist()} exceeds upper {high[row].tolist()} in row {row}")
-        return services.queries.boxes(low, high, check.wanted("query_aabbs", len(low), masks, one_way=one_way))
+        return services.queries.boxes(low, high, self._wanted("query_aabbs", len(low), masks, one_way=one_way))
 
     def overlaps(
-        self, shape: Component, position: Vector, mask: int = -1, *, exclude: int | Entities | None = None,
+        self, shape: Component, position: Vector, mask: Layers = -1, *, exclude: int | Entities | None = None,
         one_way: bool = False,
     ) -> list[OverlapHit]:  # fmt: skip
         """All that a collider touches at a place, the deepest first, ties by id: how deep, where, and the way out.
@@ -88,7 +88,7 @@ class QueryVerbs(CastVerbs):
         services = self._synchronized()
         columns, layers = self._asked(shape, "overlaps", services.dimensions)
         place = check.point(position, "overlaps: position", services.dimensions)
-        wanted = check.met_by(layers, check.wanted_of_one("overlaps", mask, exclude, one_way))
+        wanted = check.met_by(layers, self._wanted_of_one("overlaps", mask, exclude, one_way))
         hits = services.queries.overlaps(type(shape), columns, np.array((place,)), wanted)
         found = zip(hits.entities.tolist(), hits.depths.tolist(), hits.points, hits.normals, strict=True)
         return [OverlapHit(*hit) for hit in found]
@@ -110,12 +110,12 @@ class QueryVerbs(CastVerbs):
         services = self._synchronized()
         places = check.points(positions, "shape_overlaps: positions", services.dimensions)
         columns, layers = self._asked(shapes, "shape_overlaps", services.dimensions, len(places))
-        wanted = check.met_by(layers, check.wanted("shape_overlaps", len(places), masks, excludes, one_way))
+        wanted = check.met_by(layers, self._wanted("shape_overlaps", len(places), masks, excludes, one_way))
         component = shapes.component if isinstance(shapes, Many) else type(shapes)
         return services.queries.overlaps(component, columns, places, wanted)
 
     def query_nearest(
-        self, point: Vector, mask: int = -1, *, max_distance: float = math.inf, exclude: int | Entities | None = None
+        self, point: Vector, mask: Layers = -1, *, max_distance: float = math.inf, exclude: int | Entities | None = None
     ) -> NearestHit | None:
         """The collider whose surface is nearest to ``point``, at most ``max_distance`` m away; None if there is none.
 
@@ -125,7 +125,7 @@ class QueryVerbs(CastVerbs):
         services = self._synchronized()
         place = check.point(point, "query_nearest: point", services.dimensions)
         limit = check.distance(max_distance, "query_nearest: max_distance", endless=True)
-        wanted = check.wanted_of_one("query_nearest", mask, exclude)
+        wanted = self._wanted_of_one("query_nearest", mask, exclude)
         hits = services.queries.nearest(np.array((place,)), np.array((limit,)), wanted)
         if hits.row[0] < 0:
             return None
@@ -146,9 +146,9 @@ class QueryVerbs(CastVerbs):
         services = self._synchronized()
         places = check.points(points, "query_nearests: points", services.dimensions)
         limits = check.distances(max_distances, "query_nearests: max_distances", len(places), endless=True)
-        return services.queries.nearest(places, limits, check.wanted("query_nearests", len(places), masks, excludes))
+        return services.queries.nearest(places, limits, self._wanted("query_nearests", len(places), masks, excludes))
 
-    def neighbours(self, radius: float, mask: int = -1, *, of: Entities | None = None) -> Neighbours:
+    def neighbours(self, radius: float, mask: Layers = -1, *, of: Entities | None = None) -> Neighbours:
         """For every body the others whose position is within ``radius`` m of its own, by id.
 
         Distances are between the positions of the Transforms, so it needs no collider, and whoever is a neighbour has
@@ -164,7 +164,7 @@ class QueryVerbs(CastVerbs):
             if askers.ndim != 1 or (askers.size and askers.dtype.kind not in "iu"):
                 raise ValueError(f"neighbours: of must be entities, a list of their ids, got {of!r}")
             askers = askers.astype(np.int64)
-        return services.queries.neighbours(size, check.mask(mask, "neighbours: mask"), askers)
+        return services.queries.neighbours(size, self._mask(mask, "neighbours: mask"), askers)
 
     def refresh_queries(self) -> None:
         """Make the next query see positions that were written since the last step."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import os
 from collections.abc import Collection, Iterable
 from typing import Any, NoReturn, Self
@@ -59,6 +60,7 @@ class StateVerbs:
         *plugins: Plugin,
         components: Iterable[type[Component]] = (),
         name: str | None = None,
+        layers: type[enum.IntFlag] | None = None,
     ) -> Self:
         """A world that goes on where the one saved at ``path`` was, to the bit.
 
@@ -66,15 +68,15 @@ class StateVerbs:
             all that the saved world had, of the same versions or newer
         components
             your own component classes that it had, but for those of the plugins
-        name
-            as for a new world
+        name, layers
+            as for a new world; a file holds bits of layers, and no names
 
         Add your systems afterwards. CaromError, and no world is made, if the file is damaged, of a newer carom or no
         saved world, or if it needs a plugin, a component class or dimensions that are not given.
         """
         file = saved_files.SavedFile(path)
         file.check_plugins(plugins)
-        world: Any = cls(*plugins, settings=file.settings(), name=name)  # type: ignore[call-arg]
+        world: Any = cls(*plugins, settings=file.settings(), name=name, layers=layers)  # type: ignore[call-arg]
         try:
             physics = world._services
             of_stages = [component for stage in world.registry.stages.values() for component in stage.components]

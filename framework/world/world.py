@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import itertools
 import math
 import numbers
@@ -14,6 +15,7 @@ import esper
 from ..data import esper_bridge
 from ..data.bodies import Bodies, counts_by_kind
 from ..data.component import Component
+from ..data.layers import LayerNames
 from ..errors import CaromError, NoPhysicsError, PluginError
 from ..jit.records.record import Record
 from ..jit.records.schema import Schema
@@ -49,6 +51,9 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
         see :class:`Settings`
     name
         of the esper context, unique by default; ``"default"`` takes over esper's default context
+    layers
+        an ``enum.IntFlag`` class whose members name the layers: ``layer="player"`` and ``mask=("player", "walls")`` are
+        understood then wherever bits of layers are
 
     ValueError if another world has the name, PluginError if two plugins have the same.
 
@@ -63,7 +68,13 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
     physics: PhysicsServices | None
     plugins: tuple[Plugin, ...]
 
-    def __init__(self, *plugins: Plugin, settings: Settings | None = None, name: str | None = None) -> None:
+    def __init__(
+        self,
+        *plugins: Plugin,
+        settings: Settings | None = None,
+        name: str | None = None,
+        layers: type[enum.IntFlag] | None = None,
+    ) -> None:
         if settings is not None and not isinstance(settings, Settings):
             raise TypeError(f"settings must be Settings, got {settings!r}")
         for plugin in plugins:
@@ -79,6 +90,7 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
         self.name = name
         self.closed = False
         self.registry = Registry(declare=self._declare)
+        self._layer_names = None if layers is None else LayerNames(layers)
         self.physics = None
         self.plugins = plugins
         self._settings = settings or Settings()
@@ -219,6 +231,7 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
             raise ValueError("a world takes one Physics")
         self.physics = self._pipeline.physics = physics
         self._declare(self.registry.components, ())
+        physics.table.layer_names = self._layer_names
 
     @property
     def _services(self) -> PhysicsServices:

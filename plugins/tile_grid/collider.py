@@ -145,7 +145,7 @@ class TileGridCollider(Collider):
 
     def __repr__(self) -> str:
         cells = self.cells
-        shared = ", ".join(f"{name}={getattr(self, name)!r}" for name in self.stacked_columns)
+        shared = ", ".join(f"{name}={value!r}" for name, value in self._shown() if name in self.stacked_columns)
         return (
             f"<TileGridCollider of {cells.shape[0]} rows and {cells.shape[1]} columns, {int(cells.sum())} tiles, "
             f"tile_size={self.tile_size!r}, {shared}>"
