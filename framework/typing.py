@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -13,7 +13,7 @@ Integers: TypeAlias = NDArray[np.int64]
 Vector: TypeAlias = Sequence[float] | NDArray[Any]  # d numbers, in whatever holds them
 Vectors: TypeAlias = Sequence[Vector] | NDArray[Any]  # m of them
 Numbers: TypeAlias = float | Sequence[float] | NDArray[Any]  # m numbers, or one for all
-Layers: TypeAlias = int | str | tuple[int | str, ...] | set[int | str] | frozenset[int | str]  # bits, or names of them
+Layers: TypeAlias = int | str | tuple[int | str, ...] | Set[int | str]  # bits, or names that a world gives them
 Entities: TypeAlias = Sequence[int] | NDArray[np.integer[Any]]
 Masks: TypeAlias = Layers | Sequence[Layers] | NDArray[np.integer[Any]]  # m of them or one for all
 Excludes: TypeAlias = int | Entities | Sequence[Entities] | None  # for all queries, one for each, several for each

@@ -64,8 +64,7 @@ class Scene:
         self._excluded = np.empty(0, np.int64)  # rows that are taken out
         self._off = np.empty((0, 0), bool)  # (rows, colliders): which of those that bodies have are not enabled
         self._off_known = True  # whether all that follows from that is up to date
-        # When that was found, and the scene's version.
-        self._enabled, self._enabled_version = np.empty((0, 0), bool), -1
+        self._enabled, self._enabled_version = np.empty((0, 0), bool), -1  # then, and the scene's version
         self.stretches = np.zeros(0, bool)  # bodies whose box is stretched by rotation inside of a cheaper level
         self.rotated = False
         self.structure = self.static_version = -1  # of the table and the registry, when they were followed last

@@ -97,7 +97,7 @@ def colliders() -> list[Component]:
             0.5, restitution=0.9, friction=None, offset=(0.0, 1.0), sensor=False, layer=2, mask=ALL_LAYERS, group=1
         ),
         SphereCollider(radius=np.float64(0.5)),
-        AABBCollider((0.5, 1.0)),
+        AABBCollider((0.5, 1.0), layer="walls", mask=("walls", 4), enabled=False, surface_velocity=(1.0, 0.0)),
         AABBCollider(np.ones(2), offset=0.5),
         AABBCollider.from_bounds((0, 0), (1, 1), restitution=0.5),
         CapsuleCollider(0.5, half_height=1.0, friction=0.3),

@@ -23,13 +23,15 @@ class Unresolved(tuple[Any, ...]):
         return self[0] if len(self) == 1 else tuple(self)
 
 
+def _is_name(value: Any) -> bool:
+    return value.isidentifier() if isinstance(value, str) else isinstance(value, enum.Flag)
+
+
 def is_named(value: Any) -> bool:
     """Whether a value names layers: a text or members of an IntFlag class, one or several."""
-    if isinstance(value, (str, enum.Flag)):
-        return True
-    if not isinstance(value, GROUPS) or not all(isinstance(each, (str, int, enum.Flag)) for each in value):
-        return False
-    return any(isinstance(each, (str, enum.Flag)) for each in value)
+    if not isinstance(value, GROUPS):
+        return _is_name(value)
+    return any(map(_is_name, value)) and all(_is_name(each) or isinstance(each, int) for each in value)
 
 
 def unresolved(value: Any) -> Any:
@@ -81,7 +83,7 @@ class LayerNames:
         found = tuple(name for bit, name in self._single.items() if bits & bit)
         if bits < 0 or not found or functools.reduce(operator.or_, (self._bits[name] for name in found)) != bits:
             return bits
-        return found if len(found) > 1 else found[0]
+        return found if found[1:] else found[0]
 
 
 def resolved(value: Any, names: LayerNames | None, what: str) -> Any:

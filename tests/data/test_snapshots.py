@@ -214,7 +214,8 @@ def test_the_hash_notices_the_smallest_change_of_any_value():
             elif isinstance(value, float):
                 new = np.nextafter(value, np.inf)
             else:
-                new = {"kind": "kinematic", "sensor": True, "ccd": True}.get(name, 0.25 if value is None else value)
+                other = {"kind": "kinematic", "sensor": True, "enabled": False, "ccd": True}
+                new = other.get(name, 0.25 if value is None else value)
                 new = value + 1 if field.dtype is np.int64 else new
             setattr(handle, name, new)
             digest = world.state_hash()
