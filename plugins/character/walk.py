@@ -9,6 +9,7 @@ from ...framework.vectors import add, add_scaled, divided, dot, item, length, ne
 from ...systems.narrow_phase.one_way import is_one_way
 from ...systems.queries.compiled import is_sensor, make_gather, meets, overlap
 from ...systems.shapes.dispatch import half_extents
+from ...systems.shapes.surfaces import along_world, any_surface_runs
 from .casts import (
     across,
     deepest,
@@ -139,13 +140,10 @@ def ride_of(state, character, i, at, floor, up, dt):
             if turns:
                 arm = sub(at, then)
                 ride = add(ride, sub(turned(arm, character.floor_x[i], character.floor_y[i], x, y), arm))
-    return add_scaled(ride, surface_of(state, floor, character.floor_normal[i]), dt)
-
-
-@inlined
-def surface_of(state, j, normal):
-    """The velocity at which the surface of row j runs."""
-    return scale(normal, 0.0)
+    if any_surface_runs(state):
+        surface = state.colliders.surface_velocity[state.bodies.collider_slot[floor], floor]
+        ride = add_scaled(ride, across(along_world(state, floor, surface), character.floor_normal[i]), dt)
+    return ride
 
 
 @inlined

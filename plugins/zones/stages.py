@@ -10,11 +10,11 @@ from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.records.schema import Schema, floats, integer, ints, table, vectors
 from ...framework.vectors import add, add_scaled, item, length, replace, scale, sub
-from ...systems.broad_phase.boxes import rotated_offset
 from ...systems.integration.stages import phi1
 from ...systems.narrow_phase.stages import layers_meet
 from ...systems.parts.rows import owner_of
 from ...systems.shapes.dispatch import evaluate, half_extents, write_rotated
+from ...systems.shapes.surfaces import along_world
 from .components import Field, Water, Wind
 from .displacement import submerged
 
@@ -49,7 +49,7 @@ def follow(state, i):
     if shape >= 0:
         at = state.colliders.offset[state.shapes.slots[shape], i]
         if state.rotated:
-            at = rotated_offset(state, i, at)
+            at = along_world(state, i, at)
             write_rotated(state, shape, i, state.rotated)
         bodies.offset[i] = at
 

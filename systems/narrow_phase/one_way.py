@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add_scaled, dot, length, negative, replace, sub
+from ...framework.vectors import add_scaled, dot, length, negative, sub
 from ..codes import OK
 from ..shapes.dispatch import both_convex
-from ..shapes.poses import row_of_axes
+from ..shapes.surfaces import along_world
 from ..shapes.tolerances import SAME_PLACE
 from .manifolds import centre_offset, centre_offset_at_start, evaluate_pair
 
@@ -34,13 +34,7 @@ def front_of(state, i):
     """The direction of row i's ``one_way`` in the world, of any length; 0 if it is solid from all sides."""
     if not is_one_way(state, i):
         return zero_of(state)
-    way = state.colliders.one_way[state.bodies.collider_slot[i], i]
-    if len(state.bodies.axes) == 0:
-        return way
-    turned = way
-    for k in range(len(way)):
-        turned = replace(turned, k, dot(row_of_axes(state, i, k), way))
-    return turned
+    return along_world(state, i, state.colliders.one_way[state.bodies.collider_slot[i], i])
 
 
 @inlined
