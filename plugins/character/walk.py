@@ -408,26 +408,22 @@ def move_one(state, near, character, ladder, work, i, dt):
         tried = add_scaled(level, up, mean)
         way = scale(add_scaled(level, up, mean), dt)
         at = slide(state, near, character, work, walker, at, way, False, False, left)
-        velocity, wedge, steep = add_scaled(level, up, rising), False, False
+        velocity, steep = add_scaled(level, up, rising), False
         for k in range(first, work.hits):
             hit, rise = work.hit_out[k], dot(work.hit_out[k], up)
-            if rise > -1e-3 and length(across(hit, up)) > 1e-3:
-                steep |= rise > 1e-3
-                for m in range(first, k):
-                    other = work.hit_out[m]
-                    wedge |= dot(across(hit, up), other) < -EXACT and dot(other, up) > -1e-3
+            steep |= rise > 1e-3 and length(across(hit, up)) > 1e-3
             if rise < limit or rising <= 0.0:
                 velocity = add_scaled(velocity, hit, 0.0 - min(0.0, dot(velocity, hit)))
         level, rising = across(velocity, up), dot(velocity, up)
         if not jumped and (rising <= EXACT or work.hits > first):
             j, gap, found_out, _ = floor_below(state, near, character, work, walker, at, 2.0 * skin)
-            stayed = abs(dot(sub(at, begin), up)) < 1e-3 * abs(2.0 * mean) * dt + 1e-6
+            stayed = length(sub(at, begin)) < 1e-3 * length(way) + 1e-6
             if j >= 0 and dot(velocity, found_out) <= gravity * dt + EXACT:  # no more than falls back in a step
                 at = lowered(state, near, character, work, walker, at, gap)
                 state_now, ground, out = FLOOR, j, found_out
             elif rising > EXACT:
                 state_now = AIR
-            elif wedge and stayed:  # between two slopes that are both too steep
+            elif stayed and work.hits > first + 1:  # wedged, as between two slopes that are both too steep
                 state_now, ground, out = FLOOR, work.hit_row[work.hits - 1], scale(up, 0.0)
             elif steep:
                 state_now = STEEP
