@@ -14,7 +14,7 @@ from ...framework.vectors import add_scaled, dot, length, negative, sub
 from ..codes import OK
 from ..shapes.dispatch import both_convex
 from ..shapes.surfaces import along_world
-from ..shapes.tolerances import SAME_PLACE
+from ..shapes.tolerances import SAME_PLACE, way_of_turning
 from .manifolds import centre_offset, centre_offset_at_start, evaluate_pair
 
 UPRIGHT = 0.5  # cosine of the most that a normal leans from the direction: what leans farther is met from the side
@@ -70,13 +70,15 @@ def normal_ahead(state, a, b, start, end):
 def one_way_holds(state, a, b, start, end, touched):
     """Whether a and b push each other, of which one is one-way or both are; start, end: from the centre of a's shape to
     that of b's; touched: in the step before."""
-    front_a, front_b, extents = front_of(state, a), front_of(state, b), state.bodies.min_extent
+    bodies, holds = state.bodies, True
     depth, normal = normal_ahead(state, a, b, start, end)
-    holds, opposite = True, negative(normal)
+    if state.spinning:  # shapes stand as they are turned at the end
+        depth -= way_of_turning(bodies, a, bodies.turn[a]) + way_of_turning(bodies, b, bodies.turn[b])
     if is_one_way(state, a):
-        holds = (touched or depth <= SLACK * extents[b]) and is_from_front(front_a, normal)
+        holds = (touched or depth <= SLACK * bodies.min_extent[b]) and is_from_front(front_of(state, a), normal)
     if is_one_way(state, b):
-        holds &= (touched or depth <= SLACK * extents[a]) and is_from_front(front_b, opposite)
+        back = negative(normal)
+        holds &= (touched or depth <= SLACK * bodies.min_extent[a]) and is_from_front(front_of(state, b), back)
     return holds
 
 

@@ -15,6 +15,7 @@ from carom.framework import Settings, World
 from carom.plugins import Physics, tile_grid
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.capsule import plugin as capsule
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
 from carom.plugins.tile_grid import TileGridCollider
 
 pytestmark = pytest.mark.slow  # its shapes take long to compile
@@ -445,6 +446,24 @@ def test_twenty_jumps_of_any_height_end_on_it(shape, restitution):
     np.testing.assert_allclose(heights[-1], 0.5, atol=REST)
     if restitution == 0.0:
         assert sorted((contact.entity_a, contact.entity_b) for contact in begun) == [(1, each) for each in jumpers]
+
+
+@pytest.mark.parametrize("mode", ["discrete", "continuous"])
+def test_a_pile_on_it_is_the_same_to_the_bit_as_on_a_floor(mode):
+    """Boxes that tumble: corners that turn into it within a step come from the front."""
+    ends = []
+    for way in ((0, 0, 0), (0, 1, 0)):
+        rng = np.random.default_rng(3)
+        world = World(Physics(3, gravity=(0, -G, 0)), Rotation(), settings=Settings(collision=mode))
+        world.create_entity(Transform((0, 0, 0)), AABBCollider((30, 0.1, 30), one_way=way, friction=0.6))
+        for k in range(12):
+            place = rng.uniform(-1.2, 1.2), 1.0 + 0.8 * k, rng.uniform(-1, 1)
+            world.create_entity(Transform(place), RigidBody(), Spin(rng.uniform(-15, 15, 3)), BoxCollider(0.3))
+        for _ in range(120):
+            world.step()
+        ends.append(world.bodies.dynamic.position.copy())
+    assert ends[0][:, 1].min() > 0.3
+    np.testing.assert_array_equal(*ends)
 
 
 def test_the_example_runs(capsys):
