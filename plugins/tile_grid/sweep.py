@@ -60,10 +60,11 @@ def first_touch(a, b, d, v, support, rounding):
     box = box_on_map(core, radius, at)
     waiting = stack_array(WAITING, (0, 0, 0, 0))
     left, right, lower, upper = min(v[0], 0.0), max(v[0], 0.0), min(v[1], 0.0), max(v[1], 0.0)
-    swept = box[0] + left, box[1] + right, box[2] + lower, box[3] + upper
+    tie = TIE * tile  # as passing_cells has it
+    swept = box[0] + left - tie, box[1] + right + tie, box[2] + lower - tie, box[3] + upper + tie
     touched = cells_under(swept, tile, (columns, rows))[1]
     small = max(touched[2] - touched[0], touched[3] - touched[1]) < BLOCK
-    store_cells(waiting, 0, searched(touched, 1 if small else BLOCK, (columns, rows)))
+    store_cells(waiting, 0, searched(touched, 0 if small else BLOCK, (columns, rows)))
     count, best = 1, math.inf
     while count > 0:
         count -= 1
