@@ -222,23 +222,31 @@ def normal_varies(state, a, b, d, normal):
 
 
 @inlined
-def repeat_row(solver, one, k, surfaces):
+def repeat_row(solver, one, k):
     """What the points of a pair have in common."""
     solver.normal[k], solver.gap[k], solver.apart[k] = solver.normal[one], solver.gap[one], solver.apart[one]
     solver.varies[k], solver.parting[k] = solver.varies[one], solver.parting[one]
     solver.extent[k], solver.friction[k] = solver.extent[one], solver.friction[one]
-    if surfaces:
-        solver.surface_slip[k] = solver.surface_slip[one]
+
+
+@part
+def find_surface_slips(state):
+    """What surfaces that run add to the slip of each row; returns whether any does where there is friction."""
+    pairs, solver, runs = state.pairs, state.solver, False
+    for r in range(solver.contacts):
+        c, k = solver.pair[r], solver.slot[r]
+        solver.surface_slip[k] = slip_of(state, pairs.a[c], pairs.b[c], zero_of(state))
+        runs |= solver.friction[k] != 0.0 and not is_zero(solver.surface_slip[k])
+    return runs
 
 
 def linearise(state, dt):
     """Of each contact at rest the normal and the gap where the step starts, and what the solver needs of its bodies."""
     pairs, bodies, solver, has_friction = state.pairs, state.bodies, state.solver, False
-    surfaces, solver.surfaces_run = any_surface_runs(state), False
     for r in range(solver.contacts):  # in the order of the pairs, for the caches
         c, k = solver.pair[r], solver.slot[r]
         if solver.point[r] > 0:
-            repeat_row(solver, solver.slot[r - 1], k, surfaces)
+            repeat_row(solver, solver.slot[r - 1], k)
             continue
         a, b, parting = pairs.a[c], pairs.b[c], pairs.parting[c]
         extent, d = smaller_extent(bodies, a, b), centre_offset_at_start(bodies, a, b)
@@ -267,10 +275,7 @@ def linearise(state, dt):
         mu = friction_of(state, a, b)
         solver.friction[k] = mu
         has_friction |= mu != 0.0
-        if surfaces:
-            solver.surface_slip[k] = slip_of(state, a, b, zero_of(state))
-            solver.surfaces_run |= mu != 0.0 and not is_zero(solver.surface_slip[k])
-    solver.has_friction = has_friction
+    solver.has_friction, solver.surfaces_run = has_friction, any_surface_runs(state) and find_surface_slips(state)
     solver.has_rolling = False
     for r in range(solver.contacts if state.spinning else 0):
         if solver.point[r] == 0:
