@@ -287,10 +287,13 @@ def contact_of_segment(a, b, d, support, rounding):
     ends = rounded_end and way_after[0] == 0.0 and way_after[1] == 0.0
     if dot(outer_start, outer_end if ends else normal) >= -STRAIGHT:  # else neither side tells
         ahead, beyond = -face.high[0], face.low[0] - size
-        if rounded_start and (dot(way_before, way_before) > 0.0 or dot(along, at_start) < 0.0):
-            ahead = -face_of(b, at_start, outer_start, support).high[0]
-        if ends and dot(along, at_end) > 0.0:
-            beyond = face_of(b, at_end, outer_end, support).low[0]
+        if rounded_start:
+            wall = -face_of(b, at_start, outer_start, support).high[0]
+            is_wall = dot(way_before, way_before) > 0.0 or dot(along, at_start) < 0.0
+            ahead = wall if is_wall else min(ahead, wall)
+        if ends:
+            wall = face_of(b, at_end, outer_end, support).low[0]
+            beyond = wall if dot(along, at_end) > 0.0 else min(beyond, wall)
         ahead, beyond = ahead - room_start, beyond - room_end
         if ahead > zone or beyond > zone:
             gap = face.nearest[1] - round_b
@@ -303,6 +306,11 @@ def contact_of_segment(a, b, d, support, rounding):
     if kind == NONE:
         height = face.nearest[1]
     known, point, centre = (kind, height, normal, False), add_scaled(a.start, along, x), dot(normal, at_start)
+    near = height < round_b + NEAR * size
+    if near and x > size and not rounded_end:  # over what goes up from there, not behind it
+        centre = min(centre, cross(way_after, at_end) / length(way_after))
+    elif near and x < 0.0 and not rounded_start:
+        centre = min(centre, cross(way_before, at_start) / length(way_before))
     if rounded_start:
         known = with_corner(b, at_start, (outer_start, normal, True, False), face, known, support)
         if known[3]:
@@ -310,7 +318,9 @@ def contact_of_segment(a, b, d, support, rounding):
     if rounded_end:
         before = known
         known = with_corner(b, at_end, (outer_end, normal, ends, True), face, before, support)
-        if known[3] and not before[3]:
+        if before[3] and known[1] <= before[1]:  # the other corner parts them more
+            known = before
+        elif known[3]:
             point, centre = a.end, dot(known[2], at_end)
     kind, height, best, _ = known
     if kind == NONE:

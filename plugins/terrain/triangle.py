@@ -123,10 +123,11 @@ def part_above(b, at, normal, edge, nearest, known, support):
 
 
 @part
-def is_between(normal, edge, beside):
-    """Whether a normal is none of the neighbour's at an edge towards which it leans; beside: how far from the edge it
-    stands, inwards, which is nothing to the neighbour."""
-    return beside > 0.0 or dot(normal, edge.outward) <= NEAR or (edge.falls and dot(normal, edge.through) <= NEAR)
+def is_between(normal, spot, edge, near):
+    """Whether a normal at a spot of the triangle is none of the neighbour's at an edge that the spot is on."""
+    if dot(edge.outward, sub(spot, edge.at)) < -near or dot(normal, edge.outward) <= NEAR:
+        return True
+    return edge.falls and dot(normal, edge.through) <= NEAR
 
 
 @plugin.kernel
@@ -155,14 +156,11 @@ def contact_of_triangle(a, b, d, support, rounding):
     two = edge_of(a.b, a.c, a.beyond_bc, normal, 5.0 * zone)
     three = edge_of(a.c, a.a, a.beyond_ca, normal, 5.0 * zone)
     _, depth, straight, place = convex_convex(a, b, d, triangle_support, support, sharp, rounding)
-    between, core = dot(straight, normal) > -NEAR, max(0.5 * round_b, NEAR * size)
-    for k in range(3):
-        edge = one if k == 0 else two if k == 1 else three
-        beside = -dot(edge.outward, sub(place, edge.at)) - BESIDE * zone if depth < core else 0.0  # else it is inside
-        between = between and is_between(straight, edge, beside)
+    spot, near, between = add_scaled(place, straight, 0.5 * depth), NEAR * size, dot(straight, normal) > -NEAR
     kind, height, lowest, far, side, outer = WHOLE, level, nearest, 0.0, normal, normal
     for k in range(3):
         edge = one if k == 0 else two if k == 1 else three
+        between = between and is_between(straight, spot, edge, near)
         known = kind, height, lowest
         kind_now, height, lowest, beyond = part_above(b, sub(d, edge.at), normal, edge, nearest, known, support)
         kind = NONE if kind == NONE else kind_now

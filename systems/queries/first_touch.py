@@ -24,6 +24,7 @@ from .candidates import to_collider
 
 CAST_STEPS = 100  # a graze takes about 30; what still approaches after that counts as touching
 LAST_STEP = 1e-9  # of the way: the most that rounding is made up for
+BEYOND_ROUNDING = 1e-12  # of a distance: more than all rounding
 LONGEST_SPAN = 1e200  # m; on the way past bodies without end
 SPAN_RATIO = 1e6  # the way that a sweep is given may be so many times longer than needed
 MOST_SHIFTS = 8  # off what is left, before the shape counts as wedged in
@@ -66,6 +67,7 @@ def make_first_touch(evaluate_at: Callable[..., Any], sweep_at: Callable[..., An
     def search_touch(state, batch, q, i, path, away, reach):
         """(touches, distance, normal, point) by steps along the path; reach: where to give up."""
         direction, distance, touches, normal, point = path.direction, 0.0, False, away, away
+        before, past = 0.0, math.inf  # where they are apart, and where they are in each other
         for step in range(CAST_STEPS):
             d = add_scaled(away, direction, 0.0 - distance)
             hit, depth, here, point = evaluate_at(state, batch, q, i, d)
@@ -75,6 +77,17 @@ def make_first_touch(evaluate_at: Callable[..., Any], sweep_at: Callable[..., An
             near = abs(depth) <= ROUNDING * length(d)
             touches = hit or (near and (step > 0 or rate > 0.0))
             further = distance - depth / rate if rate != 0.0 else math.inf
+            if hit and depth > BEYOND_ROUNDING * (length(d) + distance) and distance > before:
+                past = distance
+            elif not touches:
+                before = distance
+            if past < math.inf and (not touches or distance == past):
+                further = further if before < further < past else 0.5 * (before + past)
+                if before < further < past:
+                    distance = further
+                    continue
+                distance, touches = past, True
+                break
             if touches or not rate > 0.0:
                 if near and step > 0 and abs(further - distance) <= LAST_STEP * distance:
                     distance = further  # what rounding leaves of the gap is a long way at a graze
