@@ -165,9 +165,9 @@ def add_water(state, water, zones, j, half, i, up, top, bottom, g):
     """What a body displaces of a zone, and how that turns it."""
     bodies, o = state.bodies, owner_of(state, i)
     volume, middle = submerged(state, i, up, top, bottom)
-    mass = water.density[j] * volume * overlap_across(state, j, half, i, up)
-    if not mass > 0.0:
+    if not volume > 0.0:  # nor is there one of what has no extent
         return
+    mass = water.density[j] * volume * overlap_across(state, j, half, i, up)
     rate, arm = water.drag[j] * mass / bodies.mass[o], sub(bodies.position[i], bodies.position[o])
     zones.displaced[o] += mass
     zones.rate[o] += rate
