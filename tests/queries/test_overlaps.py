@@ -160,7 +160,7 @@ def test_a_shape_on_the_floor():
 
 WRONG = {
     "overlaps: position must be 2 finite": lambda w: w.overlaps(SphereCollider(1), (0, math.nan)),
-    "overlaps: mask must be an integer": lambda w: w.overlaps(SphereCollider(1), (0, 0), "red"),
+    "overlaps: mask: .red. names a layer": lambda w: w.overlaps(SphereCollider(1), (0, 0), "red"),
     "overlaps: exclude must be None, an entity or sev": lambda w: w.overlaps(SphereCollider(1), (0, 0), exclude=1.5),
     "AABBCollider.half_extents": lambda w: w.overlaps(AABBCollider((1, 1, 1)), (0, 0)),
     "shape_overlaps: positions must have shape": lambda w: w.shape_overlaps(SphereCollider(1), (0, 0)),

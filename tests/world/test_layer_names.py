@@ -62,7 +62,7 @@ def test_handles_columns_and_queries_take_names():
     world.bodies.sphere_collider.layer = ["walls", "player", "ghost"]
     assert world.query_aabb((-9, -9), (9, 9), mask=("ghost", "walls")) == [made[0], made[2]]
     assert [hit.entity for hit in world.ray_cast((-9, 0), (1, 0), 20, mask=Layers.GHOST)] == [made[2]]
-    assert world.query_aabbs([(-9, -9)], [(9, 9)], mask="player")[0].tolist() == [made[1]]
+    assert world.query_aabbs([(-9, -9)], [(9, 9)], masks="player")[0].tolist() == [made[1]]
     world.bodies.sphere_collider.mask = "walls"
     assert np.array_equal(world.bodies.sphere_collider.mask, [2, 2, 2])
 
