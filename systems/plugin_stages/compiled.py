@@ -25,8 +25,10 @@ PRESENT = "present"  # the column that says which rows have the component
 
 
 def visible_columns(component: type[Component]) -> list[Column]:
-    """Those that a record of the component has: arrays are for shapes alone."""
-    return [column for column in component.columns.values() if not isinstance(column, ArrayColumn)]
+    """Those that a record of the component has: arrays are for shapes alone, and some columns for the state."""
+    hidden = getattr(component, "hidden_columns", ())
+    columns = component.columns.values()
+    return [column for column in columns if not (isinstance(column, ArrayColumn) or column.name in hidden)]
 
 
 @lru_cache(maxsize=CACHE_SIZE)
