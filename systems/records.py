@@ -161,11 +161,12 @@ BODIES = Schema(
         axes_rotation=floats(unit="rad or 1"),  # and the rotations that they are of
     ),
     Section(
-        "body", "shapes", "which shapes a body has, and where they are",
-        levels=ints("int8", stacked=True),  # shapes, cheapest first, the last one repeated
-        own_levels=ints("int8", stacked=True),  # the same with those that are not enabled: they have inertia
-        level_offsets=vectors(stacked=True, unit="m"),
+        "body", "shapes", "which shapes a body has",
+        levels=ints("int8", stacked=True),  # cheapest first, the last one repeated
     ),
+    # With those that are not enabled, which have inertia. The same array as ``levels`` while all are.
+    Section(own_levels=ints("int8", stacked=True)),
+    Section("body", "shapes", "where its shapes are", level_offsets=vectors(stacked=True, unit="m")),
     Section(
         "static body", "collisions", "where it stood when its box was made",
         static_position=vectors(unit="m"),  # from row 0

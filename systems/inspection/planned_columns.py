@@ -20,6 +20,7 @@ OBJECTS = "whose entities have Python objects"
 MASKS = "which components it has"
 ROTATED = "some body is rotated: shapes as they are in the world"
 NOT_ENCLOSING = "some body has several colliders: whether the cheaper one still encloses the other"
+NOT_ENABLED = "some collider is not enabled: which shapes a body has, with those"
 UNDO_NOTE = "copies for going back to the start of a step that fails"
 
 
@@ -35,6 +36,8 @@ def planned_columns(
     for component in table.component_types:
         yield from _column(table.mask_name(component), "body", "the table", table.has_mask(component), capacity, MASKS)
     yield from _sections(bodies, [section for section in BODIES.sections if section not in of_table])
+    if scene.own_levels is not scene.levels:
+        yield from _column("own_levels", "body", "shapes", scene.own_levels, capacity, NOT_ENABLED)
     yield from _column("stretches", "body", "shapes", scene.stretches, capacity, NOT_ENCLOSING)
     yield from _column("level_not_enclosing", "body", "shapes", bodies.level_not_enclosing, capacity, NOT_ENCLOSING)
     for key, array in sorted(scene.rotated_columns.items()):
