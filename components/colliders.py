@@ -77,7 +77,7 @@ class Collider(Component, abstract=True):
 
     # Records of stages do not show these, so that worlds without them pay nothing: see state.bodies.shape and
     # state.colliders.
-    hidden_columns: ClassVar[tuple[str, ...]] = ("enabled", "surface_velocity")
+    hidden_columns: ClassVar[tuple[str, ...]] = ("enabled", "one_way", "surface_velocity")
 
     offset: VectorField = special_column(
         unit="m", default=0.0, item="vector", kw_only=True, on_demand=True, also=("centre",)
