@@ -24,6 +24,7 @@ _NAMES = {
     ),
     "plugins": ("Physics",),
     "plugins.capsule": ("CapsuleCollider",),
+    "plugins.character": ("Character", "Characters", "Ladder"),
     "plugins.convex_hull": ("ConvexHullCollider",),
     "plugins.convex_polygon": ("ConvexPolygonCollider",),
     "plugins.half_space": ("HalfSpaceCollider",),

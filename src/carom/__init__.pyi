@@ -2,6 +2,9 @@ from .components import *
 from .framework import *
 from .plugins import *
 from .plugins.capsule import CapsuleCollider as CapsuleCollider
+from .plugins.character import Character as Character
+from .plugins.character import Characters as Characters
+from .plugins.character import Ladder as Ladder
 from .plugins.convex_hull import ConvexHullCollider as ConvexHullCollider
 from .plugins.convex_polygon import ConvexPolygonCollider as ConvexPolygonCollider
 from .plugins.half_space import HalfSpaceCollider as HalfSpaceCollider
