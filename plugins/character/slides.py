@@ -143,7 +143,7 @@ def part_out(state, near, character, work, walker, at, rising, ignored):
     rising
         m/s, its own speed upwards: what holds from above does not pick up what jumps
     """
-    start, crusher, skin = at, -1, walker.skin
+    start, crusher, skin, moved = at, -1, walker.skin, 0.0
     for turn in range(6):
         work.planes, worst = 0, 0.0
         for k in range(walker.near):
@@ -163,12 +163,12 @@ def part_out(state, near, character, work, walker, at, rising, ignored):
                 continue
             if is_one_way(state, j):  # picked up by one that rises, and by that way at most
                 front = front_of(state, j)
-                moved = sub(state.bodies.position[j], state.bodies.previous_position[j])
-                rise = dot(moved, front) / length(front)
+                rise = dot(sub(state.bodies.position[j], state.bodies.previous_position[j]), front) / length(front)
                 if walker.dropping or rising > 0.0 or not rise > 0.0 or depth > rise + EXACT:
                     continue
                 if not is_from_front(front, out):
                     continue
+            moved = max(moved, length(sub(state.bodies.position[j], state.bodies.previous_position[j])))
             add_plane(work, out, depth + skin)
             worst = max(worst, depth + skin)
             if j < state.moving or crusher < 0:
@@ -177,6 +177,8 @@ def part_out(state, near, character, work, walker, at, rising, ignored):
         if worst <= 0.6 * skin:
             return at, -1
         at = add(at, pushed_by_planes(work))
+        if length(sub(at, start)) > walker.half + skin + moved:  # not out on the other side
+            return start, crusher
     worst_row, _ = deepest(state, near, character, walker, at, 0, 1e-6)
     if worst_row < 0:
         return at, -1

@@ -280,7 +280,8 @@ def move_one(state, near, character, ladder, work, i, dt):
     ride, floor = scale(start, 0.0), row_of_floor(state, character, i)
     if standing and (floor < 0 or not meets(state, i, floor) or is_sensor(state, floor)):
         standing = False
-    if standing:
+    put = differs(bodies.position[i], character.place[i])  # by the game
+    if standing and not put:
         ride = ride_of(state, character, i, start, floor, up, dt)
     # what is near
     reach = (length(velocity) + length(wish) + abs(character.climb[i]) + jump_speed + gravity * dt) * dt + length(ride)
@@ -312,8 +313,7 @@ def move_one(state, near, character, ladder, work, i, dt):
     if dot(ride, ride) > 0.0 and not leaves:
         at = slide(state, near, character, work, walker, at, ride, False, True, floor)
     carried_hits, crusher = work.hits, -1
-    disturbed = work.hits > 0 or state.statics_version != work.statics_version
-    disturbed |= differs(bodies.position[i], character.place[i])
+    disturbed = put or work.hits > 0 or state.statics_version != work.statics_version
     for k in range(found):  # beside what rests nothing can have moved into it
         disturbed |= state.dynamic <= near.row[k] < state.moving
     if disturbed:
