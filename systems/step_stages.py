@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from ..framework.compilation import part
+from .broad_phase.boxes import box_motions, box_statics
 from .ccd.search_bounds import DISCRETE
 from .codes import INDEX, NEED_SWEEPS, OK, ROTATE
 from .parts.stages import add_masses_of_parts
 from .shapes.attribution import NOTHING_TESTED
+
+FEW_BODIES = 160  # that are looked at one by one
+
+make_static_boxes, make_moving_boxes = part(box_statics), part(box_motions)
 
 OPENED, KEEPS_VELOCITY, KEEPS_START, KEEPS_FORCE, KEEPS_WRITTEN = 1, 2, 4, 8, 16  # bits of state.kept
 LARGEST_FLOAT = 1.7976931348623157e308  # of all finite numbers
@@ -101,8 +106,19 @@ def read_bodies(state, dt):
 
 
 def index_bodies(state, dt):
-    """Where the bodies are now, for stages of plugins that query: systems of the game may have moved them."""
-    return INDEX
+    """Where the bodies are now, for stages of plugins that query: systems of the game may have moved them. Few bodies
+    need boxes alone, others grids or trees."""
+    turned = state.rotated or any_rotation(state)
+    if state.count > FEW_BODIES or state.rotation_stale or (turned and (not state.rotated or axes_are_old(state))):
+        return INDEX
+    moved, known_until = state.moved, state.neighbours_known_until
+    ready, still = state.candidates_ready, state.all_still
+    state.moved = state.all_still = False
+    make_static_boxes(state, dt)
+    make_moving_boxes(state, dt)
+    state.moved, state.neighbours_known_until = moved, known_until
+    state.candidates_ready, state.all_still = ready, still
+    return OK
 
 
 def close_step(state, dt):

@@ -15,7 +15,8 @@ from ...framework.jit.records.schema import Schema, integer, ints, number, vecto
 from ...framework.vectors import negative
 from ..narrow_phase.stages import layers_meet
 from ..shapes.dispatch import evaluate, sweep
-from .candidates import make_find_all, to_collider
+from ..step_stages import FEW_BODIES
+from .candidates import is_box_near, make_find_all, order_by_entity, to_collider
 from .casts import box_interval as box_interval
 from .casts import inverse_of as inverse_of
 from .first_touch import Path as Path
@@ -70,6 +71,13 @@ def make_gather(wanted: Callable[..., bool]) -> Any:
 
     @part
     def gather(state, near, i, low, high):
+        if state.count <= FEW_BODIES:
+            found = 0
+            for j in range(state.count):
+                near.row[found] = j
+                found += is_box_near(state, j, low, high) and wanted(state, i, j)
+            order_by_entity(state, near, 0, found)
+            return found
         near.asking, near.low[0], near.high[0] = i, low, high
         find(state, near, state.tree, state.static_tree, 0, 1)
         return near.end[0]
