@@ -333,6 +333,9 @@ def contact_of_segment(a, b, d, support, rounding):
     if centre < -BEHIND * size - a.thickness:
         return miss(best, math.inf, frame, face.nearest)
     depth = round_b - height
+    if kind == PART and depth < -size:  # what is beside it may come over it before that
+        _, depth, best, point = convex_convex(a, b, d, segment_support, support, sharp, rounding)
+        return True, depth, best, point
     return True, depth, best, add_scaled(point, best, -0.5 * depth)
 
 
