@@ -52,8 +52,9 @@ def between_segments(p, q, a, b):
     return np.where(inside[..., None], w + s[..., None] * u - t[..., None] * v, w)
 
 
-def ways_apart(corners, edges, half, pieces, places):
+def ways_apart(core, pieces, places):
     """(places, pieces, 3): from the nearest point of each piece, (n, 2 or 3, 3), to a shape's core at each place."""
+    corners, edges, half = core
     d, piece = places[:, None, :], [pieces[None, :, k] for k in range(pieces.shape[1])]
     sides = list(itertools.combinations(piece, 2))
     ways = [to_segment(d + corner, a, b) for corner in corners for a, b in sides]
@@ -109,18 +110,18 @@ def first_touches(core, radius, pieces, starts, ways):
     """(distance, way apart from each piece just before) of each cast; nan if that is no touch, or a graze. What is
     apart can go as far as the gap is wide."""
     far = np.zeros(len(starts))
-    for _ in range(120):
-        apart = ways_apart(*core, pieces, starts + far[:, None] * ways)
+    for _ in range(80):
+        apart = ways_apart(core, pieces, starts + far[:, None] * ways)
         gaps = np.linalg.norm(apart, axis=2).min(axis=1) - radius
         far += np.where(gaps > 1e-13, np.minimum(gaps, LENGTH), 0.0)
-    before = ways_apart(*core, pieces, starts + (far - 1e-7)[:, None] * ways)
+    before = ways_apart(core, pieces, starts + (far - 1e-7)[:, None] * ways)
     return np.where((gaps < 1e-12) & (far < LENGTH), far, np.nan), before
 
 
 @pytest.mark.parametrize("d", [2, 3])
 def test_what_falls_on_edges_corners_and_ends_is_found_where_it_touches(d):
     random, met, beyond = np.random.default_rng(40 + d), 0, 0
-    for _ in range(24 if d == 2 else 8):
+    for _ in range(12 if d == 2 else 2):
         world, pieces, normals = random_ground(random, d)
         corners = pieces.reshape(-1, 3)
         for _ in range(4):
@@ -131,7 +132,7 @@ def test_what_falls_on_edges_corners_and_ends_is_found_where_it_touches(d):
             aims[:, d:] = ways[:, d:] = 0.0
             ways /= np.linalg.norm(ways, axis=1)[:, None]
             starts = aims - 4.0 * ways
-            clear = np.linalg.norm(ways_apart(*core, pieces, starts), axis=2).min(axis=1) > radius
+            clear = np.linalg.norm(ways_apart(core, pieces, starts), axis=2).min(axis=1) > radius
             distances, before = first_touches(core, radius, pieces, starts, ways)
             gaps = np.linalg.norm(before, axis=2)
             from_front = (dot(before, normals) > 1e-6 * gaps) | (gaps > radius + 1e-6)
@@ -139,11 +140,11 @@ def test_what_falls_on_edges_corners_and_ends_is_found_where_it_touches(d):
             for k in np.nonzero(clear & from_front.all(axis=1) & ~np.isnan(distances))[0].tolist():
                 place = starts[k] + (distances[k] + 1e-6) * ways[k]
                 assert found[k] <= distances[k] + EXACT
-                at_hit = ways_apart(*core, pieces, starts[[k]] + found[k] * ways[k])
+                at_hit = ways_apart(core, pieces, starts[[k]] + found[k] * ways[k])
                 assert np.linalg.norm(at_hit, axis=2).min() - radius <= (EXACT if d == 2 else BESIDE)
                 assert world.overlaps(shape, place[:d])
                 met += 1
                 beyond += not corners[:, 0].min() <= place[0] <= corners[:, 0].max()
         world.close()
-    assert met > 500
-    assert beyond > 30
+    assert met > 150
+    assert beyond > 15
