@@ -9,7 +9,7 @@ from ...framework.vectors import add, add_scaled, dot, item, scale, sub
 from .casts import is_dynamic
 from .records import MOST_HITS, ROWS
 from .slides import cross
-from .walk import move_one, row_of, row_of_floor, up_of
+from .step import move_one, row_of, row_of_floor, up_of
 
 
 @part

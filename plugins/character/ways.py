@@ -1,0 +1,119 @@
+"""The ways of a character: along the ground, through the air, on a ladder."""
+
+from __future__ import annotations
+
+import collections
+
+from ...framework.compilation import part
+from ...framework.vectors import add, add_scaled, divided, dot, item, length, scale, sub
+from ...systems.queries.compiled import overlap
+from .casts import across, floor_below, is_dynamic, lowered
+from .records import AIR, CLIMB, EXACT, FLOOR, STEEP
+from .slides import along_floor, slide
+
+SLOWER = 1e-6  # of its speed: less is rounding
+
+# What became of it. at: place; level: own velocity across up, rising: along it; tried: with which velocity it moved;
+# ground: row of what it stands on, out: its normal; fell: velocity along up before it landed.
+Outcome = collections.namedtuple("Outcome", "at level rising state ground out tried fell")
+
+
+@part
+def is_on_ladder(state, near, character, ladder, walker, at, before, standing):
+    """Whether it climbs: it is in a ladder, and did so before or wants to, but not down into the floor."""
+    wanted = character.climb[walker.row]
+    if before == CLIMB or (wanted != 0.0 and not (standing and wanted < 0.0)):
+        for k in range(walker.near if len(ladder.present) > 0 else 0):
+            j = near.row[k]
+            if ladder.present[j] and overlap(state, walker.row, j, at)[0] > 0.0:
+                return True
+    return False
+
+
+@part
+def climb(state, near, character, work, walker, at, level, dt):
+    """Where it gets on a ladder."""
+    rising = character.climb[walker.row]
+    velocity = add_scaled(level, walker.up, rising)
+    to = slide(state, near, character, work, walker, at, scale(velocity, dt), False, False, -1)
+    return Outcome(to, level, rising, CLIMB, -1, walker.up, velocity, 0.0)
+
+
+@part
+def step_over(state, near, character, work, walker, at, wish, done, height):
+    """(taken, place) of going over an edge: up, forward and down, if that leads farther than it has done, to a floor
+    that is at most so high."""
+    up, size = walker.up, length(wish)
+    top = slide(state, near, character, work, walker, at, scale(up, height), False, True, -1)
+    level, raised = across(wish, up), dot(sub(top, at), up)
+    ahead = divided(level, length(level))
+    over = slide(state, near, character, work, walker, top, scale(ahead, size), False, False, -1)
+    if dot(sub(over, top), ahead) <= dot(done, ahead) + EXACT:
+        return False, at
+    j, gap, _, floor_height = floor_below(state, near, character, work, walker, over, raised)
+    foot = dot(at, up) - walker.skin
+    for k in range(len(up)):
+        foot -= abs(item(up, k)) * item(walker.half_extents, k)
+    if j < 0 or gap < -EXACT or not floor_height - foot <= height + walker.skin:
+        return False, at
+    return True, add_scaled(over, up, 0.0 - gap)
+
+
+@part
+def walk(state, near, character, work, walker, at, level, kept, lift, dt):
+    """Where it gets on the ground, which may end. kept, lift: what it keeps then of what has carried it."""
+    up, normal, first = walker.up, character.floor_normal[walker.row], work.hits
+    way, work.blocked = scale(along_floor(level, normal, up), dt), -1
+    to = slide(state, near, character, work, walker, at, way, True, False, -1)
+    blocked, high, taken, tried = work.blocked, character.step_height[walker.row], False, level
+    if blocked >= 0 and high > 0.0 and not is_dynamic(state, blocked):
+        hits = work.hits
+        taken, over = step_over(state, near, character, work, walker, at, way, sub(to, at), high)
+        if taken:
+            to = over
+        work.hits = hits
+    gone = sub(to, at)
+    if not taken and work.hits > first and length(gone) < (1.0 - SLOWER) * length(way):
+        ahead = across(gone, up)  # as fast as it got along the floor
+        level = scale(ahead, length(gone) / (dt * max(length(ahead), EXACT)))
+    j, gap, out, _ = floor_below(state, near, character, work, walker, to, character.snap[walker.row])
+    if j >= 0:
+        to = lowered(state, near, character, work, walker, to, gap)
+        return Outcome(to, level, 0.0, FLOOR, j, out, tried, 0.0)
+    velocity = along_floor(level, normal, up)
+    rising = dot(velocity, up) + max(lift, 0.0 - character.max_fall[walker.row])
+    return Outcome(to, add(across(velocity, up), kept), rising, AIR, -1, up, tried, 0.0)
+
+
+@part
+def fall(state, near, character, work, walker, at, level, rising, gravity, wish, jumped, ignored, dt):
+    """Where it gets in the air, on the parabola, and whether it has landed."""
+    i, up, max_fall, first = walker.row, walker.up, character.max_fall[walker.row], work.hits
+    start, rising = rising, max(rising - gravity * dt, 0.0 - max_fall)
+    slowest = character.wall_slide[i]
+    if slowest == slowest and character.on_wall[i] and dot(wish, character.wall_normal[i]) < 0.0:
+        rising = max(rising, 0.0 - slowest)
+    tried, fell = add_scaled(level, up, 0.5 * (start + rising)), rising
+    way = scale(tried, dt)
+    to = slide(state, near, character, work, walker, at, way, False, False, ignored)
+    velocity, steep = add_scaled(level, up, rising), False
+    for k in range(first, work.hits):
+        hit, rise = work.hit_out[k], dot(work.hit_out[k], up)
+        steep |= rise > 1e-3 and length(across(hit, up)) > 1e-3
+        if rise < walker.limit or rising <= 0.0:
+            velocity = add_scaled(velocity, hit, 0.0 - min(0.0, dot(velocity, hit)))
+    level, rising = across(velocity, up), dot(velocity, up)
+    now, ground, normal = AIR, -1, up
+    if not jumped and (rising <= EXACT or work.hits > first):
+        j, gap, out, _ = floor_below(state, near, character, work, walker, to, 2.0 * walker.skin)
+        stayed = length(sub(to, at)) < 1e-3 * length(way) + 1e-6
+        if j >= 0 and dot(velocity, out) <= gravity * dt + EXACT:  # no more than falls back in a step
+            to = lowered(state, near, character, work, walker, to, gap)
+            now, ground, normal = FLOOR, j, out
+        elif rising > EXACT:
+            now = AIR
+        elif stayed and work.hits > first + 1:  # wedged, as between two slopes that are both too steep
+            now, ground, normal = FLOOR, work.hit_row[work.hits - 1], scale(up, 0.0)
+        elif steep:
+            now = STEEP
+    return Outcome(to, level, rising, now, ground, normal, tried, fell)
