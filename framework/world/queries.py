@@ -83,7 +83,8 @@ class QueryVerbs(CastVerbs):
         """All that a collider touches at a place, the deepest first, ties by id: how deep, where, and the way out.
 
         ``shape``, ``mask`` and ``exclude`` as in :meth:`shape_cast`; ``position``, (d,) m, is where a Transform would
-        be. ValueError names the argument that is wrong, TypeError a shape that is no collider of this world.
+        be; one_way: also what is solid from one side only. ValueError names the argument that is wrong, TypeError a
+        shape that is no collider of this world.
         """
         services = self._synchronized()
         columns, layers = self._asked(shape, "overlaps", services.dimensions)
@@ -105,7 +106,7 @@ class QueryVerbs(CastVerbs):
         """:meth:`overlaps` of m colliders, as columns.
 
         shapes: one collider for all, or ``SphereCollider.many(radius=radii)``; positions (m, d); masks: one for all or
-        (m,); excludes: one for all, (m,), or several for each, (m, k).
+        (m,); excludes: one for all, (m,), or several for each, (m, k); one_way: as of :meth:`overlaps`.
         """
         services = self._synchronized()
         places = check.points(positions, "shape_overlaps: positions", services.dimensions)
