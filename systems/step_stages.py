@@ -109,7 +109,8 @@ def index_bodies(state, dt):
     """Where the bodies are now, for stages of plugins that query: systems of the game may have moved them. Few bodies
     need boxes alone, others grids or trees."""
     turned = state.rotated or any_rotation(state)
-    if state.count > FEW_BODIES or state.rotation_stale or (turned and (not state.rotated or axes_are_old(state))):
+    state.rotation_stale |= turned and (not state.rotated or axes_are_old(state))
+    if state.count > FEW_BODIES or state.rotation_stale:
         return INDEX
     moved, known_until = state.moved, state.neighbours_known_until
     ready, still = state.candidates_ready, state.all_still

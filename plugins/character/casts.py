@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import inlined, part
-from ...framework.vectors import add, add_scaled, dot, length, negative, scale, sub
+from ...framework.vectors import add, add_scaled, dot, item, length, negative, scale, sub
 from ...systems.narrow_phase.one_way import front_of, is_from_front, is_one_way
-from ...systems.queries.compiled import Path, box_interval, cast, inverse_of, is_sensor, overlap
+from ...systems.queries.compiled import Path, box_interval, cast, inverse_of, is_sensor, overlap, to_collider
 from .records import EXACT
 
 REACH = 10.0  # skins that a cast looks beyond its way
@@ -84,7 +84,25 @@ def cast_near(state, near, character, work, walker, at, way, reach, ignored):
 
 
 @part
-def ground_kind(state, walker, j, out, at, point):
+def nearest_normal(state, near, character, walker, at, margin):
+    """The normal of what is nearest to it there, of all within the margin; pieces of a terrain are as one."""
+    deepest, normal = -math.inf, walker.up
+    for k in range(walker.near):
+        j = near.row[k]
+        if is_sensor(state, j) or character.present[j]:
+            continue
+        away, half, close = to_collider(state, at, j), state.bodies.half_extents[j], True
+        for m in range(len(away)):
+            close &= abs(item(away, m)) <= item(half, m) + item(walker.half_extents, m) + margin
+        if close:
+            depth, out, _ = overlap(state, walker.row, j, at)
+            if depth > deepest:
+                deepest, normal = depth, out
+    return normal
+
+
+@part
+def ground_kind(state, near, character, walker, out, at, point):
     """Whether what it touches there is too steep, a slope that it can walk on, an edge that it can stand on, or the rim
     of one, too far out to stand on.
 
@@ -98,7 +116,7 @@ def ground_kind(state, walker, j, out, at, point):
         step = LEAN * walker.half
         lift = 2.0 * step / max(rise, 0.1)
         to = add_scaled(add_scaled(at, level, 0.0 - step / sine), walker.up, lift)
-        _, turned, _ = overlap(state, walker.row, j, to)
+        turned = nearest_normal(state, near, character, walker, to, lift)
         x, y = arm - step, arm * rise / sine + lift  # from a point to the middle of the foot
         if 2.0 * (dot(turned, walker.up) - rise) >= y / math.sqrt(x * x + y * y) - rise:
             if arm <= FOOT * walker.half:
@@ -138,7 +156,7 @@ def floor_below(state, near, character, work, walker, at, reach):
         here = distance - skin / max(rise, 0.1)
         kind = SLOPE if rise >= walker.limit else STEEP_GROUND
         if not character.present[j]:
-            kind = ground_kind(state, walker, j, out, add_scaled(at, down, distance), point)
+            kind = ground_kind(state, near, character, walker, out, add_scaled(at, down, distance), point)
         if kind == SLOPE or kind == EDGE:  # noqa: SIM109  compiled
             if here < gap:
                 best, gap, normal = j, here, out if kind == SLOPE else up

@@ -68,11 +68,11 @@ def along_floor(way, normal, up):
 
 
 @part
-def climbs(state, character, walker, j, out, at, point):
+def climbs(state, near, character, walker, j, out, at, point):
     """Whether it walks on along what it meets; edges are stepped over, but for those of what can be pushed."""
     if character.present[j] or is_dynamic(state, j):
         return dot(out, walker.up) >= walker.limit
-    return ground_kind(state, walker, j, out, at, point) == SLOPE
+    return ground_kind(state, near, character, walker, out, at, point) == SLOPE
 
 
 @part
@@ -104,7 +104,7 @@ def slide(state, near, character, work, walker, at, wish, is_walking, is_carried
         left = add_scaled(left, way, 0.0 - free)
         note_hit(work, j, out)
         if is_walking:
-            if climbs(state, character, walker, j, out, add_scaled(at, way, distance - free), point):
+            if climbs(state, near, character, walker, j, out, add_scaled(at, way, distance - free), point):
                 left = along_floor(across(left, walker.up), out, walker.up)
             elif dot(out, walker.up) > -0.1:
                 level = across(out, walker.up)

@@ -109,7 +109,8 @@ class CandidateSearch:
 
     def index_for_stages(self, scene: Any) -> None:
         """The same within a step, and the trees where compiled code finds them."""
-        scene.refresh_rotation()
+        if self._state.rotation_stale:
+            scene.refresh_rotation()
         self._state.tree, self._state.static_tree = (tree.record for tree in self.index_now())
 
     def _build(self, index: SpatialTree, start: int, stop: int) -> None:

@@ -16,7 +16,8 @@ from ...framework.vectors import negative
 from ..narrow_phase.stages import layers_meet
 from ..shapes.dispatch import evaluate, sweep
 from ..step_stages import FEW_BODIES
-from .candidates import is_box_near, make_find_all, order_by_entity, to_collider
+from .candidates import is_box_near, make_find_all, order_by_entity
+from .candidates import to_collider as to_collider
 from .casts import box_interval as box_interval
 from .casts import inverse_of as inverse_of
 from .first_touch import Path as Path
