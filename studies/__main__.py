@@ -17,7 +17,7 @@ from carom.lab.cli.usage_errors import Problem, did_you_mean
 from carom.lab.reporting.progress import Progress
 from carom.lab.reporting.text import TextTable
 
-from . import accuracy, features, joints, scaling, settings, startup
+from . import accuracy, characters, features, joints, scaling, settings, startup
 from .bench import timing as bench
 from .features import LADDER, SPINS
 from .limits import search as limits
@@ -58,6 +58,9 @@ STUDIES = {
         draw=accuracy.draw_charts,
     ),
     "bench": Study("carom against pymunk and Box2D, on the same bodies.", bench.axes, bench.report, 3),
+    "characters": Study(
+        "What characters cost, many and one beside pymunk.", characters.axes, characters.report, 3,
+    ),
     "joints": Study("What substeps and shorter steps buy joints, and what they cost.", joints.axes, joints.report, 5),
     "ladder": Study(
         "What each feature costs, switched on alone.", partial(features.axes, LADDER, features.BODIES),
