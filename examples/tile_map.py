@@ -1,13 +1,14 @@
 """A character runs and jumps over a tile map: python examples/tile_map.py
 
-The map is drawn as text. In the world it is two entities, floors and walls, so that a character who leans against a
-wall stands still on the floor. Balls roll about on the same map.
+The map is drawn as text, and is one entity. The character jumps where a wall is in its way. Balls lie on the same map;
+it pushes them aside.
 """
 
 from __future__ import annotations
 
 from carom import AABBCollider, Physics, RigidBody, SphereCollider, TileGridCollider, Transform, World, cells_of_text
 from carom.plugins import tile_grid
+from carom.plugins.character import Character, Characters
 
 MAP = """
     ############################################################
@@ -21,7 +22,6 @@ MAP = """
     ############################################################
 """
 SPEED, JUMP = 6.0, 9.0
-LAYER_CHARACTER, LAYER_REST = 2, 1
 
 
 def places(mark):
@@ -31,26 +31,24 @@ def places(mark):
 
 
 def main(seconds=12.0):
-    world = World(Physics(dimensions=2, gravity=(0, -20)), tile_grid.plugin)
+    world = World(Physics(dimensions=2, gravity=(0, -20)), tile_grid.plugin, Characters())
     cells = cells_of_text(MAP, empty=" .@o")
-    for faces in TileGridCollider.floors_and_walls(cells, 1.0, lower=(0, 0)):
-        world.create_entity(Transform((0, 0)), faces)
+    world.create_entity(Transform((0, 0)), TileGridCollider(cells, 1.0, lower=(0, 0)))
     for place in places("o"):
         world.create_entity(Transform(place), RigidBody(), SphereCollider(0.4, restitution=0.5))
-    character = world.create_entity(
-        Transform(places("@")[0]), RigidBody(), AABBCollider((0.35, 0.45), layer=LAYER_CHARACTER, mask=LAYER_REST)
-    )
-    transform, body = (world.component_for_entity(character, kind) for kind in (Transform, RigidBody))
+    entity = world.create_entity(
+        Transform(places("@")[0]), RigidBody(kind="kinematic"), AABBCollider((0.35, 0.45)),
+        Character(move=SPEED, jump_speed=JUMP, step_height=0.1),
+    )  # fmt: skip
+    transform, character = (world.component_for_entity(entity, kind) for kind in (Transform, Character))
 
     path = []
     while world.time < seconds:
-        stands = any(contact.normal[1] < -0.7 for contact in world.contacts.of(character))  # normals point away from it
-        blocked = any(contact.normal[0] > 0.7 for contact in world.contacts.of(character))
-        body.linear_velocity = (SPEED, JUMP if stands and blocked else body.linear_velocity[1])
+        character.jump = character.on_wall and character.state == "floor"
         world.step()
         path.append(tuple(transform.position))
         if world.step_count % 60 == 0:
-            where = "leans on a wall" if blocked else "runs" if stands else "is in the air"
+            where = "leans on a wall" if character.on_wall else "is in the air" if character.state == "air" else "runs"
             print(f"{world.time:5.2f} s  x = {transform.x:6.3f}  y = {transform.y:6.3f}  {where}")
     return path
 
