@@ -17,8 +17,8 @@ def check_pairs(
     """UnhandledPairError if two bodies can meet whose shapes no plugin has a pair for.
 
     Two bodies can meet if one of them moves and each one's layer is in the other's mask, unless both are of one
-    group. Levels of geometry meet level by level. Costs nothing in a scene whose shapes all have pairs, and little in one
-    where those without rest, such as tile grids.
+    group. Levels of geometry meet level by level. Costs nothing in a scene whose shapes all have pairs, and little in
+    one where those without rest, such as tile grids.
     """
     for i, j in linked.unhandled:
         for level in levels:
