@@ -25,8 +25,9 @@ def is_dynamic(state, j):
 
 
 @inlined
-def holds(state, walker, j, out, distance):
+def holds(walker, j, out, distance):
     """Whether row j, met along that normal, is in the way: what is solid from one side is not from others."""
+    state = walker.state
     if not is_one_way(state, j):
         return True
     return not walker.dropping and is_from_front(front_of(state, j), out) and distance > 0.0
@@ -48,9 +49,10 @@ def comes_near(state, j, path, reach):
 
 
 @part
-def meet_character(state, walker, j, at, way):
+def meet_character(walker, j, at, way):
     """(touches, distance, out) of another character: each may come half the way to where the other stood at the start,
     up to a plane between them, so that their order does not matter."""
+    state = walker.state
     depth, out, _ = overlap(state, walker.row, j, walker.start)
     along = 0.0 - dot(out, way)
     if along <= EXACT:
@@ -59,22 +61,23 @@ def meet_character(state, walker, j, at, way):
 
 
 @part
-def cast_near(state, near, character, work, walker, at, way, reach, ignored):
+def cast_near(walker, at, way, reach, ignored):
     """(row, distance, out, point) of what opposes a way first; row -1: it is free."""
+    state, near, character, work = walker.state, walker.near, walker.character, walker.work
     best, first, normal, touch = -1, reach, way, at
     path = Path(at, way, inverse_of(way), walker.half_extents)
-    for k in range(walker.near):
+    for k in range(walker.found):
         j, point = near.row[k], way
         if j == ignored or is_sensor(state, j):
             continue
         if character.present[j]:
-            touches, distance, out = meet_character(state, walker, j, at, way)
+            touches, distance, out = meet_character(walker, j, at, way)
         else:
             if not comes_near(state, j, path, first):
                 continue
             touches, distance, out, point = cast(state, near, walker.row, j, path, first, first)
         along = dot(out, way)
-        if not touches or distance >= first or along >= -EXACT or not holds(state, walker, j, out, distance):
+        if not touches or distance >= first or along >= -EXACT or not holds(walker, j, out, distance):
             continue
         if distance <= 0.0 and is_dynamic(state, j) and along > -0.5:
             continue
@@ -84,10 +87,11 @@ def cast_near(state, near, character, work, walker, at, way, reach, ignored):
 
 
 @part
-def nearest_normal(state, near, character, walker, at, margin):
+def nearest_normal(walker, at, margin):
     """The normal of what is nearest to it there, of all within the margin; pieces of a terrain are as one."""
+    state, near, character = walker.state, walker.near, walker.character
     deepest, normal = -math.inf, walker.up
-    for k in range(walker.near):
+    for k in range(walker.found):
         j = near.row[k]
         if is_sensor(state, j) or character.present[j]:
             continue
@@ -102,7 +106,7 @@ def nearest_normal(state, near, character, walker, at, margin):
 
 
 @part
-def ground_kind(state, near, character, walker, out, at, point):
+def ground_kind(walker, out, at, point):
     """Whether what it touches there is too steep, a slope that it can walk on, an edge that it can stand on, or the rim
     of one, too far out to stand on.
 
@@ -116,7 +120,7 @@ def ground_kind(state, near, character, walker, out, at, point):
         step = LEAN * walker.half
         lift = 2.0 * step / max(rise, 0.1)
         to = add_scaled(add_scaled(at, level, 0.0 - step / sine), walker.up, lift)
-        turned = nearest_normal(state, near, character, walker, to, lift)
+        turned = nearest_normal(walker, to, lift)
         x, y = arm - step, arm * rise / sine + lift  # from a point to the middle of the foot
         if 2.0 * (dot(turned, walker.up) - rise) >= y / math.sqrt(x * x + y * y) - rise:
             if arm <= FOOT * walker.half:
@@ -127,36 +131,37 @@ def ground_kind(state, near, character, walker, out, at, point):
 
 
 @part
-def floor_below(state, near, character, work, walker, at, reach):
+def floor_below(walker, at, reach):
     """(row, gap, out, height) of the floor that it can walk on within reach, and how far it may go down; row -1: none.
     height: of the touch along up, nan where something else keeps it from getting there.
 
     What is too steep in between only limits the way: it stands on a floor although a steep wall is nearer.
     """
+    state, near, character, work = walker.state, walker.near, walker.character, walker.work
     skin, up = walker.skin, walker.up
     far = reach + REACH * skin
     down = negative(up)
     path = Path(at, down, inverse_of(down), walker.half_extents)
     best, gap, normal, blocked, rim, height, rim_height = -1, far, up, far, far, math.nan, math.nan
-    for k in range(walker.near):
+    for k in range(walker.found):
         j = near.row[k]
         if is_sensor(state, j):
             continue
         point = at
         if character.present[j]:
-            touches, distance, out = meet_character(state, walker, j, at, down)
+            touches, distance, out = meet_character(walker, j, at, down)
         else:
             if not comes_near(state, j, path, far):
                 continue
             touches, distance, out, point = cast(state, near, walker.row, j, path, far, far)
         rise = dot(out, up)
-        if not touches or rise <= EXACT or not holds(state, walker, j, out, distance):
+        if not touches or rise <= EXACT or not holds(walker, j, out, distance):
             continue
         work.inside |= distance <= 0.0 and j >= state.moving
         here = distance - skin / max(rise, 0.1)
         kind = SLOPE if rise >= walker.limit else STEEP_GROUND
         if not character.present[j]:
-            kind = ground_kind(state, near, character, walker, out, add_scaled(at, down, distance), point)
+            kind = ground_kind(walker, out, add_scaled(at, down, distance), point)
         if kind == SLOPE or kind == EDGE:  # noqa: SIM109  compiled
             if here < gap:
                 best, gap, normal = j, here, out if kind == SLOPE else up
@@ -176,21 +181,22 @@ def floor_below(state, near, character, work, walker, at, reach):
 
 
 @part
-def lowered(state, near, character, work, walker, at, gap):
+def lowered(walker, at, gap):
     """Where it is after going down by the gap; up, where that is negative, only as far as there is room."""
     if gap >= 0.0 or gap > -1e-12:
         return add_scaled(at, walker.up, 0.0 - gap) if gap > 1e-12 else at
     skin = walker.skin
-    j, distance, _, _ = cast_near(state, near, character, work, walker, at, walker.up, 0.5 * skin - gap, -1)
+    j, distance, _, _ = cast_near(walker, at, walker.up, 0.5 * skin - gap, -1)
     rise = 0.0 - gap if j < 0 else min(0.0 - gap, max(0.0, distance - 0.5 * skin))
     return add_scaled(at, walker.up, rise)
 
 
 @part
-def deepest(state, near, character, walker, at, first, tolerance):
+def deepest(walker, at, first, tolerance):
     """(row, depth) of the worst overlap with what cannot be pushed, of rows from ``first`` on."""
+    state, near, character = walker.state, walker.near, walker.character
     worst, deep = -1, tolerance
-    for k in range(walker.near):
+    for k in range(walker.found):
         j = near.row[k]
         if j < first or is_dynamic(state, j) or is_sensor(state, j) or character.present[j] or is_one_way(state, j):
             continue
@@ -201,8 +207,9 @@ def deepest(state, near, character, walker, at, first, tolerance):
 
 
 @part
-def meets_on_way(state, near, walker, j, start, stop):
+def meets_on_way(walker, j, start, stop):
     """Whether it touches row j on a straight way but not where this begins."""
+    state, near = walker.state, walker.near
     way = sub(stop, start)
     size = length(way)
     if size == 0.0 or overlap(state, walker.row, j, start)[0] > 0.0:

@@ -45,7 +45,9 @@ WORK = Schema(
     plane_push=floats(unit="m"),
 )
 
-# A character at work. start: centre of its shape at the start of the step; half_extents: of its box, half: the least;
-# limit: cosine of the steepest slope it walks on; dropping: whether it falls through what holds from above only; near:
-# how many rows have been found.
-Walker = collections.namedtuple("Walker", "row start half_extents half up skin limit dropping near")
+# A character at work: the records, its row, and what stays the same in a step. start: centre of its shape at first;
+# half_extents: of its box, half: the least; limit: cosine of the steepest slope it walks on; dropping: whether it falls
+# through what holds from above only; wish: m/s across up; found: how many rows there are in ``near.row``.
+Walker = collections.namedtuple(
+    "Walker", "state near character work row start half_extents half up skin limit dropping gravity wish found"
+)

@@ -68,15 +68,16 @@ def along_floor(way, normal, up):
 
 
 @part
-def climbs(state, near, character, walker, j, out, at, point):
+def climbs(walker, j, out, at, point):
     """Whether it walks on along what it meets; edges are stepped over, but for those of what can be pushed."""
+    state, character = walker.state, walker.character
     if character.present[j] or is_dynamic(state, j):
         return dot(out, walker.up) >= walker.limit
-    return ground_kind(state, near, character, walker, out, at, point) == SLOPE
+    return ground_kind(walker, out, at, point) == SLOPE
 
 
 @part
-def slide(state, near, character, work, walker, at, wish, is_walking, is_carried, ignored):
+def slide(walker, at, wish, is_walking, is_carried, ignored):
     """Where it gets by moving by ``wish`` and along what it meets.
 
     is_walking
@@ -84,6 +85,7 @@ def slide(state, near, character, work, walker, at, wish, is_walking, is_carried
     is_carried
         it may also be moved back
     """
+    state, work = walker.state, walker.work
     left, skin = wish, walker.skin
     work.planes = 0
     for _turn in range(SLIDES):
@@ -91,7 +93,7 @@ def slide(state, near, character, work, walker, at, wish, is_walking, is_carried
         if size < EXACT:
             break
         way = divided(left, size)
-        j, distance, out, point = cast_near(state, near, character, work, walker, at, way, size + REACH * skin, ignored)
+        j, distance, out, point = cast_near(walker, at, way, size + REACH * skin, ignored)
         if j < 0:
             return add(at, left)
         slope = 0.0 - dot(out, way)
@@ -104,7 +106,7 @@ def slide(state, near, character, work, walker, at, wish, is_walking, is_carried
         left = add_scaled(left, way, 0.0 - free)
         note_hit(work, j, out)
         if is_walking:
-            if climbs(state, near, character, walker, j, out, add_scaled(at, way, distance - free), point):
+            if climbs(walker, j, out, add_scaled(at, way, distance - free), point):
                 left = along_floor(across(left, walker.up), out, walker.up)
             elif dot(out, walker.up) > -0.1:
                 level = across(out, walker.up)
@@ -137,16 +139,17 @@ def pushed_by_planes(work):
 
 
 @part
-def part_out(state, near, character, work, walker, at, rising, ignored):
+def part_out(walker, at, rising, ignored):
     """(place, row of what crushes it): out of static and kinematic bodies, the planes of all that overlap together.
 
     rising
         m/s, its own speed upwards: what holds from above does not pick up what jumps
     """
+    state, near, character, work = walker.state, walker.near, walker.character, walker.work
     start, crusher, skin, moved = at, -1, walker.skin, 0.0
     for turn in range(6):
         work.planes, worst = 0, 0.0
-        for k in range(walker.near):
+        for k in range(walker.found):
             j = near.row[k]
             if j == ignored or is_dynamic(state, j) or is_sensor(state, j):
                 continue
@@ -179,7 +182,7 @@ def part_out(state, near, character, work, walker, at, rising, ignored):
         at = add(at, pushed_by_planes(work))
         if length(sub(at, start)) > walker.half + skin + moved:  # not out on the other side
             return start, crusher
-    worst_row, _ = deepest(state, near, character, walker, at, 0, 1e-6)
+    worst_row, _ = deepest(walker, at, 0, 1e-6)
     if worst_row < 0:
         return at, -1
     return start, crusher if crusher >= 0 else worst_row

@@ -153,21 +153,22 @@ def stands_nowhere(character, i):
 
 
 @part
-def carried(state, near, character, work, walker, ride, floor, left, put, rising):
+def carried(walker, ride, floor, left, put, rising):
     """(place, row of what crushes it) after the ride on its floor, and out of what has moved into it.
 
     left
         the row of a floor that it jumps off
     """
+    state, near, work = walker.state, walker.near, walker.work
     at, crusher = walker.start, -1
     if dot(ride, ride) > 0.0 and left < 0:
-        at = slide(state, near, character, work, walker, at, ride, False, True, floor)
+        at = slide(walker, at, ride, False, True, floor)
     disturbed = put or work.hits > 0 or state.statics_version != work.statics_version
-    for k in range(walker.near):  # beside what rests nothing can have moved into it
+    for k in range(walker.found):  # beside what rests nothing can have moved into it
         disturbed |= state.dynamic <= near.row[k] < state.moving
     if disturbed:
-        at, crusher = part_out(state, near, character, work, walker, at, rising, left)
-    if crusher >= 0 and deepest(state, near, character, walker, at, state.moving, 1e-6)[0] >= 0:
+        at, crusher = part_out(walker, at, rising, left)
+    if crusher >= 0 and deepest(walker, at, state.moving, 1e-6)[0] >= 0:
         at = walker.start
     return at, crusher
 
@@ -197,8 +198,9 @@ def count_times(character, i, standing, dt):
 
 
 @part
-def jump(character, i, standing, climbing, level, rising, kept, lift, speed):
+def jump(walker, standing, climbing, level, rising, kept, lift, speed):
     """(jumps, velocity across up, along up): from the floor or a ladder, off a wall, or once more in the air."""
+    character, i = walker.character, walker.row
     if standing or climbing:
         character.air_jumped[i] = 0
     jumps = False
@@ -236,14 +238,15 @@ def towards(character, i, level, wish, rate):
 
 
 @part
-def push(state, character, work, walker, j, out, wish, dt):
+def push(walker, j, out, dt):
     """(pushes, force) with which it pushes row j in the next step, so that this gets no faster than it wants to be."""
+    state, character, work = walker.state, walker.character, walker.work
     bodies, i, level = state.bodies, walker.row, across(out, walker.up)
     size, force = length(level), character.push_force[walker.row]
-    if size < 0.5 or dot(wish, level) >= 0.0 or force == 0.0:
+    if size < 0.5 or dot(walker.wish, level) >= 0.0 or force == 0.0:
         return False, level
     ahead = divided(level, 0.0 - size)
-    wanted = dot(wish, ahead)
+    wanted = dot(walker.wish, ahead)
     if character.present[j]:
         if not character.pushable[j]:
             return False, level
@@ -275,8 +278,9 @@ def tell(work, event, entity, other, normal, speed):
 
 
 @part
-def tell_hits(state, near, work, walker, floor, first, velocity, start, carried, stop, dt):
+def tell_hits(walker, floor, first, velocity, carried, stop, dt):
     """What it has run against on its own way, and which sensors it has come into."""
+    state, near, work, start = walker.state, walker.near, walker.work, walker.start
     me = state.bodies.entity[walker.row]
     for k in range(first, work.hits):
         j, speed = work.hit_row[k], 0.0 - dot(velocity, work.hit_out[k])
@@ -285,19 +289,20 @@ def tell_hits(state, near, work, walker, floor, first, velocity, start, carried,
             known |= work.hit_row[m] == j
         if not known:
             tell(work, HIT, me, state.bodies.entity[j], work.hit_out[k], speed)
-    for k in range(walker.near):
+    for k in range(walker.found):
         j = near.row[k]
         if is_sensor(state, j):
-            met = meets_on_way(state, near, walker, j, start, carried)
-            if met or meets_on_way(state, near, walker, j, carried, stop):
+            met = meets_on_way(walker, j, start, carried)
+            if met or meets_on_way(walker, j, carried, stop):
                 way = sub(stop, start)
                 tell(work, HIT, me, state.bodies.entity[j], divided(way, 0.0 - length(way)), length(way) / dt)
 
 
 @part
-def look_at_hits(state, character, work, walker, wish, in_air, dt):
+def look_at_hits(walker, in_air, dt):
     """Walls, ceilings, and what it pushes."""
-    i, wall, ceiling, pushed, force = walker.row, -1, False, -1, scale(wish, 0.0)
+    state, character, work = walker.state, walker.character, walker.work
+    i, wall, ceiling, pushed, force = walker.row, -1, False, -1, scale(walker.up, 0.0)
     for k in range(work.hits):
         j, hit = work.hit_row[k], work.hit_out[k]
         side = across(hit, walker.up)
@@ -305,7 +310,7 @@ def look_at_hits(state, character, work, walker, wish, in_air, dt):
             wall = j
             character.wall_normal[i] = divided(side, length(side))
         ceiling |= dot(hit, walker.up) < CEILING
-        pushes, given = push(state, character, work, walker, j, hit, wish, dt)
+        pushes, given = push(walker, j, hit, dt)
         if pushes:
             pushed, force = j, given
     character.on_wall[i], character.on_ceiling[i] = wall >= 0, ceiling
@@ -320,16 +325,22 @@ def look_at_hits(state, character, work, walker, wish, in_air, dt):
 
 
 @part
-def look_around(state, near, character, i, start, up, reach):
-    """The walker, with all that is within reach in ``near.row``."""
-    extents, low, high = half_extents(state, state.bodies.shape[i], i), start, start
-    half = item(extents, 0)
+def look_around(state, near, i, start, extents, reach):
+    """How many rows there are within reach, in ``near.row``."""
+    low, high = start, start
     for k in range(len(extents)):
-        half = min(half, item(extents, k))
         low = replace(low, k, item(start, k) - item(extents, k) - reach)
         high = replace(high, k, item(start, k) + item(extents, k) + reach)
-    found, skin, dropping = gather(state, near, i, low, high), character.skin[i], character.since_drop[i] < DROPS_FOR
-    return Walker(i, start, extents, half, up, skin, math.cos(character.max_slope[i]), dropping, found)
+    return gather(state, near, i, low, high)
+
+
+@inlined
+def least(extents):
+    """The smallest of them."""
+    smallest = item(extents, 0)
+    for k in range(len(extents)):
+        smallest = min(smallest, item(extents, k))
+    return smallest
 
 
 @part
@@ -354,34 +365,36 @@ def move_one(state, near, character, ladder, work, i, dt):
         left = floor  # it jumps as the step begins, and what moves stays behind
     reach = (length(velocity) + length(wish) + abs(character.climb[i]) + speed + gravity * dt) * dt + length(ride)
     reach += character.step_height[i] + character.snap[i] + 20.0 * character.skin[i] + NEAR_BY
-    walker = look_around(state, near, character, i, start, up, reach)
+    extents, dropping = half_extents(state, bodies.shape[i], i), character.since_drop[i] < DROPS_FOR
+    walker = Walker(
+        state, near, character, work, i, start, extents, least(extents), up, character.skin[i],
+        math.cos(character.max_slope[i]), dropping, gravity, wish, look_around(state, near, i, start, extents, reach),
+    )  # fmt: skip
     work.hits, work.inside = 0, False
-    at, crusher = carried(state, near, character, work, walker, ride, floor, left, put, rising)
+    at, crusher = carried(walker, ride, floor, left, put, rising)
     begin, first = at, work.hits
     # jumps, and how fast it wants to be
-    climbing = is_on_ladder(state, near, character, ladder, walker, at, before, standing)
+    climbing = is_on_ladder(walker, ladder, at, before, standing)
     kept, lift = scale(ride, 0.0), dot(ride, up) / dt if character.leave[i] != LEAVE_NOTHING else 0.0
     if character.leave[i] == LEAVE_ALL:
         kept = across(scale(ride, 1.0 / dt), up)
-    jumps, level, rising = jump(
-        character, i, standing, climbing, across(velocity, up), rising, kept, lift, speed
-    )
+    jumps, level, rising = jump(walker, standing, climbing, across(velocity, up), rising, kept, lift, speed)
     standing = standing and not jumps and dot(character.floor_normal[i], up) != 0.0  # wedged: it falls in each step
     climbing = climbing and not jumps
     rate = character.acceleration[i] if standing or climbing else character.air_acceleration[i]
     level = towards(character, i, level, wish, rate * dt)
     # its own way
     if climbing:
-        end = climb(state, near, character, work, walker, at, level, dt)
+        end = climb(walker, at, level, dt)
     elif standing:
-        end = walk(state, near, character, work, walker, at, level, kept, lift, dt)
+        end = walk(walker, at, level, kept, lift, dt)
         if end.state == AIR:
             character.since_floor[i] = 0.0
     else:
-        end = fall(state, near, character, work, walker, at, level, rising, gravity, wish, jumps, left, dt)
+        end = fall(walker, at, level, rising, jumps, left, dt)
     at, velocity = end.at, add_scaled(end.level, up, end.rising if end.state != FLOOR else 0.0)
     if work.inside or left >= 0:  # it was put into what rests, or came from behind a chain
-        at, crusher = part_out(state, near, character, work, walker, at, end.rising, -1)
+        at, crusher = part_out(walker, at, end.rising, -1)
     # what it knows then
     if end.state == FLOOR:
         character.since_floor[i], character.jumping[i] = 0.0, False
@@ -390,13 +403,13 @@ def move_one(state, near, character, ladder, work, i, dt):
             tell(work, LANDED, bodies.entity[i], bodies.entity[end.ground], end.out, max(0.0, 0.0 - end.fell))
     else:
         stands_nowhere(character, i)
-    look_at_hits(state, character, work, walker, wish, end.state == AIR, dt)
+    look_at_hits(walker, end.state == AIR, dt)
     by = bodies.entity[crusher] if crusher >= 0 else -1
     if by >= 0:
         velocity = scale(velocity, 0.0)
         if character.crushed[i] < 0:
             tell(work, CRUSHED, bodies.entity[i], by, scale(up, 0.0), 0.0)
     character.crushed[i] = by
-    tell_hits(state, near, work, walker, end.ground, first, end.tried, start, begin, at, dt)
+    tell_hits(walker, end.ground, first, end.tried, begin, at, dt)
     character.state[i], work.velocity[i], character.floor_velocity[i] = end.state, velocity, scale(ride, 1.0 / dt)
     work.place[i] = add(bodies.position[i], sub(at, start))

@@ -19,11 +19,12 @@ Outcome = collections.namedtuple("Outcome", "at level rising state ground out tr
 
 
 @part
-def is_on_ladder(state, near, character, ladder, walker, at, before, standing):
+def is_on_ladder(walker, ladder, at, before, standing):
     """Whether it climbs: it is in a ladder, and did so before or wants to, but not down into the floor."""
+    state, near, character = walker.state, walker.near, walker.character
     wanted = character.climb[walker.row]
     if before == CLIMB or (wanted != 0.0 and not (standing and wanted < 0.0)):
-        for k in range(walker.near if len(ladder.present) > 0 else 0):
+        for k in range(walker.found if len(ladder.present) > 0 else 0):
             j = near.row[k]
             if ladder.present[j] and overlap(state, walker.row, j, at)[0] > 0.0:
                 return True
@@ -31,26 +32,27 @@ def is_on_ladder(state, near, character, ladder, walker, at, before, standing):
 
 
 @part
-def climb(state, near, character, work, walker, at, level, dt):
+def climb(walker, at, level, dt):
     """Where it gets on a ladder."""
+    character = walker.character
     rising = character.climb[walker.row]
     velocity = add_scaled(level, walker.up, rising)
-    to = slide(state, near, character, work, walker, at, scale(velocity, dt), False, False, -1)
+    to = slide(walker, at, scale(velocity, dt), False, False, -1)
     return Outcome(to, level, rising, CLIMB, -1, walker.up, velocity, 0.0)
 
 
 @part
-def step_over(state, near, character, work, walker, at, wish, done, height):
+def step_over(walker, at, wish, done, height):
     """(taken, place) of going over an edge: up, forward and down, if that leads farther than it has done, to a floor
     that is at most so high."""
     up, size = walker.up, length(wish)
-    top = slide(state, near, character, work, walker, at, scale(up, height), False, True, -1)
+    top = slide(walker, at, scale(up, height), False, True, -1)
     level, raised = across(wish, up), dot(sub(top, at), up)
     ahead = divided(level, length(level))
-    over = slide(state, near, character, work, walker, top, scale(ahead, size), False, False, -1)
+    over = slide(walker, top, scale(ahead, size), False, False, -1)
     if dot(sub(over, top), ahead) <= dot(done, ahead) + EXACT:
         return False, at
-    j, gap, _, floor_height = floor_below(state, near, character, work, walker, over, raised)
+    j, gap, _, floor_height = floor_below(walker, over, raised)
     foot = dot(at, up) - walker.skin
     for k in range(len(up)):
         foot -= abs(item(up, k)) * item(walker.half_extents, k)
@@ -60,15 +62,16 @@ def step_over(state, near, character, work, walker, at, wish, done, height):
 
 
 @part
-def walk(state, near, character, work, walker, at, level, kept, lift, dt):
+def walk(walker, at, level, kept, lift, dt):
     """Where it gets on the ground, which may end. kept, lift: what it keeps then of what has carried it."""
+    state, character, work = walker.state, walker.character, walker.work
     up, normal, first = walker.up, character.floor_normal[walker.row], work.hits
     way, work.blocked = scale(along_floor(level, normal, up), dt), -1
-    to = slide(state, near, character, work, walker, at, way, True, False, -1)
+    to = slide(walker, at, way, True, False, -1)
     blocked, high, taken, tried = work.blocked, character.step_height[walker.row], False, level
     if blocked >= 0 and high > 0.0 and not is_dynamic(state, blocked):
         hits = work.hits
-        taken, over = step_over(state, near, character, work, walker, at, way, sub(to, at), high)
+        taken, over = step_over(walker, at, way, sub(to, at), high)
         if taken:
             to = over
         work.hits = hits
@@ -76,9 +79,9 @@ def walk(state, near, character, work, walker, at, level, kept, lift, dt):
     if not taken and work.hits > first and length(gone) < (1.0 - SLOWER) * length(way):
         ahead = across(gone, up)  # as fast as it got along the floor
         level = scale(ahead, length(gone) / (dt * max(length(ahead), EXACT)))
-    j, gap, out, _ = floor_below(state, near, character, work, walker, to, character.snap[walker.row])
+    j, gap, out, _ = floor_below(walker, to, character.snap[walker.row])
     if j >= 0:
-        to = lowered(state, near, character, work, walker, to, gap)
+        to = lowered(walker, to, gap)
         return Outcome(to, level, 0.0, FLOOR, j, out, tried, 0.0)
     velocity = along_floor(level, normal, up)
     rising = dot(velocity, up) + max(lift, 0.0 - character.max_fall[walker.row])
@@ -86,16 +89,17 @@ def walk(state, near, character, work, walker, at, level, kept, lift, dt):
 
 
 @part
-def fall(state, near, character, work, walker, at, level, rising, gravity, wish, jumped, ignored, dt):
+def fall(walker, at, level, rising, jumped, ignored, dt):
     """Where it gets in the air, on the parabola, and whether it has landed."""
+    character, work = walker.character, walker.work
     i, up, max_fall, first = walker.row, walker.up, character.max_fall[walker.row], work.hits
-    start, rising = rising, max(rising - gravity * dt, 0.0 - max_fall)
+    start, rising = rising, max(rising - walker.gravity * dt, 0.0 - max_fall)
     slowest = character.wall_slide[i]
-    if slowest == slowest and character.on_wall[i] and dot(wish, character.wall_normal[i]) < 0.0:
+    if slowest == slowest and character.on_wall[i] and dot(walker.wish, character.wall_normal[i]) < 0.0:
         rising = max(rising, 0.0 - slowest)
     tried, fell = add_scaled(level, up, 0.5 * (start + rising)), rising
     way = scale(tried, dt)
-    to = slide(state, near, character, work, walker, at, way, False, False, ignored)
+    to = slide(walker, at, way, False, False, ignored)
     velocity, steep = add_scaled(level, up, rising), False
     for k in range(first, work.hits):
         hit, rise = work.hit_out[k], dot(work.hit_out[k], up)
@@ -105,10 +109,10 @@ def fall(state, near, character, work, walker, at, level, rising, gravity, wish,
     level, rising = across(velocity, up), dot(velocity, up)
     now, ground, normal = AIR, -1, up
     if not jumped and (rising <= EXACT or work.hits > first):
-        j, gap, out, _ = floor_below(state, near, character, work, walker, to, 2.0 * walker.skin)
+        j, gap, out, _ = floor_below(walker, to, 2.0 * walker.skin)
         stayed = length(sub(to, at)) < 1e-3 * length(way) + 1e-6
-        if j >= 0 and dot(velocity, out) <= gravity * dt + EXACT:  # no more than falls back in a step
-            to = lowered(state, near, character, work, walker, to, gap)
+        if j >= 0 and dot(velocity, out) <= walker.gravity * dt + EXACT:  # no more than falls back in a step
+            to = lowered(walker, to, gap)
             now, ground, normal = FLOOR, j, out
         elif rising > EXACT:
             now = AIR

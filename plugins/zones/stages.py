@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import math
 
 from ...components.spin import Spin
@@ -160,19 +161,24 @@ def upwards(state):
     return (-item(gravity, 0) / size, -item(gravity, 1) / size, z), size
 
 
+# Of a zone of water: its row and half extents, where up is, its heights along that, and how strong gravity is.
+Surface = collections.namedtuple("Surface", "zone half up top bottom gravity")
+
+
 @part
-def add_water(state, water, zones, j, half, i, up, top, bottom, g):
+def add_water(state, water, zones, i, surface):
     """What a body displaces of a zone, and how that turns it."""
     bodies, o = state.bodies, owner_of(state, i)
-    volume, middle = submerged(state, i, up, top, bottom)
+    j, up = surface.zone, surface.up
+    volume, middle = submerged(state, i, up, surface.top, surface.bottom)
     if not volume > 0.0:  # nor is there one of what has no extent
         return
-    mass = water.density[j] * volume * overlap_across(state, j, half, i, up)
+    mass = water.density[j] * volume * overlap_across(state, j, surface.half, i, up)
     rate, arm = water.drag[j] * mass / bodies.mass[o], sub(bodies.position[i], bodies.position[o])
     zones.displaced[o] += mass
     zones.rate[o] += rate
     zones.flow[o] = add_scaled(zones.flow[o], water.flow[j], rate)
-    lift, last = g * mass * bodies.gravity_scale[o], len(arm) - 1
+    lift, last = surface.gravity * mass * bodies.gravity_scale[o], len(arm) - 1
     x, y = middle[0] + item(arm, 0), middle[1] + item(arm, 1)
     z = middle[2] + (item(arm, last) if last == 2 else 0.0)
     zones.torque[o, 0] += lift * (y * up[2] - z * up[1])
@@ -206,7 +212,7 @@ def lift(state, dt, water, zones):
         for i in range(state.force_first, state.dynamic):
             o = owner_of(state, i)
             if state.force_first <= o < state.dynamic and is_in(state, j, half, i):
-                add_water(state, water, zones, j, half, i, up, height + reach, height - reach, g)
+                add_water(state, water, zones, i, Surface(j, half, up, height + reach, height - reach, g))
     for i in range(state.force_first, state.dynamic):
         if zones.displaced[i] > 0.0:
             force, by = bodies.force[i], g * zones.displaced[i] * bodies.gravity_scale[i]

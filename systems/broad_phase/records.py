@@ -77,7 +77,8 @@ TREE = Schema(
     keys=ints("int32"),
     order=ints("int32"),  # rows
     cells=ints("int32"),
-    boxes=table("float64", 2, per_dimension=True),  # boxes[i, k] the lower corner, boxes[i, d + k] the upper one
+    # boxes[i, k] the lower corner, boxes[i, d + k] the upper one
+    boxes=table("float64", 2, per_dimension=True, unit="m"),
     codes=ints(),  # boxes in small integers
     # pairs: owner, begin, end of what may overlap it
     range_count=integer(),

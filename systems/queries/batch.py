@@ -27,7 +27,7 @@ def slices_of(count: int) -> Iterator[slice]:
         yield slice(start, min(start + MOST_QUERIES, count))
 
 
-def rows_of(values: Any, some: slice) -> Any:
+def some_rows(values: Any, some: slice) -> Any:
     """Those rows of an array; of one value for all, that."""
     return values[some] if isinstance(values, np.ndarray) else values
 
@@ -63,7 +63,7 @@ class QueryBatch:
     def ask(self, count: int, some: slice, wanted: Wanted) -> int:
         """Write what those queries look for, to the first rows; returns how many entities each leaves out."""
         record, each = self.record, wanted.excluded.shape[1]
-        record.mask[:count], record.one_way = rows_of(wanted.masks, some), wanted.one_way
+        record.mask[:count], record.one_way = some_rows(wanted.masks, some), wanted.one_way
         if each:
             if len(record.excluded) < count * each:
                 record.excluded = np.zeros(count * each, np.int64)

@@ -28,7 +28,7 @@ BEYOND_ROUNDING = 1e-12  # of a distance: more than all rounding
 LONGEST_SPAN = 1e200  # m; on the way past bodies without end
 SPAN_RATIO = 1e6  # the way that a sweep is given may be so many times longer than needed
 MOST_SHIFTS = 8  # off what is left, before the shape counts as wedged in
-STRIDE, MOST_STRIDES = 0.2, 1000  # of the size of a shape that is wedged in; at most so many
+LOOK_AHEAD, MOST_STRIDES_AHEAD = 0.2, 1000  # of the size of a shape that is wedged in; at most so many
 
 # start: centre of the query's shape; direction: unit vector; inverse: 1 / direction; half: half extents, with room for
 # rounding.
@@ -194,7 +194,7 @@ def touch_of_wedged(state, batch, q, i, path, reach):
     away, shape, size = to_collider(state, path.start, i), state.bodies.shape[i], math.inf
     for k in range(len(away)):
         size = min(size, 2.0 * item(path.half, k))
-    stride = max(STRIDE * size, reach / MOST_STRIDES)
+    stride = max(LOOK_AHEAD * size, reach / MOST_STRIDES_AHEAD)
     low, high, t, looks, inside, normal, point = 0.0, math.inf, 0.0, 0, 0.0, away, away
     while low < t < high or looks == 0:
         d = add_scaled(away, path.direction, 0.0 - t)

@@ -19,7 +19,7 @@ from ..broad_phase.search import CandidateSearch
 from ..broad_phase.tree.tree import SpatialTree
 from ..scene import Scene
 from ..shapes.attribution import ErrorAttribution
-from .batch import CollectedHits, QueryBatch, QueryShape, joined, rows_of, slices_of
+from .batch import CollectedHits, QueryBatch, QueryShape, joined, slices_of, some_rows
 from .kernels import query_kernels
 from .neighbours import ALL_LAYERS
 
@@ -227,7 +227,7 @@ class Queries:
         queries, count = self._batch.record, some.stop - some.start
         shape.bind({name: column[some] for name, column in columns.items()}, count)
         queries.centre[:count] = positions[some] + columns["offset"][some]
-        queries.layer[:count], queries.group[:count] = rows_of(wanted.layers, some), rows_of(wanted.groups, some)
+        queries.layer[:count], queries.group[:count] = some_rows(wanted.layers, some), some_rows(wanted.groups, some)
         return self._batch.ask(count, some, wanted)
 
     def _cast(
