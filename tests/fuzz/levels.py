@@ -202,7 +202,7 @@ def level_2d(level: Level) -> None:
     if rng.random() < 0.4:
         x = np.linspace(1.2, wide - 1.2, 24)
         hills = 1.0 + rng.uniform(0, 0.8) * (1 + np.sin(x * rng.uniform(0.3, 2.0)))
-        level.lowest = lambda place: float(np.interp(place[0], x, hills))
+        level.lowest = lambda place: float(np.interp(place[0], x, hills)) + 0.9
         create_chain(level.world, np.stack((x, hills), 1), layer=SOLID, thickness=1.5)
 
 
@@ -332,9 +332,10 @@ class Play:
         self.still = np.where((moved < STILL) & free, self.still + 1, 0)
         for k in np.flatnonzero(self.still == RESTS):
             at = f"at {places[k].round(5)}, velocity {np.round(me.velocity[self.rows[k]], 4)}"
-            if state[k] in (AIR, STEEP):
+            pressed = self.wish[k].any() and self.is_blocked(k, places[k])  # into a notch, say, which holds it
+            if state[k] in (AIR, STEEP) and not pressed and not self.jumps[k]:
                 self.complain("floats", k, at)
-            elif state[k] == FLOOR and self.wish[k].any() and not self.is_blocked(k, places[k]):
+            elif state[k] == FLOOR and self.wish[k].any() and not pressed:
                 self.complain("stuck", k, f"{at}, wish {self.wish[k].round(3)}")
         idle = (state == FLOOR) & ~self.wish.any(axis=1) & ~self.jumps & ~self.drops & (self.climbs == 0.0) & free
         rests = np.array([entity >= 0 and self.is_still(entity) for entity in floor.tolist()], bool)
