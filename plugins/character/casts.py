@@ -117,7 +117,7 @@ def ground_kind(walker, out, at, point):
     if rise < STEEPEST:
         return STEEP_GROUND
     if sine > EDGE_SINE and arm > 0.0:
-        step = LEAN * walker.half
+        step = min(LEAN * walker.half, 0.5 * arm)  # not past an edge
         lift = 2.0 * step / max(rise, 0.1)
         to = add_scaled(add_scaled(at, level, 0.0 - step / sine), walker.up, lift)
         turned = nearest_normal(walker, to, lift)
