@@ -16,9 +16,12 @@ from carom.components import AABBCollider, Collider, RigidBody, SphereCollider, 
 from carom.framework import ForceSystem, Plugin, Settings, World, column
 from carom.framework.vectors import item, replace, scale
 from carom.plugins import Physics, capsule, convex_polygon, half_space, terrain, tile_grid
+from carom.plugins.capsule import CapsuleCollider
+from carom.plugins.character import Character, Characters, Ladder
 from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Motor, MousePull, Slider, Weld
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 from carom.plugins.springs import Springs
+from carom.plugins.zones import Field, Water, Wind, Zones, explode
 
 MODES = ("discrete", "continuous", "event_driven")
 METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
@@ -331,6 +334,54 @@ def sleepers(d: int, mode: str) -> list[str]:
     return found
 
 
+def characters(d: int) -> list[str]:
+    """Heroes that jump, ride, climb, push, fall through, stand on each other and are crushed."""
+    rng = np.random.default_rng(d)
+    world = World(Physics(d, gravity=at(d, 0, -30)), capsule.plugin, Rotation(), Characters())
+    sides = (*at(d, 9, 0.5), 9)[:d]
+    world.create_entity(Transform(at(d, 0, -0.5)), AABBCollider(sides, surface_velocity=at(d, 0.5)))
+    world.create_entity(Transform(at(d, -3, 1.5)), AABBCollider(at(d, 0.5, 1.5, 9)))
+    world.create_entity(Transform(at(d, 2.5, 0.1)), AABBCollider(at(d, 0.6, 0.1, 9)))
+    world.create_entity(Transform(at(d, -1, 1.9)), AABBCollider(at(d, 1, 0, 1), one_way=at(d, 0, 1)))
+    world.create_entity(Transform(at(d, 0.3, 2)), AABBCollider(at(d, 0.4, 2, 1), sensor=True), Ladder())
+    world.create_entity(Transform(at(d, 4.5, 0.5)), RigidBody(), Spin(), BoxCollider(0.5, friction=0.5))
+    turn = -0.4 if d == 2 else (math.cos(0.2), 0.0, 0.0, -math.sin(0.2))
+    world.create_entity(Transform(at(d, 6.5, 0.3), turn), BoxCollider(at(d, 1, 0.4, 2)))
+    lift = RigidBody(kind="kinematic", linear_velocity=at(d, 0, 2))
+    world.create_entity(Transform(at(d, -1.5, -0.3)), lift, AABBCollider(at(d, 0.7, 0.3, 1)))
+    press = RigidBody(kind="kinematic", linear_velocity=at(d, 0, -2))
+    world.create_entity(Transform(at(d, 6.8, 3)), press, AABBCollider(at(d, 0.7, 0.3, 1)))
+    for x in (-2.3, -1.5, 0.3, 1.3, 3.4, 6.8):
+        own = Character(wall_slide=2.0, wall_jump=5.0, air_jumps=1, jump_cut=0.5, pushable=x > 0, weight=20.0)
+        shape = CapsuleCollider(0.3, 0.3) if x > 1 else AABBCollider(at(d, 0.3, 0.6, 0.3))
+        world.create_entity(Transform(at(d, x, 0.9)), RigidBody(kind="kinematic"), shape, own)
+    found, me = [], world.bodies.character
+    for step in range(45 if d == 2 else 24):
+        if step % 6 == 0:
+            heroes = len(me.climb)
+            me.move[:] = rng.uniform(-5, 5, me.move.shape)
+            me.climb[:], me.drop[:] = rng.uniform(-3, 3, heroes), rng.random(heroes) < 0.3
+            me.jump[:] = rng.random(heroes) < 0.5
+        world.step()
+        found.append(seen(world))
+    return found
+
+
+def zones(d: int) -> list[str]:
+    """What floats, is blown and attracted; an explosion."""
+    world = World(Physics(d, gravity=at(d, 0, -10)), capsule.plugin, Rotation(), Zones())
+    for x, component in ((0, Water(400.0, flow=0.5)), (0, Wind(at(d, 2.0))), (3, Field(4.0))):
+        world.create_entity(Transform(at(d, x)), AABBCollider(at(d, 5, 3, 5), sensor=True), component)
+    turn = 0.5 if d == 2 else (math.cos(0.25), 0.0, 0.6 * math.sin(0.25), 0.8 * math.sin(0.25))
+    shapes = SphereCollider(0.5), AABBCollider(0.4), BoxCollider(at(d, 0.6, 0.3, 0.5)), CapsuleCollider(0.3, 0.4)
+    for k, shape in enumerate(shapes):
+        spin = (Spin(),) if k > 1 else ()
+        place = Transform(at(d, 2 * k - 3, 2.8), turn if k > 1 else 0.0)
+        world.create_entity(place, RigidBody(mass=90.0), *spin, shape)
+    found = play(world, 3)
+    return [*found, str(explode(world, at(d, 0, 1), 4.0, 50.0, shielded=True)), *play(world, 2)]
+
+
 def scenarios() -> Iterator[tuple[str, Callable[[], list[str]]]]:
     """By name; calling one plays it."""
     for d, mode in itertools.product((2, 3), MODES):
@@ -355,6 +406,8 @@ def scenarios() -> Iterator[tuple[str, Callable[[], list[str]]]]:
         yield f"asked {d}D", lambda d=d: asked(d)
         yield f"tumbling {d}D", lambda d=d: play(tumbling(d, MODES[d - 2]), 12 - 3 * d)
         yield f"joined {d}D", lambda d=d: play(joined(d, MODES[0]), 12 - 3 * d)
+        yield f"characters {d}D", lambda d=d: characters(d)
+        yield f"zones {d}D", lambda d=d: zones(d)
         yield f"ground {d}D", lambda d=d: play(ground(d, MODES[d - 2]), 9 - 2 * d)
     for d, mode in zip((2, 3, 2), MODES, strict=True):
         yield f"sleepers {d}D {mode}", lambda d=d, mode=mode: sleepers(d, mode)

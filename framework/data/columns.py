@@ -369,6 +369,7 @@ def column(
     optional: bool = False,
     choices: tuple[str, ...] = (),
     kw_only: bool = False,
+    init: bool = True,
     unit: str = "",
 ) -> Any:
     """A field of a component: one number per entity (or one vector: ``item="vector"``), stored as a column.
@@ -382,8 +383,8 @@ def column(
         ``float``, ``int`` or ``bool``
     positive, minimum, optional, choices
         checks: above zero; not below; None allowed; one of these strings
-    kw_only
-        whether the constructor takes it by name only
+    kw_only, init
+        whether the constructor takes it by name only, and whether it takes it at all
     unit
         "m", "N s"; "1" of a ratio: printed by ``world.plan()``
 
@@ -399,14 +400,13 @@ def column(
         raise ValueError(f"column dtype must be float, int or bool, got {dtype!r}")
     return Column(
         default=default, item=item, dtype=dtype, positive=positive, minimum=minimum, optional=optional, choices=choices,
-        kw_only=kw_only, unit=unit,
+        kw_only=kw_only, constructor=init, unit=unit,
     )  # fmt: skip
 
 
 def special_column(
     default: Any = REQUIRED,
     *,
-    init: bool = True,
     kw_only: bool = False,
     on_demand: bool = False,
     on_write: Callable[[Any, int], None] | None = None,
@@ -417,9 +417,9 @@ def special_column(
     also: tuple[str, ...] = (),
     **options: Any,
 ) -> Any:
-    """A column with what only the built-in components use, see :class:`Column`; ``init``: ``Column.constructor``."""
+    """A column with what only the built-in components use, see :class:`Column`."""
     return replace(
         column(default, kw_only=kw_only, **options),
-        constructor=init, on_demand=on_demand, on_write=on_write, largest=largest, nonzero=nonzero,
+        on_demand=on_demand, on_write=on_write, largest=largest, nonzero=nonzero,
         cure=cure, layers=layers, also=also,
     )  # fmt: skip

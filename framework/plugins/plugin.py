@@ -76,6 +76,7 @@ class Plugin:
         self.stages: dict[str, PluginStage] = {}
         self.joints: dict[type[Component], Any] = {}
         self.systems: list[Callable[[], Any]] = []
+        self.around_step: dict[str, list[Callable[[Any], None]]] = {"before_step": [], "after_step": []}
         self.registries: weakref.WeakSet[Registry] = weakref.WeakSet()  # of the worlds it is in
 
     # -- shapes and pairs -------------------------------------------------------------------------
@@ -305,6 +306,22 @@ class Plugin:
                 self._add_systems(registry.world, [make])
         return make
 
+    def before_step(self, function: Thing) -> Thing:
+        """Register ``function(world)``, called before each step in which code of the game runs, or bodies or components
+        have changed; if it raises, the step does not begin. PluginError for what cannot be called."""
+        return self._around_step("before_step", function)
+
+    def after_step(self, function: Thing) -> Thing:
+        """Register ``function(world)``, called at the end of each step in which code of the game runs, handlers among
+        it, after all systems and stages; if it raises, the step is undone. PluginError for what cannot be called."""
+        return self._around_step("after_step", function)
+
+    def _around_step(self, when: str, function: Thing) -> Thing:
+        if not callable(function):
+            raise PluginError(f"plugin {self.name}: {when} takes a function (world), got {function!r}")
+        self.around_step[when].append(function)
+        return function
+
     # -- being taken by a world -------------------------------------------------------------------
 
     def install(self, world: Any) -> None:
@@ -316,6 +333,9 @@ class Plugin:
             own = "plugin" if type(self) is Plugin else f"{type(self).__name__}()"
             raise NoPhysicsError(f"plugin {self.name} needs physics before it: World(Physics(...), {own})")
         self._add_systems(world, self.systems)
+        if world.physics is not None:
+            world.physics.plugin_stages.followers += self.around_step["before_step"]
+            world.physics.plugin_stages.finishers += self.around_step["after_step"]
 
     # -- snapshots --------------------------------------------------------------------------------
 

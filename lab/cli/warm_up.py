@@ -138,6 +138,7 @@ def prepare_shipped_plugins(dimensions: int) -> None:
     plugins = [plugin for plugin in SHIPPED if any(dimensions in shape.dimensions for shape in plugin.shapes)]
     shapes = [shape for plugin in plugins for shape in plugin.shapes if dimensions in shape.dimensions]
     with closing(World(Physics(dimensions=dimensions), *plugins)) as world:
+        world.create_entity(Transform((0.0,) * dimensions), AABBCollider(1.0, one_way=1.0))
         world.prepare(SphereCollider, AABBCollider, *shapes)
 
 

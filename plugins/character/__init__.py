@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...components.spin import Spin
-from ...framework import Plugin, World
+from ...framework import Plugin
 from ...systems.queries.compiled import NEAR
 from .checks import CharacterCheck
 from .component import WRITTEN, Character, Ladder
@@ -30,6 +30,8 @@ class Characters(Plugin):
         self.component(Character)
         self.component(Ladder)
         self.event(*EVENTS.values())
+        self.before_step(CharacterCheck(Character))
+        self.after_step(tell_events)
         settings = tuple(f"character.{name}" for name in Character.columns if name not in WRITTEN)
         known = tuple(f"character.{name}" for name in WRITTEN)
         self.stage(after="sum_forces", records=(Character,), reads=(*settings, *known), writes=("force",))(press_bodies)
@@ -42,13 +44,6 @@ class Characters(Plugin):
             reads=("tree", "static_tree", "grid", "static_grid", "rotation", *settings),
             writes=("position", "linear_velocity", *known),
         )(move_characters)  # fmt: skip
-
-    def install(self, world: World) -> None:
-        """Called by the world; NoPhysicsError if it has none."""
-        super().install(world)
-        physics: Any = world.physics
-        physics.plugin_stages.followers.append(CharacterCheck(Character))
-        physics.plugin_stages.finishers.append(tell_events)
 
 
 def tell_events(world: Any) -> None:

@@ -6,8 +6,18 @@ import math
 
 from ...framework.compilation import inlined, part
 from ...framework.vectors import add, add_scaled, dot, item, length, negative, scale, sub
-from ...systems.narrow_phase.one_way import front_of, is_from_front, is_one_way
-from ...systems.queries.compiled import Path, box_interval, cast, inverse_of, is_sensor, overlap, to_collider
+from ...systems.queries.compiled import (
+    Path,
+    box_interval,
+    cast,
+    front_of,
+    inverse_of,
+    is_from_front,
+    is_one_way,
+    is_sensor,
+    overlap,
+    to_collider,
+)
 from .records import EXACT
 
 REACH = 10.0  # skins that a cast looks beyond its way

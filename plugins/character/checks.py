@@ -33,11 +33,11 @@ class CharacterCheck:
     """Before a step, when bodies or their components have changed: ValueError for what became of a character."""
 
     def __init__(self, character: type[Any]) -> None:
-        self._character, self._seen = character, (-1, -1)
+        self._character, self._seen = character, ("", -1, -1)
 
     def __call__(self, world: Any) -> None:
         table = world.physics.table
-        version = table.version, table.members_version
+        version = world.name, table.version, table.members_version
         if version == self._seen:
             return
         count, (first, stop) = table.count, table.stops[:2]

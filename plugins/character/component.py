@@ -43,7 +43,7 @@ class UpColumn(Column):
 
 def known(default: Any = 0.0, **options: Any) -> Any:
     """A column that the plugin writes."""
-    return special_column(default, init=False, **options)
+    return column(default, init=False, **options)
 
 
 class Ladder(Component):

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from ...framework.compilation import inlined, part
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, scale, sub
-from ...systems.narrow_phase.one_way import front_of, is_from_front, is_one_way
-from ...systems.queries.compiled import is_sensor, overlap
+from ...systems.queries.compiled import front_of, is_from_front, is_one_way, is_sensor, overlap
 from .casts import REACH, SLOPE, across, cast_near, deepest, ground_kind, is_dynamic
 from .records import EXACT, MOST_HITS, SLIDES
 

@@ -6,10 +6,7 @@ import math
 
 from ...framework.compilation import inlined, part
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, scale, sub
-from ...systems.narrow_phase.one_way import is_one_way
-from ...systems.queries.compiled import is_sensor, make_gather, meets
-from ...systems.shapes.dispatch import half_extents
-from ...systems.shapes.surfaces import along_world, any_surface_runs
+from ...systems.queries.compiled import half_extents_of, is_one_way, is_sensor, make_gather, meets, surface_velocity_of
 from .casts import across, deepest, is_dynamic, meets_on_way
 from .records import (
     AIR,
@@ -131,10 +128,7 @@ def ride_of(state, character, i, at, floor, up, dt):
             if turns:
                 arm = sub(at, then)
                 ride = add(ride, sub(turned(arm, character.floor_x[i], character.floor_y[i], x, y), arm))
-    if any_surface_runs(state):
-        surface = state.colliders.surface_velocity[state.bodies.collider_slot[floor], floor]
-        ride = add_scaled(ride, across(along_world(state, floor, surface), character.floor_normal[i]), dt)
-    return ride
+    return add_scaled(ride, across(surface_velocity_of(state, floor), character.floor_normal[i]), dt)
 
 
 @inlined
@@ -365,7 +359,7 @@ def move_one(state, near, character, ladder, work, i, dt):
         left = floor  # it jumps as the step begins, and what moves stays behind
     reach = (length(velocity) + length(wish) + abs(character.climb[i]) + speed + gravity * dt) * dt + length(ride)
     reach += character.step_height[i] + character.snap[i] + 20.0 * character.skin[i] + NEAR_BY
-    extents, dropping = half_extents(state, bodies.shape[i], i), character.since_drop[i] < DROPS_FOR
+    extents, dropping = half_extents_of(state, i), character.since_drop[i] < DROPS_FOR
     walker = Walker(
         state, near, character, work, i, start, extents, least(extents), up, character.skin[i],
         math.cos(character.max_slope[i]), dropping, gravity, wish, look_around(state, near, i, start, extents, reach),

@@ -11,10 +11,15 @@ from collections.abc import Callable
 from typing import Any
 
 from ...framework.compilation import inlined, part
+from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.records.schema import Schema, integer, ints, number, vectors
 from ...framework.vectors import negative
+from ..narrow_phase.one_way import front_of as front_of
+from ..narrow_phase.one_way import is_from_front as is_from_front
+from ..narrow_phase.one_way import is_one_way as is_one_way
 from ..narrow_phase.stages import layers_meet
-from ..shapes.dispatch import evaluate, sweep
+from ..shapes.dispatch import evaluate, half_extents, sweep
+from ..shapes.surfaces import along_world, any_surface_runs
 from ..step_stages import FEW_BODIES
 from .candidates import is_box_near, make_find_all, order_by_entity
 from .candidates import to_collider as to_collider
@@ -40,6 +45,20 @@ NEAR = Schema(
 def meets(state, i, j):
     """Whether rows i and j have shapes whose layers, masks and groups let them meet."""
     return i != j and state.bodies.shape[j] >= 0 and layers_meet(state, i, j)
+
+
+@inlined
+def half_extents_of(state, i):
+    """Half extents of the box around row i's shape."""
+    return half_extents(state, state.bodies.shape[i], i)
+
+
+@part
+def surface_velocity_of(state, i):
+    """At which the surface of row i runs, m/s along the axes of the world."""
+    if not any_surface_runs(state):
+        return zero_of(state)
+    return along_world(state, i, state.colliders.surface_velocity[state.bodies.collider_slot[i], i])
 
 
 @inlined

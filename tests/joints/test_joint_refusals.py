@@ -59,7 +59,7 @@ def test_numbers_that_no_step_can_take_are_refused_with_their_field(number):
         (lambda: MousePull(1, grip=(0, number), target=(0, 0)), "MousePull.grip"),
         (lambda: Weld(1, 2, anchor=(number, 0)), "Weld.anchor"),
     ):
-        with pytest.raises(ValueError, match=rf"{field} must be at most 1e\+15, got"):
+        with pytest.raises(ValueError, match=rf"{field} must be at most 1e\+15( along each axis)?, got"):
             make()
     world, _ = joint_world()
     pull = MousePull(disc(world, (0, 0)), grip=(0, 0), target=(1, 0), max_force=number)

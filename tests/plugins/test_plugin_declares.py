@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from carom.components import RigidBody, Transform
-from carom.framework import Component, NoPhysicsError, Phase, Plugin, PluginError, System, World, column
+from carom.framework import Component, NoPhysicsError, Phase, Plugin, PluginError, StepError, System, World, column
 from carom.framework.jit.records.schema import Schema, flag, floats, number
 from carom.plugins import Physics
 
@@ -133,3 +133,26 @@ def test_what_a_world_cannot_have_is_refused_and_changes_nothing():
         world.create_entity(Transform((0, 0)), RigidBody(), Fuse())
         world.step()
         assert np.isclose(world.bodies.fuse.left[0], 2.0 - world.settings.dt)
+
+
+def test_functions_run_before_and_after_a_step_and_what_they_raise_undoes_it():
+    plugin, said = Plugin("around"), []
+    plugin.before_step(lambda world: said.append(("before", world.step_count)))
+
+    @plugin.after_step
+    def end(world):
+        said.append(("after", world.bodies.position[0, 0]))
+        if world.step_count == 1:
+            raise ValueError("not this one")
+
+    with World(Physics(dimensions=2), plugin) as world:
+        world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(60, 0)))
+        world.on("contact_begin", lambda *_: None)  # code of the game
+        world.step()
+        assert said == [("before", 0), ("after", pytest.approx(1.0))]
+        with pytest.raises(StepError, match="not this one"):
+            world.step()
+        assert world.step_count == 1
+        assert world.bodies.position[0, 0] == pytest.approx(1.0)
+    with pytest.raises(PluginError, match=r"plugin around: after_step takes a function \(world\), got 3"):
+        plugin.after_step(3)
