@@ -6,7 +6,7 @@ import pytest
 from fuzz.levels import play
 
 both = pytest.mark.parametrize("d", [2, 3])
-QUICK, STEPS, MANY = 150, 60, 5000
+QUICK, STEPS, MANY = {2: 100, 3: 50}, 60, 5000  # levels, each with four characters
 
 
 def wrong(d: int, first: int, stop: int, steps: int) -> dict[int, dict[str, str]]:
@@ -18,10 +18,10 @@ def wrong(d: int, first: int, stop: int, steps: int) -> dict[int, dict[str, str]
 @both
 @pytest.mark.slow
 def test_characters_never_float_stick_jitter_or_come_into_walls(d):
-    assert wrong(d, 0, QUICK, STEPS) == {}
+    assert wrong(d, 0, QUICK[d], STEPS) == {}
 
 
 @both
 @pytest.mark.long
 def test_nor_in_thousands_of_levels(d):
-    assert wrong(d, QUICK, MANY, 250) == {}
+    assert wrong(d, QUICK[d], MANY, 250) == {}

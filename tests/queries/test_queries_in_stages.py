@@ -81,7 +81,7 @@ class Shuffle(System):
 
 
 @pytest.mark.parametrize("count", [30, 300])
-@pytest.mark.parametrize("dimensions", [2, 3])
+@pytest.mark.parametrize("dimensions", [2, pytest.param(3, marks=pytest.mark.long)])
 def test_stages_find_what_queries_find(dimensions, count):
     rng = np.random.default_rng(57 + count)
     with World(Physics(dimensions, gravity=0.0), probes) as world:
