@@ -19,8 +19,10 @@ from carom.plugins import Physics, capsule, convex_polygon, half_space, terrain,
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.character import Character, Characters, Ladder
 from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Motor, MousePull, Slider, Weld
+from carom.plugins.paths import Path, Paths
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 from carom.plugins.springs import Springs
+from carom.plugins.timers import Timer, Timers
 from carom.plugins.zones import Field, Water, Wind, Zones, explode
 
 MODES = ("discrete", "continuous", "event_driven")
@@ -379,7 +381,24 @@ def zones(d: int) -> list[str]:
         place = Transform(at(d, 2 * k - 3, 2.8), turn if k > 1 else 0.0)
         world.create_entity(place, RigidBody(mass=90.0), *spin, shape)
     found = play(world, 3)
-    return [*found, str(explode(world, at(d, 0, 1), 4.0, 50.0, shielded=True)), *play(world, 2)]
+    return [*found, *map(str, explode(world, at(d, 0, 1), 4.0, 50.0, shielded=True)), *play(world, 2)]
+
+
+def clockwork(d: int) -> list[str]:
+    """Paths and timers, of bodies and of others, gone back to once."""
+    world = World(Physics(d), Timers(), Paths(), settings=Settings(dt=0.1))
+    for k, mode in enumerate(("back_and_forth", "loop", "once")):
+        path = Path([at(d, k), at(d, k, 1), at(d, k + 1, 1)], 2.0, mode=mode, ease=k == 1)
+        body = RigidBody(kind="kinematic")
+        world.create_entity(Transform(at(d, k, -0.3 * k)), body, SphereCollider(0.2), path, Timer(0.25, repeat=k > 0))
+        world.create_entity(Timer(0.35, repeat=k == 2))
+    rung: list[int] = []
+    world.on("timer", lambda entity, timer: rung.append(entity))
+    found, kept = play(world, 8), world.snapshot()
+    again = play(world, 6)
+    world.restore(kept)
+    assert play(world, 6) == again
+    return [*found, *again, *map(str, rung)]
 
 
 def scenarios() -> Iterator[tuple[str, Callable[[], list[str]]]]:
@@ -408,6 +427,7 @@ def scenarios() -> Iterator[tuple[str, Callable[[], list[str]]]]:
         yield f"joined {d}D", lambda d=d: play(joined(d, MODES[0]), 12 - 3 * d)
         yield f"characters {d}D", lambda d=d: characters(d)
         yield f"zones {d}D", lambda d=d: zones(d)
+        yield f"clockwork {d}D", lambda d=d: clockwork(d)
         yield f"ground {d}D", lambda d=d: play(ground(d, MODES[d - 2]), 9 - 2 * d)
     for d, mode in zip((2, 3, 2), MODES, strict=True):
         yield f"sleepers {d}D {mode}", lambda d=d, mode=mode: sleepers(d, mode)

@@ -6,7 +6,14 @@ import math
 
 from ...framework.compilation import inlined, part
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, scale, sub
-from ...systems.queries.compiled import half_extents_of, is_one_way, is_sensor, make_gather, meets, surface_velocity_of
+from ...systems.queries.compiled import (
+    half_extents_of_row,
+    is_one_way,
+    is_sensor,
+    make_gather,
+    meets,
+    surface_velocity_of,
+)
 from .casts import across, deepest, is_dynamic, meets_on_way
 from .records import (
     AIR,
@@ -359,7 +366,7 @@ def move_one(state, near, character, ladder, work, i, dt):
         left = floor  # it jumps as the step begins, and what moves stays behind
     reach = (length(velocity) + length(wish) + abs(character.climb[i]) + speed + gravity * dt) * dt + length(ride)
     reach += character.step_height[i] + character.snap[i] + 20.0 * character.skin[i] + NEAR_BY
-    extents, dropping = half_extents_of(state, i), character.since_drop[i] < DROPS_FOR
+    extents, dropping = half_extents_of_row(state, i), character.since_drop[i] < DROPS_FOR
     walker = Walker(
         state, near, character, work, i, start, extents, least(extents), up, character.skin[i],
         math.cos(character.max_slope[i]), dropping, gravity, wish, look_around(state, near, i, start, extents, reach),

@@ -48,7 +48,7 @@ def meets(state, i, j):
 
 
 @inlined
-def half_extents_of(state, i):
+def half_extents_of_row(state, i):
     """Half extents of the box around row i's shape."""
     return half_extents(state, state.bodies.shape[i], i)
 

@@ -25,8 +25,6 @@ from carom import (
 )
 from carom.plugins.paths import MODES as ENDS
 
-pytestmark = pytest.mark.plain
-
 SQUARE = [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0)]
 
 

@@ -24,8 +24,6 @@ from carom import (
 )
 from carom.plugins.timers import FireTimers, StartTimers
 
-pytestmark = pytest.mark.plain
-
 KINDS = ("loose", "dynamic", "kinematic", "static")
 
 
