@@ -107,6 +107,7 @@ def test_a_tween_strikes_with_its_true_speed(d, mode):
         pytest.fail("it was not struck")
 
 
+@pytest.mark.plain
 def test_where_it_is_called_from():
     """Before the flight it is for this step, afterwards for the next; of several steps of a frame for the first."""
     expected = {Phase.START: 1, Phase.FORCES: 1, Phase.INTEGRATION: 2, Phase.RESPONSE: 2, Phase.END: 2}
@@ -131,6 +132,7 @@ def test_where_it_is_called_from():
     np.testing.assert_allclose(velocity(world, entity), (60.0, 0.0))
 
 
+@pytest.mark.plain
 def test_it_stands_where_it_was_driven_in_snapshots_files_and_steps_that_fail(tmp_path):
     world = make_world(gravity=G)
     lift = mover(world, (0.0, 0.0), half=(1.0, 0.25))
@@ -181,6 +183,7 @@ def test_what_sleeps_on_it_wakes_and_rides():
         assert of(world, crate).asleep
 
 
+@pytest.mark.plain
 @both_dimensions
 def test_many_at_once(d):
     """All but those whose rows are nan, which go on as they did."""
@@ -195,6 +198,7 @@ def test_many_at_once(d):
     np.testing.assert_allclose(velocity(world, ids[3]), flat(d, 0.0, 6.0))
 
 
+@pytest.mark.plain
 def test_what_cannot_be_is_refused_with_its_entity_and_changes_nothing():
     world = make_world()
     entity, other, still = mover(world, (0.0, 0.0)), ball(world, (9.0, 0.0)), box(world, (5.0, 0.0), kind="static")

@@ -134,6 +134,7 @@ def test_what_sleeps_on_a_lift_rides_on_when_it_goes_on(mode):
         path.points, path.travelled = [(1, 2), (1, 6)], 0.0
 
 
+@pytest.mark.plain
 def test_what_is_elsewhere_goes_to_its_path_at_its_speed():
     """And then on from where it was: never faster, and in the end on it."""
     world = world_of(dt=0.1)
@@ -151,6 +152,7 @@ def test_what_is_elsewhere_goes_to_its_path_at_its_speed():
     np.testing.assert_allclose(before, walked(SQUARE, travelled, "loop", False), rtol=0, atol=1e-12)
 
 
+@pytest.mark.plain
 def test_fields_may_change_on_the_way():
     world = world_of(dt=0.1)
     entity = mover(world, SQUARE, 1.0, travelled=1.0, at=(1.0, 0.0))
@@ -170,6 +172,7 @@ def test_fields_may_change_on_the_way():
     assert tuple(at(world, entity)) == (1.5, 5.0)
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize("d", [2, 3])
 def test_snapshots_files_and_failed_steps_go_on_to_the_bit(d, tmp_path):
     class FailsOnce(System):
@@ -208,6 +211,7 @@ def test_snapshots_files_and_failed_steps_go_on_to_the_bit(d, tmp_path):
     assert play(other) == first
 
 
+@pytest.mark.plain
 def test_many_share_points_in_bulk():
     world, starts = world_of(dt=0.1), np.linspace(0.0, 2.0, 11)
     ids = world.create_entities(
@@ -231,6 +235,7 @@ POINTS = (
 )
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize(("points", "message"), POINTS)
 def test_points_that_are_no_path_are_refused(points, message):
     for make in (Path, lambda points, speed: Path.many(points, speed).store(3, 2)):
@@ -238,6 +243,7 @@ def test_points_that_are_no_path_are_refused(points, message):
             make(points, 1.0)
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize(
     ("values", "field"), [({"speed": -1.0}, "speed"), ({"mode": "round"}, "mode"), ({"travelled": -1}, "travelled")]
 )
@@ -246,6 +252,7 @@ def test_fields_that_cannot_be_are_refused(values, field):
         Path(SQUARE, **{"speed": 1.0, **values})
 
 
+@pytest.mark.plain
 def test_what_cannot_move_along_a_path_is_refused_with_its_entity():
     with pytest.raises(NoPhysicsError, match="plugin paths needs physics before it"):
         World(Paths())

@@ -81,6 +81,7 @@ def test_what_repeats_keeps_its_phase(kind, steps):
     assert log == [(step, entity) for step in due]
 
 
+@pytest.mark.plain
 def test_events_of_a_step_come_in_order_of_the_entities_also_of_bulk_and_of_no_bodies():
     world, log = world_of(), []
     world.on("timer", lambda entity, timer: log.append(entity))
@@ -91,6 +92,7 @@ def test_events_of_a_step_come_in_order_of_the_entities_also_of_bulk_and_of_no_b
     assert log == sorted(ids)
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_created_inside_a_step_counts_from_its_end(kind):
     """Before, and in, and after the timers' own systems."""
@@ -111,6 +113,7 @@ def test_what_is_created_inside_a_step_counts_from_its_end(kind):
         assert log == [(5, made[-1])]
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize("kind", ["loose", "dynamic"])
 def test_handlers_may_do_anything_to_timers(kind):
     """Delete, cancel and replace their own and those that are due after it."""
@@ -134,6 +137,7 @@ def test_handlers_may_do_anything_to_timers(kind):
     assert log == [(5, first), (5, fourth), (11, first), (11, fourth)]
 
 
+@pytest.mark.plain
 def test_seconds_that_are_set_count_from_the_begin_or_the_last_time():
     world = world_of(dt=0.1)
     log = log_of(world)
@@ -179,6 +183,7 @@ def test_snapshots_and_files_go_on_to_the_bit(way, tmp_path):
     world.close()
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize("kind", ["loose", "dynamic"])
 def test_a_handler_that_raises_loses_no_event(kind):
     """The step is taken again, with the events of all."""
@@ -200,6 +205,7 @@ def test_a_handler_that_raises_loses_no_event(kind):
     assert log == [(5, ids[0]), (5, ids[1]), (5, ids[2]), (11, ids[1])]
 
 
+@pytest.mark.plain
 def test_bodies_are_none_the_wiser():
     """Timers move nothing, wake nothing, and do not make what is static be looked at anew."""
     hashes = []
@@ -222,6 +228,7 @@ def test_bodies_are_none_the_wiser():
     assert hashes[0] == hashes[1]
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize("seconds", [0.0, -1.0, 1e-9, math.nan, math.inf, None, "1", True])
 def test_seconds_that_are_none_are_refused(seconds):
     for make in (Timer, lambda seconds: Timer.many(seconds).store(2, 2)):
@@ -229,6 +236,7 @@ def test_seconds_that_are_none_are_refused(seconds):
             make(seconds)
 
 
+@pytest.mark.plain
 def test_what_timers_need():
     with pytest.raises(NoPhysicsError, match=r"timers needs physics before it: World\(Physics\(...\), Timers\(\)\)"):
         World(Timers())
