@@ -71,21 +71,27 @@ def meet_character(walker, j, at, way):
 
 
 @part
+def meet(walker, j, path, reach):
+    """(touches, distance, out, point) of row j on a path; of another character without a point."""
+    if walker.character.present[j]:
+        touches, distance, out = meet_character(walker, j, path.start, path.direction)
+        return touches, distance, out, path.start
+    if not comes_near(walker.state, j, path, reach):
+        return False, 0.0, path.direction, path.start
+    return cast(walker.state, walker.near, walker.row, j, path, reach, reach)
+
+
+@part
 def cast_near(walker, at, way, reach, ignored):
     """(row, distance, out, point) of what opposes a way first; row -1: it is free."""
-    state, near, character, work = walker.state, walker.near, walker.character, walker.work
+    state, near, work = walker.state, walker.near, walker.work
     best, first, normal, touch = -1, reach, way, at
     path = Path(at, way, inverse_of(way), walker.half_extents)
     for k in range(walker.found):
-        j, point = near.row[k], way
+        j = near.row[k]
         if j == ignored or is_sensor(state, j):
             continue
-        if character.present[j]:
-            touches, distance, out = meet_character(walker, j, at, way)
-        else:
-            if not comes_near(state, j, path, first):
-                continue
-            touches, distance, out, point = cast(state, near, walker.row, j, path, first, first)
+        touches, distance, out, point = meet(walker, j, path, first)
         along = dot(out, way)
         if not touches or distance >= first or along >= -EXACT or not holds(walker, j, out, distance):
             continue
@@ -157,13 +163,7 @@ def floor_below(walker, at, reach):
         j = near.row[k]
         if is_sensor(state, j):
             continue
-        point = at
-        if character.present[j]:
-            touches, distance, out = meet_character(walker, j, at, down)
-        else:
-            if not comes_near(state, j, path, far):
-                continue
-            touches, distance, out, point = cast(state, near, walker.row, j, path, far, far)
+        touches, distance, out, point = meet(walker, j, path, far)
         rise = dot(out, up)
         if not touches or rise <= EXACT or not holds(walker, j, out, distance):
             continue
