@@ -44,7 +44,7 @@ def climb(walker, at, level, dt):
 @part
 def step_over(walker, at, wish, done, height):
     """(taken, place) of going over an edge: up, forward and down, if that leads farther than it has done, to a floor
-    that is at most so high."""
+    that is at most so high and no lower than it snaps to."""
     up, size = walker.up, length(wish)
     top = slide(walker, at, scale(up, height), False, True, -1)
     level, raised = across(wish, up), dot(sub(top, at), up)
@@ -52,7 +52,7 @@ def step_over(walker, at, wish, done, height):
     over = slide(walker, top, scale(ahead, size), False, False, -1)
     if dot(sub(over, top), ahead) <= dot(done, ahead) + EXACT:
         return False, at
-    j, gap, _, floor_height = floor_below(walker, over, raised)
+    j, gap, _, floor_height = floor_below(walker, over, raised + walker.character.snap[walker.row])
     foot = dot(at, up) - walker.skin
     for k in range(len(up)):
         foot -= abs(item(up, k)) * item(walker.half_extents, k)
