@@ -13,17 +13,25 @@ import time
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from .errors import LibraryError
+from .jit import library
+from .jit.kinds import FLOAT, INT, Kind, Signature
 from .jit.lazy import JIT, LazyIntrinsic, dispatchers
+from .jit.linkable import Linkable
 from .jit.log import CHECKED, log
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 # A wrapper for C callers costs compile time and serves none of our kernels.
+KINDS: dict[Any, Kind] = {"int": INT, "float": FLOAT}  # of arguments, by the words of annotations
+
 _OPTIONS = {"nopython": True, "boundscheck": None, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
 def kernel(function: Function) -> Function:
     """Compile ``function`` on first call, per argument types, and keep the machine code on disk.
+
+    One whose arguments are annotated as int or float, and its result as int, may come out of a library instead.
 
     IEEE semantics throughout (no fastmath: same input, same bits); division by zero gives inf or nan. The function
     cannot make arrays: without numba's reference counting, which costs more than the work itself where arrays are
@@ -74,10 +82,24 @@ def allocating_part(function: Any) -> Any:
     return Part(function.py_func, {**function.targetoptions, "_nrt": True})
 
 
-def linked_dispatcher(function: Any) -> Any:
+def linked_dispatcher(function: Any, what: str) -> Any:
     """For functions that are called through their address alone, see :mod:`~carom.framework.jit.linking`."""
-    plain = getattr(function, "py_func", function)
-    return Compiled(plain, {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": CHECKED}).made
+    options = {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": CHECKED}
+    return _dispatcher(function, options, what, named=True)
+
+
+def _dispatcher(function: Any, options: dict[str, Any], what: str, named: bool = False) -> Any:
+    """What compiles it; LibraryError where there is no compiler."""
+    try:
+        return dispatchers.KeptDispatcher(dispatchers.named(function) if named else function, options)
+    except ModuleNotFoundError as error:
+        if error.name not in ("numba", "llvmlite"):
+            raise
+        known = ", ".join(each.path for each in library.libraries()) or "none is loaded"
+        raise LibraryError(
+            f"{what} is in no library of kernels ({known}), and numba, which would compile it, is not installed: "
+            "pip install numba, or build the game anew with all that it uses (carom build)"
+        ) from error
 
 
 def _kept(kind: type[Compiled], function: Any, **options: Any) -> Any:
@@ -89,8 +111,9 @@ def _part(function: Any, **options: Any) -> Any:
     return Part(function, options) if JIT else function
 
 
-class Compiled(LazyIntrinsic):
+class Compiled(LazyIntrinsic, Linkable):
     """A function for numba to compile; its dispatcher, :attr:`made`, is made when first called or needed by a kernel.
+    If a library has it, that is what is called.
 
     targetoptions, py_func: numba's names, by which it recognises what it has to inline.
     """
@@ -100,8 +123,25 @@ class Compiled(LazyIntrinsic):
         self.plain = self.py_func = function
         self.targetoptions = options
 
+    @functools.cached_property
+    def signature(self) -> Signature | None:
+        code, words = self.py_func.__code__, self.py_func.__annotations__
+        arguments = [KINDS.get(words.get(name)) for name in code.co_varnames[: code.co_argcount]]
+        known = [kind for kind in arguments if kind is not None]
+        return INT(*known) if words.get("return") == "int" and len(known) == len(arguments) else None
+
     def _make(self) -> Any:
-        return dispatchers.KeptDispatcher(self.py_func, self.targetoptions)
+        entry = library.entry(self)
+        return _dispatcher(self.py_func, self.targetoptions, self.py_func.__name__) if entry is None else entry
+
+    @property
+    def compiled(self) -> Any:
+        return self.made
+
+    def link(self) -> None:
+        if not library.holds(self):
+            self.made.address_for(self)
+        self.ready = True
 
     def __call__(self, *args: Any) -> Any:
         return self.made(*args)

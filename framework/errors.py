@@ -44,5 +44,9 @@ class PluginError(CaromError, ValueError):
     """A plugin is not what it should be; the message names plugin, shape, function and the cure."""
 
 
+class LibraryError(CaromError, ImportError):
+    """A library of compiled kernels cannot be used, or lacks one that nothing here can compile."""
+
+
 class ScheduleError(CaromError):
     """Systems cannot be put in order: a cycle, or two writers of one column without an order."""

@@ -33,7 +33,7 @@ def _emitted(emit: Callable[..., Any], signature: Callable[..., Any]) -> Callabl
         if not JIT:
             return function
         name, count = function.__name__, function.__code__.co_argcount
-        return LazyIntrinsic(lambda: operation(name, count, typing, (function, emit, signature)), function)
+        return LazyIntrinsic(lambda: operation(name, count, typing), function)
 
     return decorate
 

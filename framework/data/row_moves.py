@@ -9,7 +9,6 @@ import numpy as np
 
 from ..compilation import kernel, part
 from ..jit.lazy import JIT, cgutils, intrinsic, ir, types
-from ..jit.linking import Called
 from ..jit.records.record import make_record
 from ..jit.records.record_type import record_at
 from ..jit.records.schema import Schema, integer, ints
@@ -136,7 +135,7 @@ def move_rows_of(plan, columns, column):
 
 
 @kernel
-def move_rows(plan_address, columns_address, new_plan):
+def move_rows(plan_address: int, columns_address: int, new_plan: int) -> int:
     """Move the rows of some columns as planned; new_plan, 0 or 1: find out first what has to move, and write ids and
     kinds of those that come."""
     plan, columns = _plan_at(plan_address), _columns_at(columns_address)
@@ -150,9 +149,7 @@ def move_rows(plan_address, columns_address, new_plan):
         plan.ids[plan.fresh[k]] = plan.added[k]
         if len(plan.kind_column):
             plan.kind_column[plan.fresh[k]] = max(plan.blocks[k] - 1, 0)
-
-
-MOVE_ROWS = Called(move_rows, int, int, int)
+    return 0
 
 
 class RowPlan:

@@ -12,20 +12,21 @@ import threading
 from collections import deque
 from collections.abc import Iterable
 
-from .linking import Called, Linked
+from .lazy import JIT
+from .linkable import Linkable
 from .log import background, log
 
 logger = logging.getLogger("carom")
 
-_waiting: deque[Linked | Called] = deque()
+_waiting: deque[Linkable] = deque()
 _lock = threading.Lock()
 _thread: threading.Thread | None = None
 
 
-def link_in_background(functions: Iterable[Linked | Called]) -> None:
+def link_in_background(functions: Iterable[Linkable]) -> None:
     """Compile these soon; not at all where ``log.background`` is off."""
     global _thread
-    if not log.background:
+    if not log.background or not JIT:
         return
     with _lock:
         _waiting.extend(function for function in functions if not function.ready)

@@ -19,18 +19,18 @@ import os
 import pickle
 import stat
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import llvmlite.binding
-from numba.core import compiler
+import numba
+import numpy as np
+from numba.core import compiler, config
 from numba.core.caching import _Cache
 from numba.core.runtime import _nrt_python
 from numba.core.serialize import dumps
 
-from . import prebuilt
-from .hash import hash_and_reach, type_names
+from .hash import PYTHON, hash_and_reach
 from .log import in_background, log
 
 CACHE_FOLDER_VARIABLE = "CAROM_CACHE_DIR"
@@ -40,7 +40,6 @@ logger = logging.getLogger("carom")
 machine_code = operator.attrgetter("library")  # of numba's compile result
 _checksum = hashlib.sha256
 _reported: set[Path] = set()  # folders that could not be used or written, told once
-used: set[Path] = set()  # files that this process has loaded or written
 
 
 def cache_folder() -> Path | None:
@@ -193,26 +192,17 @@ class KernelCache(_Cache):
             path.unlink(missing_ok=True)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        if self._enabled:
-            for path in self._places(sig, target_context.codegen()):
-                found = _read(path)
-                if found is not None:
-                    used.add(path)
-                    return _loaded(target_context, *found)
+        path = self._path(sig, target_context.codegen())
+        found = _read(path) if self._enabled and path is not None else None
+        if found is not None:
+            return _loaded(target_context, *found)
         announce(self._dispatcher)
         return None
 
     def holds(self, sig: Any, target_context: Any) -> bool:
         """Whether there is a file for that signature, so that most likely nothing has to compile."""
-        return self._enabled and any(path.exists() for path in self._places(sig, target_context.codegen()))
-
-    def _places(self, sig: Any, codegen: Any) -> Iterator[Path]:
-        """Where that kernel may stand: shipped for any processor of the platform, or compiled here for this one."""
-        for shipped in prebuilt.folders():
-            yield shipped.path / self._name(sig, (codegen.magic_tuple()[0], *shipped.processor))
-        path = self._path(sig, codegen)
-        if path is not None:
-            yield path
+        path = self._path(sig, target_context.codegen())
+        return self._enabled and path is not None and path.exists()
 
     def save_overload(self, sig: Any, data: Any) -> None:
         path = self._path(sig, data.codegen)
@@ -225,7 +215,6 @@ class KernelCache(_Cache):
             with os.fdopen(handle, "wb") as file:
                 file.write(content + _checksum(content).digest())
             os.replace(temporary, path)
-            used.add(path)
         except OSError as error:  # a full or vanished disk costs speed, never the run
             if temporary is not None:
                 with contextlib.suppress(OSError):
@@ -244,7 +233,8 @@ class KernelCache(_Cache):
 
     def _hashed(self) -> tuple[str, int]:
         if self._hash_and_reach is None:
-            self._hash_and_reach = hash_and_reach(self._dispatcher)
+            found, reach = hash_and_reach(self._dispatcher)
+            self._hash_and_reach = hashlib.sha256((found + toolchain()).encode()).hexdigest(), reach
         return self._hash_and_reach
 
     def _stem(self) -> str:
@@ -258,3 +248,32 @@ class KernelCache(_Cache):
         """The file's name, for a kind of processor: (platform, name, features)."""
         key = hashlib.sha256(f"{type_names(sig)} {target!r}".encode()).hexdigest()
         return f"{self._stem()}-{key[:24]}.kernel"
+
+
+# What numba makes other code for: its switches, by their names in the environment less NUMBA_.
+SWITCHES = (
+    "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX",
+)  # fmt: skip
+
+
+@functools.cache
+def toolchain() -> str:
+    """All that machine code depends on beside the kernel: versions, switches, and how carom has numba write code."""
+    switches = [(name, getattr(config, name, None)) for name in SWITCHES]
+    versions = PYTHON, numba.__version__, llvmlite.__version__, np.__version__
+    return hashlib.sha256(repr((versions, switches, writing_digest())).encode()).hexdigest()
+
+
+def writing_digest() -> str:
+    """The hash of the modules that write code in LLVM's language."""
+    files = Path(__file__).with_name("pipeline.py"), Path(__file__).parent / "records" / "record_code.py"
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files if file.exists())).hexdigest()
+
+
+def type_names(kind: Any) -> str:
+    """A numba type or signature in words; numba's own leave out the fields of named tuples, and which comes first."""
+    fields = f" {kind.fields}" if hasattr(kind, "fields") else ""
+    inner = getattr(kind, "args", None) or getattr(kind, "types", None) or ()
+    if isinstance(kind, (tuple, list)):
+        inner = kind
+    return f"{kind}{fields}({', '.join(type_names(part) for part in inner)})" if inner else f"{kind}{fields}"

@@ -8,17 +8,57 @@ from __future__ import annotations
 import gc
 import logging
 import time
+import types as python_types
 from typing import Any, ClassVar
 
+from numba.core import types
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.types import unliteral
 
 from .cache import KernelCache
+from .hash import deep_hash
+from .kinds import Kind, RecordKind, Signature, TupleKind
+from .linkable import Linkable
 from .log import in_background, log
 from .pipeline import kernel_compiler, part_compiler
+from .records.record_code import record_type
 
 logger = logging.getLogger("carom")
+
+
+# What has been compiled or loaded for functions of one signature, by their names in libraries.
+linked: dict[str, tuple[Linkable, Any]] = {}
+
+_NUMBERS = {"int64": types.int64, "float64": types.float64, "bool": types.boolean}
+
+
+def numba_type(kind: Kind) -> Any:
+    """numba's type of that kind."""
+    if isinstance(kind, RecordKind):
+        return record_type(kind.schema, kind.dimensions)
+    if isinstance(kind, TupleKind):
+        return types.Tuple([numba_type(part) for part in kind.kinds])
+    return _NUMBERS[kind.name]
+
+
+def numba_types(signature: Signature) -> tuple[Any, tuple[Any, ...]]:
+    """(of the result, of the arguments)."""
+    return numba_type(signature.result), tuple(map(numba_type, signature.arguments))
+
+
+def named(function: Any) -> Any:
+    """The function with a hash of all it depends on in its name.
+
+    Machine code is found by symbol name, and numba's names tell apart only functions of one process: of two that one
+    factory made in different processes, both loaded from the cache, one would run in place of the other.
+    """
+    copy = python_types.FunctionType(
+        function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
+    )
+    vars(copy).update(vars(function))
+    copy.__qualname__ = f"{function.__name__}_{deep_hash(function)[:16]}"
+    return copy
 
 
 class CompilerLock:
@@ -83,9 +123,19 @@ class KeptDispatcher(CPUDispatcher):
         """Of how many functions it is made: the more, the longer it takes to compile."""
         return self._cache.dependency_count
 
-    def is_kept(self, sig: Any) -> bool:
+    def is_kept(self, signature: Signature) -> bool:
         """Whether it is kept on disk for that signature, and has only to be loaded."""
-        return self._cache.holds(sig, self.targetctx)
+        result, arguments = numba_types(signature)
+        return any(self._cache.holds(kind, self.targetctx) for kind in (result(*arguments), arguments))
+
+    def address_for(self, function: Linkable) -> int:
+        """Where the machine code of what it compiles for a function stands."""
+        assert function.signature is not None
+        result, arguments = numba_types(function.signature)
+        self.compile(result(*arguments))
+        made = self.overloads[arguments]
+        linked[function.symbol] = function, made
+        return made.library.get_pointer_to_function(made.fndesc.llvm_func_name)
 
     def _compile_for_args(self, *args: Any, **kws: Any) -> Any:
         """What numba calls for arguments of new types: looks at them, then compiles."""

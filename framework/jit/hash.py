@@ -1,4 +1,4 @@
-"""A hash of a function and of everything its machine code depends on, stable between processes.
+"""A hash of a function and of everything its machine code depends on, stable between processes of one Python.
 
 numba's own cache looks at the file a function stands in and at its closure; it does not see that a function which it
 calls, in another file, was edited. Here byte code, constants, options, captured values and, recursively, every
@@ -14,24 +14,11 @@ import types
 from collections.abc import Iterator
 from typing import Any
 
-import llvmlite
-import numba
 import numpy as np
-from numba.core import config
-from numba.core.dispatcher import Dispatcher
 
-# What numba makes other code for: its switches, by their names in the environment less NUMBA_.
-SWITCHES = (
-    "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX",
-)  # fmt: skip
+from .lazy import LazyModule
 
-
-def toolchain() -> dict[str, str]:
-    """The versions that machine code depends on, by name."""
-    return {
-        "python": f"{sys.implementation.name} {sys.version_info.major}.{sys.version_info.minor}",
-        "numba": numba.__version__, "llvmlite": llvmlite.__version__, "numpy": np.__version__,
-    }  # fmt: skip
+PYTHON = f"{sys.implementation.name} {sys.version_info.major}.{sys.version_info.minor}"  # whose byte code it is
 
 
 def is_packed(function: Any) -> bool:
@@ -40,35 +27,26 @@ def is_packed(function: Any) -> bool:
 
 
 def deep_hash(function: Any) -> str:
-    """The hash, as hexadecimal digits; versions and numba's switches are part of it."""
+    """The hash, as hexadecimal digits."""
     return hash_and_reach(function)[0]
 
 
 def hash_and_reach(function: Any) -> tuple[str, int]:
     """The hash, and of how many functions the code is made: how long it takes to compile, roughly."""
-    switches = [(name, getattr(config, name, None)) for name in SWITCHES]
-    digest = hashlib.sha256(repr((toolchain(), switches)).encode())
-    seen: set[int] = set()
+    digest, seen = hashlib.sha256(), set[int]()
     _feed(function, digest, seen)
     return digest.hexdigest(), len(seen)
 
 
-def type_names(kind: Any) -> str:
-    """A numba type or signature in words; numba's own leave out the fields of named tuples, and which comes first."""
-    fields = f" {kind.fields}" if hasattr(kind, "fields") else ""
-    inner = getattr(kind, "args", None) or getattr(kind, "types", None) or ()
-    if isinstance(kind, (tuple, list)):
-        inner = kind
-    return f"{kind}{fields}({', '.join(type_names(part) for part in inner)})" if inner else f"{kind}{fields}"
-
-
 def _feed(value: Any, digest: Any, seen: set[int]) -> None:
     """Add ``value`` to ``digest``; functions are followed into what they call, each once."""
-    if isinstance(value, Dispatcher):
-        digest.update(repr(sorted(value.targetoptions.items())).encode())
-        value = value.py_func
+    if isinstance(value, LazyModule):
+        return
     if hasattr(value, "carom_depends_on"):  # code written by hand, see vectors
         value = value.carom_depends_on
+    elif hasattr(value, "py_func"):  # made by numba's own decorators
+        digest.update(repr(sorted(value.targetoptions.items())).encode())
+        value = value.py_func
     if isinstance(value, types.FunctionType):
         if id(value) in seen:
             digest.update(b"again")
@@ -96,8 +74,6 @@ def _feed(value: Any, digest: Any, seen: set[int]) -> None:
         digest.update(repr((value.dtype.str, value.shape)).encode() + value.tobytes())
     elif isinstance(value, types.ModuleType):
         digest.update(value.__name__.encode())
-    elif isinstance(value, numba.types.Type):
-        digest.update(type_names(value).encode())
     else:
         digest.update(f"{type(value).__qualname__}{value!r}".encode() if _is_plain(value) else b"")
         digest.update(type(value).__qualname__.encode())

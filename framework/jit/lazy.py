@@ -35,13 +35,13 @@ class LazyModule:
 
 if TYPE_CHECKING:
     from llvmlite import ir
-    from numba.core import cgutils, errors, types
+    from numba.core import cgutils, types
     from numba.np import arrayobj
 
     from . import dispatchers
 else:
     ir, arrayobj = LazyModule("llvmlite.ir"), LazyModule("numba.np.arrayobj")
-    cgutils, errors, types = (LazyModule(f"numba.core.{name}") for name in ("cgutils", "errors", "types"))
+    cgutils, types = (LazyModule(f"numba.core.{name}") for name in ("cgutils", "types"))
     dispatchers = LazyModule(f"{__package__}.dispatchers")
 
 
@@ -52,12 +52,16 @@ class LazyIntrinsic:
         called without arguments, gives numba's object
     plain
         what Python runs instead; None: only kernels call it
+    label
+        called without arguments, tells it from others that are made by the same function
     """
 
-    def __init__(self, make: Callable[[], Any], plain: Callable[..., Any] | None = None) -> None:
+    def __init__(
+        self, make: Callable[[], Any], plain: Callable[..., Any] | None = None, label: Callable[[], str] | None = None
+    ) -> None:
         if plain is not None:
             functools.update_wrapper(self, plain)
-        self._maker, self.plain = make, plain
+        self._maker, self.plain, self._label = make, plain, label
 
     @functools.cached_property
     def made(self) -> Any:
@@ -70,7 +74,12 @@ class LazyIntrinsic:
     @property
     def carom_depends_on(self) -> Any:
         """What its code is made of, see :mod:`hash`."""
-        return self.made.carom_depends_on
+        return self._maker if self._label is None else (self._label(), self._maker)
+
+    @property
+    def carom_structure(self) -> Any:
+        """What it is, see :mod:`names`."""
+        return self._label() if self._label is not None else self.plain or self._maker
 
     @property
     def _numba_type_(self) -> Any:
@@ -96,22 +105,25 @@ class LazyIntrinsic:
         return self
 
 
+def is_of_compiler(error: BaseException) -> bool:
+    """Whether numba raised it because it cannot compile something; does not load numba."""
+    return type(error).__module__.partition(".")[0] == "numba"
+
+
 def intrinsic(function: Callable[..., Any], plain: Callable[..., Any] | None = None) -> Any:
     """numba's decorator of that name: ``function(typing_context, *types)`` gives (signature, code generator)."""
-    return LazyIntrinsic(lambda: _made_intrinsic(function, function), plain)
+    return LazyIntrinsic(lambda: _made_intrinsic(function), plain)
 
 
-def operation(name: str, count: int, typing: Callable[..., Any], depends_on: Any) -> Any:
-    """numba's intrinsic for such a function of any ``count`` types; depends_on: all that its code is made of."""
+def operation(name: str, count: int, typing: Callable[..., Any]) -> Any:
+    """numba's intrinsic for such a function of any ``count`` types."""
     names = "".join(f", a{k}" for k in range(count))
     scope = {"typing": typing}
     exec(f"def {name}(context{names}): return typing(context{names})", scope)
-    return _made_intrinsic(scope[name], depends_on)
+    return _made_intrinsic(scope[name])
 
 
-def _made_intrinsic(function: Any, depends_on: Any) -> Any:
+def _made_intrinsic(function: Any) -> Any:
     from numba.core.extending import intrinsic as made_by_numba
 
-    made: Any = made_by_numba(function)
-    made.carom_depends_on = depends_on
-    return made
+    return made_by_numba(function)

@@ -15,16 +15,21 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from ..compilation import log
-from .lazy import dispatchers
-from .linking import Called, Linked
+from . import library
+from .lazy import JIT, dispatchers
+from .linkable import Linkable
 
 CAN_FORK = sys.platform.startswith("linux")  # elsewhere system libraries do not survive it
-
-Linkable = Linked | Called
 
 
 def link_all(functions: Iterable[Linkable]) -> None:
     """Compile or load all of them; ``log.left`` tells listeners how many are left to compile."""
+    if not JIT:
+        return
+    functions = [function for function in functions if not function.ready]
+    for function in functions:
+        if library.holds(function):
+            function.link()
     functions = [function for function in functions if not function.ready]
     if not functions:
         return

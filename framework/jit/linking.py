@@ -10,11 +10,14 @@ Calls use numba's own convention. Addresses are good for this process only.
 from __future__ import annotations
 
 from collections.abc import Callable
-from operator import attrgetter
+from functools import cached_property
 from typing import Any
 
 from ..compilation import linked_dispatcher
-from .lazy import JIT, LazyIntrinsic, cgutils, operation, types
+from . import library
+from .kinds import Signature
+from .lazy import JIT, LazyIntrinsic, cgutils, dispatchers, operation, types
+from .linkable import Linkable
 
 # So many generated functions of each kind are kept at hand for worlds to come; worlds hold those that they use.
 CACHE_SIZE = 1024
@@ -23,20 +26,19 @@ CACHE_SIZE = 1024
 _plain: list[Callable[..., Any]] = [lambda *_: None]
 
 
-class Linked:
+class Linked(Linkable):
     """A function compiled for one signature, called through its address.
 
     function
         plain Python; helpers that it calls are compiled into it
-    signature
-        numba's: ``types.int64(state_type, types.float64)``
+    what
+        it is, for errors
     """
 
-    def __init__(self, function: Callable[..., Any], signature: Any) -> None:
-        self.function = getattr(function, "py_func", function)
-        self.name = self.function.__name__
-        self.signature = signature
-        self._dispatcher = linked_dispatcher(function) if JIT else function
+    def __init__(self, function: Callable[..., Any], signature: Signature, what: str = "") -> None:
+        self.py_func = getattr(function, "py_func", function)
+        self.name = self.py_func.__name__
+        self.signature, self._what = signature, what or self.name
         self._address = 0
 
     @property
@@ -51,70 +53,29 @@ class Linked:
         """Whether it has been compiled or loaded."""
         return self._address != 0
 
-    @property
-    def is_cached(self) -> bool:
-        """Whether linking it compiles nothing."""
-        return self.ready or not JIT or self._dispatcher.is_kept(self.signature)
-
-    @property
-    def dependency_count(self) -> int:
-        """Of how many functions it is made: the more, the longer it takes to compile."""
-        return self._dispatcher.dependency_count
+    @cached_property
+    def compiled(self) -> dispatchers.KeptDispatcher:
+        return linked_dispatcher(self.py_func, self._what)
 
     def link(self) -> None:
-        """Compile or load it now."""
         self.address  # noqa: B018 - asking for it links
 
     def _find(self) -> int:
         if not JIT:
-            _plain.append(self.function)
+            _plain.append(self.py_func)
             return len(_plain) - 1
-        self._dispatcher.compile(self.signature)
-        machine_code, description = attrgetter("library", "fndesc")(self._dispatcher.overloads[self.signature.args])
-        return machine_code.get_pointer_to_function(description.llvm_func_name)
-
-
-class Called:
-    """A kernel that Python calls with numbers of these types, to be linked ahead of its first call."""
-
-    def __init__(self, kernel: Any, *arguments: type[int] | type[float]) -> None:
-        self._kernel, self._arguments, self._linked = kernel, arguments, not JIT
-
-    @property
-    def _types(self) -> tuple[Any, ...]:
-        return tuple(types.int64 if kind is int else types.float64 for kind in self._arguments)
-
-    @property
-    def ready(self) -> bool:
-        """Whether it has been linked."""
-        return self._linked
-
-    @property
-    def is_cached(self) -> bool:
-        """Whether linking it compiles nothing."""
-        return self.ready or self._kernel.made.is_kept(self._types)
-
-    @property
-    def dependency_count(self) -> int:
-        """Of how many functions it is made."""
-        return self._kernel.made.dependency_count
-
-    def link(self) -> None:
-        """Compile or load it now."""
-        if not self._linked:
-            self._kernel.made.compile(self._types)
-            self._linked = True
+        return library.address_of(self) or self.compiled.address_for(self)
 
 
 def linked_call(signature_of: Callable[[], Any]) -> Any:
     """The function call(address, *arguments) that calls what stands at an address, of that signature."""
     if not JIT:
         return lambda address, *values: _plain[address](*values)
-    return LazyIntrinsic(lambda: _compiled_call(signature_of()))
+    return LazyIntrinsic(lambda: _compiled_call(signature_of()), label=lambda: f"calls {signature_of()}")
 
 
-def _compiled_call(signature: Any) -> Any:
-    result, arguments = signature.return_type, signature.args
+def _compiled_call(signature: Signature) -> Any:
+    result, arguments = dispatchers.numba_types(signature)
 
     def typing(typing_context: Any, *given: Any) -> Any:
         def emit(context: Any, builder: Any, sig: Any, values: Any) -> Any:
@@ -132,4 +93,4 @@ def _compiled_call(signature: Any) -> Any:
 
         return result(types.int64, *arguments), emit
 
-    return operation("call", 1 + len(arguments), typing, (str(result), *map(str, arguments), typing))
+    return operation("call", 1 + len(arguments), typing)

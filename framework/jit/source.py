@@ -8,6 +8,8 @@ import sys
 import types
 from typing import Any
 
+from .names import structure_of
+
 MODULES = 4096  # that a process remembers for tracebacks, the youngest
 
 _made: dict[str, None] = {}
@@ -15,9 +17,7 @@ _made: dict[str, None] = {}
 
 def source_module(source: str, scope: dict[str, Any]) -> types.ModuleType:
     """A module of that source over the names in ``scope``; its name tells both."""
-    from .hash import deep_hash  # loads numba
-
-    parts = [source, *(f"{name} {deep_hash(value)}" for name, value in sorted(scope.items()))]
+    parts = [source, *(f"{name} {structure_of(value)}" for name, value in sorted(scope.items()))]
     name = f"carom_shapes_{hashlib.sha256(' '.join(parts).encode()).hexdigest()[:24]}"
     module = types.ModuleType(name)
     vars(module).update(scope)

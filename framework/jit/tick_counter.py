@@ -8,7 +8,6 @@ from typing import Any
 
 from ..compilation import untimed_kernel
 from .lazy import JIT, cgutils, intrinsic, ir, types
-from .linking import Called
 
 _HAS_CYCLES = platform.machine().lower() in ("x86_64", "amd64", "i686", "x86")  # elsewhere reading it may be forbidden
 _MONOTONIC = 1
@@ -45,8 +44,6 @@ def ticks_now() -> int:
     """The counter, for Python."""
     return read_ticks()
 
-
-TICKS_NOW = Called(ticks_now)
 
 
 class TickClock:

@@ -16,13 +16,15 @@ from typing import Any
 import numpy as np
 
 from ..compilation import entry_point, inlined, log, packed, untimed_kernel
-from ..jit.lazy import types
-from ..jit.linking import Called, Linked, linked_call
+from ..jit.hash import is_packed
+from ..jit.kinds import FLOAT, INT, record_kind
+from ..jit.linkable import Linkable
+from ..jit.linking import Linked, linked_call
 from ..jit.records.record import Record
-from ..jit.records.record_type import record_at, record_type
+from ..jit.records.record_type import record_at
 from ..jit.records.schema import Schema, integer, ints
 from ..jit.source import source_module
-from ..jit.tick_counter import TICKS_NOW, TickClock, read_ticks
+from ..jit.tick_counter import TickClock, read_ticks, ticks_now
 
 # What every state begins with: addresses of the stages (0: not needed), the time that each has taken in ticks of the
 # processor's clock, how often it ran, and the one that runs now.
@@ -30,11 +32,11 @@ PROGRAM_FIELDS: dict[str, Any] = {"program": ints(), "ticks": ints(), "calls": i
 PROGRAM = Schema("Program", **PROGRAM_FIELDS)
 
 _program_at = record_at(PROGRAM, 2)
-_call_stage = linked_call(lambda: types.int64(record_type(PROGRAM, 2), types.float64))
+_call_stage = linked_call(lambda: INT(record_kind(PROGRAM, 2), FLOAT))
 
 
 @untimed_kernel
-def run_stages(address, start, stop, dt):
+def run_stages(address: int, start: int, stop: int, dt: float) -> int:
     """Run the stages start..stop-1 of the program of the state at that address.
 
     Returns 0, or the code of the stage that cannot go on by itself, which is in ``state.stage``.
@@ -54,8 +56,6 @@ def run_stages(address, start, stop, dt):
                 return code
     return 0
 
-
-RUN_STAGES = Called(run_stages, int, int, int, float)
 
 NEED_ROOM = 1  # what a stage returns that needs more rows than the columns of its ``room`` have
 
@@ -182,9 +182,9 @@ class Program:
     def _run_stages(self) -> Any:
         return entry_point(run_stages)
 
-    def functions(self, wanted: Callable[[Stage], bool]) -> Iterator[Linked | Called]:
+    def functions(self, wanted: Callable[[Stage], bool]) -> Iterator[Linkable]:
         """What :meth:`link` and :meth:`run` call."""
-        yield from (RUN_STAGES, TICKS_NOW)
+        yield from (run_stages, ticks_now)
         yield from (self._linked(stage) for stage in self.stages if wanted(stage))
 
     def link(self, wanted: Callable[[Stage], bool]) -> None:
@@ -282,10 +282,10 @@ _linked: dict[tuple[Any, Any], Linked] = {}
 
 def linked_stage(stage: Stage, schema: Schema, dimensions: int) -> Linked:
     """The stage's compiled function for states of that kind, one for the process."""
-    kind = record_type(schema, dimensions)
+    kind = record_kind(schema, dimensions)
     key = (stage.function, stage.tested, kind)
     if key not in _linked:
-        _linked[key] = Linked(_with_room(stage), types.int64(kind, types.float64))
+        _linked[key] = Linked(_with_room(stage), INT(kind, FLOAT), f"stage {stage.name}, {dimensions}D,")
     return _linked[key]
 
 
@@ -293,8 +293,6 @@ def _with_room(stage: Stage) -> Callable[..., int]:
     """The stage's function behind a test of its room."""
     if not stage.tested:
         return stage.function
-    from ..jit.hash import is_packed  # loads numba
-
     counts = (getattr(rows.count, "py_func", rows.count) for rows in stage.tested)
     scope: dict[str, Any] = {f"rows_{k}": inlined(count) for k, count in enumerate(counts)}
     short = (

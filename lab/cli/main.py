@@ -15,6 +15,7 @@ from .group import LateCommands
 
 # By name: where it is, and its line in the help.
 COMMANDS = {
+    "build": ("build.command:build_command", "Build a game's kernels into a library."),
     "limits": ("limits.command:limits_command", "How long a scene's step may be, and what limits it."),
     "plan": ("cli.plan:plan_command", "Show what a step of a scene runs, and why."),
     "plugins": ("plugins.command:plugins_command", "List plugins, or check one."),

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
-import shutil
-import subprocess
-import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
@@ -23,8 +19,7 @@ from ... import scenes
 from ...components import AABBCollider, RigidBody, SphereCollider, Transform
 from ...framework import Plugin, Settings, World
 from ...framework.compilation import log
-from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_folder, clear_cache, used
-from ...framework.jit.prebuilt import INDEX, OFF, PORTABLE, write_index
+from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_folder, clear_cache
 from ...plugins import Physics, capsule, convex_hull, convex_polygon, half_space, terrain, tile_grid
 from ...plugins.joints import Joints
 from ...plugins.rotation import BoxCollider, Rotation, Spin
@@ -59,27 +54,18 @@ class Row:
 @click.argument("targets", metavar="[SCENE|FILE.py]...", nargs=-1)
 @click.option("--all", "everything", is_flag=True, help="The built-in shapes and every scene of the library.")
 @click.option("--dimensions", type=click.Choice(["2", "3"]), help="Only worlds of so many dimensions.")
-@click.option(
-    "--portable", type=click.Path(path_type=Path), metavar="FOLDER",
-    help="Compile into this folder, for any processor of this platform: to ship with a game or a plugin.",
-)
 @click.option("--clear", is_flag=True, help="Empty the cache folder instead; old versions' kernels are in it too.")
 @json_option
 @traceback_option
 def warm_up_command(
-    targets: tuple[str, ...], everything: bool, dimensions: str | None, portable: Path | None, clear: bool,
-    as_json: bool,
+    targets: tuple[str, ...], everything: bool, dimensions: str | None, clear: bool, as_json: bool
 ) -> None:
     """Compile what the scenes or files need; without any: what worlds of the shapes that ship need."""
-    if clear and (targets or everything or dimensions or portable):
+    if clear and (targets or everything or dimensions):
         raise Problem("--clear goes alone: it compiles nothing")
     if targets and (everything or dimensions):
         option = "--all" if everything else "--dimensions"
         raise Problem(f"{option} and scenes exclude each other: name scenes, or choose with --all and --dimensions")
-    if portable is not None:
-        chosen = [*targets, *(["--all"] if everything else []), *(["--dimensions", dimensions] if dimensions else [])]
-        compile_portable(portable, chosen)
-        return
     folder = cache_folder()
     if folder is None:
         raise Problem(f"no folder can be written to keep kernels in; {CACHE_FOLDER_VARIABLE} names one")
@@ -90,7 +76,6 @@ def warm_up_command(
     else:
         with Progress(Console(stderr=True)) as status:
             rows = warm_up(_work(targets, everything, [int(dimensions)] if dimensions else [2, 3]), status.say)
-        copy_used()
     after = cache_contents()
     if as_json:
         cache = {"folder": str(folder), "kernels_before": before, "kernels": after[0], "bytes": after[1]}
@@ -183,36 +168,3 @@ def _print(rows: list[Row], folder: Path, before: int, after: tuple[int, int]) -
 def _megabytes(size: int) -> str:
     return f"{size / 1e6:.1f} MB"
 
-
-COPY = "CAROM_COPY_USED"  # in the environment of the process that compiles: where copies go
-
-
-def compile_portable(folder: Path, arguments: Sequence[str]) -> None:
-    """Put what ``carom warm-up ARGUMENTS`` needs, for any processor, into that folder; replace what it held.
-
-    What the cache folder holds already, made for any processor, is not compiled again.
-    """
-    if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not (folder / INDEX).exists())):
-        raise Problem(f"{folder} holds other things: name a new folder for the kernels, or one made by --portable")
-    # numba decides for a processor when it is imported: another process.
-    environment = {
-        **os.environ, COPY: str(folder.absolute()), OFF: "0",
-        "NUMBA_CPU_NAME": PORTABLE[0], "NUMBA_CPU_FEATURES": PORTABLE[1],
-    }  # fmt: skip
-    done = subprocess.run([sys.executable, "-m", "carom", "warm-up", *arguments], env=environment)
-    if done.returncode:
-        raise click.exceptions.Exit(done.returncode)
-    write_index(folder, PORTABLE)
-    sizes = [file.stat().st_size for file in folder.iterdir()]
-    what = f"{len(sizes) - 1:,} kernels for any processor of this platform"
-    click.echo(f"{folder}: {what}, {_megabytes(sum(sizes))}")
-
-
-def copy_used() -> None:
-    """In the process that compiles: leave copies of all kernels that were needed."""
-    wanted = os.environ.get(COPY)
-    if wanted:
-        shutil.rmtree(wanted, ignore_errors=True)
-        os.makedirs(wanted)
-        for file in sorted(used):
-            shutil.copyfile(file, os.path.join(wanted, file.name))

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...components import RigidBody, SphereCollider, Transform
 from ...framework import CaromError, Convex, Plugin, PluginError, Settings, World
-from ...framework.jit.lazy import errors
+from ...framework.jit.lazy import is_of_compiler
 from ...framework.plugins.checks import HELPERS, PlainFunction
 from ...framework.plugins.laws import Law, Trial, pair_laws, shape_laws, sweep_laws
 from ...framework.plugins.registry import Pair, Registry, Shape
@@ -133,13 +133,14 @@ def _attempt(checked: Checked, check: Callable[[Checked], None]) -> None:
     """Run a check; convert any exception of plugin code to a finding."""
     try:
         check(checked)
-    except errors.NumbaError as error:
-        checked.finding = f"it does not compile: {compiler_message(error)}", "every input", COMPILES
     except Problem:
         raise
     except PluginError as error:
         checked.finding = one_line(error), "the values above", "return what the message asks for"
     except Exception as error:  # plugin code may raise anything; the report shows it
+        if is_of_compiler(error):
+            checked.finding = f"it does not compile: {compiler_message(error)}", "every input", COMPILES
+            return
         checked.finding = f"it raised {one_line(error)}", "see the message", "correct what raises"
 
 

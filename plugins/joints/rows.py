@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...framework import PluginError
-from ...framework.jit.lazy import errors
+from ...framework.jit.lazy import is_of_compiler
 from ...framework.jit.records.schema import Column
 from ...systems.joints.linked import linked_joint
 from ...systems.joints.own import custom_numbers
@@ -131,7 +131,9 @@ class JointRows:
         own = self._registry.joints[type(joint)]
         try:
             return linked_joint(own, self._dimensions).address
-        except errors.NumbaError as error:
+        except Exception as error:
+            if not is_of_compiler(error):
+                raise
             raise PluginError(
                 f"plugin {own.plugin}: constraint of joint {type(joint).__name__} cannot be compiled; use numbers, "
                 f"tuples, math, carom.framework.vectors, and helpers marked @plugin.kernel: {error}"

@@ -8,22 +8,20 @@ change of its value per second, and along which its impulse pushes and turns the
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 from ...framework.compilation import inlined, part
-from ...framework.jit.lazy import types
-from ...framework.jit.records.record_type import record_type
+from ...framework.jit.kinds import FLOAT, INT, Signature, floats, record_kind, tuple_of
 from ...framework.vectors import add, add_scaled, dot, scale
 from ..contacts.solving.records import SOLVER
 from ..integration.turning import change_of_spin
-from ..shapes.linking.signatures import call_in_dimension, vector_type
+from ..shapes.linking.signatures import call_in_dimension
 
 
 @cache
-def custom_signature(dimensions: int) -> Any:
+def custom_signature(dimensions: int) -> Signature:
     """(solver, row) -> (value, or NaN where the function tells none, along a, turn of a, along b, turn of b)."""
-    vector = vector_type(dimensions)
-    return types.Tuple((types.float64, *(vector,) * 4))(record_type(SOLVER, dimensions), types.int64)
+    vector = floats(dimensions)
+    return tuple_of(FLOAT, *(vector,) * 4)(record_kind(SOLVER, dimensions), INT)
 
 
 call_given = call_in_dimension(custom_signature)

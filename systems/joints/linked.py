@@ -57,4 +57,5 @@ def linked_joint(joint: OwnJoint, dimensions: int) -> Linked:
     ]  # fmt: skip
     title = f'"""{joint.component.__name__}, {dimensions}D."""\n\n'
     made = source_module(title + "\n    ".join([*header, *lines]) + "\n", scope)
-    return Linked(made.given, custom_signature(dimensions))
+    what = f"plugin {joint.plugin}: constraint of joint {joint.component.__name__}, {dimensions}D,"
+    return Linked(made.given, custom_signature(dimensions), what)

@@ -7,11 +7,10 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from ...framework.jit.lazy import types
+from ...framework.jit.kinds import FLOAT, INT, Signature, floats, record_kind, tuple_of
 from ...framework.jit.linking import Linked
-from ...framework.jit.records.record_type import record_type
 from ..records import STATE
-from ..shapes.linking.signatures import call_in_dimension, vector_type
+from ..shapes.linking.signatures import call_in_dimension
 
 # Places in ``state.links``.
 BOUND_SEARCHES, FIRST_TOUCH, TAKE_TOGETHER = PLACES = range(3)
@@ -19,21 +18,21 @@ SWEPT_PARTS, IMPACT_PARTS = (BOUND_SEARCHES, FIRST_TOUCH), (FIRST_TOUCH, TAKE_TO
 
 
 @cache
-def _bound_searches(dimensions: int) -> Any:
-    return types.int64(record_type(STATE, dimensions), types.float64, types.float64)
+def _bound_searches(dimensions: int) -> Signature:
+    return INT(record_kind(STATE, dimensions), FLOAT, FLOAT)
 
 
 @cache
-def _first_touch(dimensions: int) -> Any:
-    vector, i, f = vector_type(dimensions), types.int64, types.float64
-    path = types.UniTuple(vector, 4)  # (x0, x1, x2, x3), see trajectory
-    found = types.Tuple((i, f, vector, vector, vector))
-    return found(record_type(STATE, dimensions), i, i, path, f, f, types.UniTuple(f, 4))
+def _first_touch(dimensions: int) -> Signature:
+    vector, i, f = floats(dimensions), INT, FLOAT
+    path = tuple_of(*(vector,) * 4)  # (x0, x1, x2, x3), see trajectory
+    found = tuple_of(i, f, vector, vector, vector)
+    return found(record_kind(STATE, dimensions), i, i, path, f, f, floats(4))
 
 
 @cache
-def _take_together(dimensions: int) -> Any:
-    return types.int64(record_type(STATE, dimensions), types.int64, types.float64)
+def _take_together(dimensions: int) -> Signature:
+    return INT(record_kind(STATE, dimensions), INT, FLOAT)
 
 
 SIGNATURES = _bound_searches, _first_touch, _take_together

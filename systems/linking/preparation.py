@@ -17,15 +17,15 @@ import numpy as np
 from ...components import AABBCollider, Collider, SphereCollider
 from ...framework.data.adoption import Adoption
 from ...framework.data.bodies import Bodies, SelectedBodies
-from ...framework.data.column_copies import COPY_BLOCKS
+from ...framework.data.column_copies import copy_blocks
 from ...framework.data.component import Component
-from ...framework.data.row_moves import MOVE_ROWS
+from ...framework.data.row_moves import move_rows
 from ...framework.data.table import Table
 from ...framework.jit.background import link_in_background
 from ...framework.jit.link_all import link_all
-from ...framework.jit.linking import Called, Linked
-from ...framework.jit.tick_counter import TICKS_NOW
-from ...framework.schedule.stages import RUN_STAGES, Program, Stage, linked_stage
+from ...framework.jit.linkable import Linkable
+from ...framework.jit.tick_counter import ticks_now
+from ...framework.schedule.stages import Program, Stage, linked_stage, run_stages
 from ...framework.world.world import World
 from ..broad_phase.tree.passes import tree_passes
 from ..forces.accumulation import required_bodies
@@ -35,7 +35,7 @@ from ..queries.kernels import query_kernels
 from ..records import STATE
 from ..scene import Scene
 from ..shapes.geometry_levels import in_order
-from ..shapes.linking.linked_shape import half_extents_call
+from ..shapes.linking.linked_shape import half_extents_kernel
 from ..shapes.linking.linked_shapes import LinkedShapes
 from ..shapes.query import LinkedQuery, linked_query
 from ..stage_list import LINKED_PARTS, WITH_COLLIDERS
@@ -78,10 +78,10 @@ def kind_of_world(scene: Scene, integration: Integration, program: Program) -> K
 def needed_functions(
     dimensions: int, stages: tuple[Stage, ...], conditions: frozenset[str], linked: LinkedShapes | None,
     queries: tuple[LinkedQuery, ...],
-) -> Iterator[Linked | Called]:  # fmt: skip
+) -> Iterator[Linkable]:  # fmt: skip
     """All that steps and queries of such a world may call, some more than once."""
     has_shapes = linked is not None
-    yield from (RUN_STAGES, TICKS_NOW, COPY_BLOCKS, MOVE_ROWS)
+    yield from (run_stages, ticks_now, copy_blocks, move_rows)
     for place, function in LINKED_PARTS.items() if has_shapes else ():
         yield linked_part(place, function, dimensions)
     for stage in stages:
@@ -92,7 +92,7 @@ def needed_functions(
     if linked is None:
         return
     yield from linked.all_functions(True, any("shapes" in stage.reads for stage in stages if stage.plugin))
-    yield half_extents_call(dimensions)
+    yield half_extents_kernel(dimensions)
     for query in queries:
         yield from query.all_functions()
 

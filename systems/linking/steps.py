@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ...framework.jit.link_all import link_all
-from ...framework.jit.linking import Called, Linked
+from ...framework.jit.linkable import Linkable
+from ...framework.jit.linking import Linked
 from ...framework.schedule.stages import Program, Stage
 from ..broad_phase.search import CandidateSearch
 from ..ccd.search_bounds import DISCRETE
@@ -137,7 +138,7 @@ class StepLinks:
         }
         return {**met, **self._plugin_stages.conditions(met)}
 
-    def _functions_of_shapes(self) -> Iterator[Linked | Called]:
+    def _functions_of_shapes(self) -> Iterator[Linkable]:
         linked = self._scene.linked
         if linked is not None:
             yield from linked.all_functions(self._sweeps(), self._scene.moments_asked)

@@ -7,13 +7,13 @@ from functools import cache
 from typing import Any
 
 from ...framework.compilation import kernel
-from ...framework.jit.lazy import types
-from ...framework.jit.linking import Called, Linked, linked_call
-from ...framework.jit.records.record_type import record_at, record_type
+from ...framework.jit.kinds import INT, record_kind
+from ...framework.jit.linkable import Linkable
+from ...framework.jit.linking import Linked, linked_call
+from ...framework.jit.records.record_type import record_at
 from ..broad_phase.records import TREE
 from ..records import STATE
 from ..shapes.attribution import NOTHING_TESTED
-from ..shapes.linking.signatures import named
 from .casts import find_hits
 from .nearest import find_nearest
 from .neighbours import find_neighbours
@@ -30,26 +30,29 @@ class QueryKernels:
     """
 
     def __init__(self, dimensions: int) -> None:
-        state, batch, tree = (record_type(schema, dimensions) for schema in (STATE, QUERY_BATCH, TREE))
-        signature = types.int64(state, batch, tree, tree, types.int64, types.int64)
+        state, batch, tree = (record_kind(schema, dimensions) for schema in (STATE, QUERY_BATCH, TREE))
+        signature = INT(state, batch, tree, tree, INT, INT)
         state_at, batch_at, tree_at = (record_at(schema, dimensions) for schema in (STATE, QUERY_BATCH, TREE))
         call = linked_call(lambda: signature)
 
-        def run_queries(function, state, batch, moving, static, excluded, first, stop):
+        @kernel
+        def run_queries(
+            function: int, state: int, batch: int, moving: int, static: int, excluded: int, first: int, stop: int
+        ) -> int:
             known, queries = state_at(state), batch_at(batch)
             known.row_a, known.unsound = NOTHING_TESTED, 0
             queries.excluded_count, queries.selects = excluded, excluded > 0 or queries.query.is_collider
             return call(function, known, queries, tree_at(moving), tree_at(static), first, stop)
 
-        self.run: Any = kernel(named(run_queries))
+        self.run: Any = run_queries
         self.overlaps = Linked(find_overlaps, signature)
         self.nearest = Linked(find_nearest, signature)
         self.hits = Linked(find_hits, signature)
         self.neighbours = Linked(find_neighbours, signature)
 
-    def of_world(self, has_shapes: bool) -> Iterator[Linked | Called]:
+    def of_world(self, has_shapes: bool) -> Iterator[Linkable]:
         """What queries of a world may call; without shapes that is the search for neighbours alone."""
-        yield Called(self.run, *[int] * 8)
+        yield self.run
         yield self.neighbours
         if has_shapes:
             yield from (self.overlaps, self.nearest, self.hits)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...framework.data.component import Component
 from ...framework.errors import PluginError
-from ...framework.jit.lazy import errors
+from ...framework.jit.lazy import is_of_compiler
 from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Registry, Shape
 from .linking.signatures import ALONE, OUT_OF_TIME
@@ -47,7 +47,7 @@ class ErrorAttribution:
     def describe(self, error: BaseException, query: type[Component] | None = None) -> None:
         """Add to an error which plugin's function it comes from."""
         state, joints = self._state, self._state.solver.joints
-        uncompiled = isinstance(error, errors.NumbaError) or state.row_a == NOTHING_TESTED
+        uncompiled = is_of_compiler(error) or state.row_a == NOTHING_TESTED
         if joints.asked:
             about, joints.asked = self._joint(joints.asked), 0
         else:

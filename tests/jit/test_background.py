@@ -11,12 +11,12 @@ from carom.framework.jit.link_all import CAN_FORK
 
 FUNCTIONS = """
 import time
-from numba import types
+from carom.framework.jit.kinds import FLOAT
 from carom.framework.compilation import log
 from carom.framework.jit.background import link_in_background, wait
 from carom.framework.jit.linking import Linked
 
-signature = types.float64(types.float64)
+signature = FLOAT(FLOAT)
 
 
 def adding(number):

@@ -42,7 +42,8 @@ def folder(tmp_path_factory):
 def run_checked(folder, code, *arguments, seed="0"):
     """What the program prints, in a new Python with the checked build."""
     optimised = {"NUMBA_OPT": "1"}  # a little, as most of the time goes to compiling
-    environment = {"CAROM_CACHE_DIR": str(folder), "CAROM_CHECK": "1", "PYTHONHASHSEED": seed, **optimised, **NATIVE}
+    environment = {"CAROM_CACHE_DIR": str(folder), "CAROM_CHECK": "1", "PYTHONHASHSEED": seed}
+    environment |= {"CAROM_BACKGROUND": "0", **optimised, **NATIVE}
     return output_of(code, *arguments, **environment, PYTHONPATH=str(Path(__file__).parents[1]))
 
 

@@ -32,7 +32,7 @@ def test_the_checked_build_names_the_column_and_the_index():
     source = """
 from carom.framework.compilation import kernel
 from carom.framework.jit.records.record import make_record
-from carom.framework.jit.records.record_type import record_at, record_type
+from carom.framework.jit.records.record_type import record_at
 from carom.framework.jit.records.schema import Schema, floats
 
 SCHEMA = Schema("Shelf", weight=floats())

@@ -393,7 +393,7 @@ def record_at(kind: RecordType) -> Any:
 
         return kind(types.int64), emit
 
-    return operation("at", 1, typing, (kind.name,))
+    return operation("at", 1, typing)
 
 
 @intrinsic

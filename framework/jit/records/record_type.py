@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ..kinds import record_kind
 from ..lazy import JIT, LazyIntrinsic, LazyModule
 from .plain_view import plain_view_at
 from .schema import Schema
@@ -14,14 +15,14 @@ else:
     record_code = LazyModule(f"{__package__}.record_code")
 
 
-def record_type(schema: Schema, dimensions: int) -> record_code.RecordType:
-    """The type of that record in compiled code."""
-    return record_code.record_type(schema, dimensions)
-
-
 def record_at(schema: Schema, dimensions: int) -> Any:
     """The function (address) -> record of that schema in worlds of that many dimensions."""
-    return LazyIntrinsic(lambda: record_code.record_at(record_type(schema, dimensions))) if JIT else plain_view_at
+    if not JIT:
+        return plain_view_at
+    return LazyIntrinsic(
+        lambda: record_code.record_at(record_code.record_type(schema, dimensions)),
+        label=lambda: str(record_kind(schema, dimensions)),
+    )
 
 
 def _plain_rows(column: Any, start: int, stop: int) -> Any:

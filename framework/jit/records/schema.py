@@ -122,6 +122,13 @@ class Schema:
         """Bytes of a record."""
         return sum(WORD * (1 if isinstance(field, Schema) else field.words) for field in self.fields.values())
 
+    @property
+    def carom_structure(self) -> str:
+        """For names and hashes of what is made for it."""
+        return f"{self.name}({self.digest})"
+
+    carom_depends_on = carom_structure
+
     @cached_property
     def digest(self) -> str:
         """Changes whenever compiled code has to: the hash of all fields, those of inner records included."""

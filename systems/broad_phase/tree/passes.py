@@ -7,9 +7,10 @@ from functools import cache, cached_property
 from typing import Any
 
 from ....framework.compilation import kernel
-from ....framework.jit.lazy import types
-from ....framework.jit.linking import Called, Linked, linked_call
-from ....framework.jit.records.record_type import record_at, record_type
+from ....framework.jit.kinds import INT, record_kind
+from ....framework.jit.linkable import Linkable
+from ....framework.jit.linking import Linked, linked_call
+from ....framework.jit.records.record_type import record_at
 from ..records import TREE
 from . import build, pairs
 
@@ -26,24 +27,24 @@ class TreePasses:
     """The passes of trees of one dimension; each compiles, or is loaded, when first run."""
 
     def __init__(self, dimensions: int) -> None:
-        kind = record_type(TREE, dimensions)
-        self._signature = types.int64(kind, kind)
+        kind = record_kind(TREE, dimensions)
+        self._signature = INT(kind, kind)
         self._at = record_at(TREE, dimensions)
         self.linked = {function.__name__: Linked(function, self._signature) for function in TREE_FUNCTIONS}
 
     @cached_property
-    def _call(self) -> Callable[[int, int, int], int]:
+    def _call(self) -> Any:
         at, call = self._at, linked_call(lambda: self._signature)
 
         @kernel
-        def run_tree_pass(function, tree, other):
+        def run_tree_pass(function: int, tree: int, other: int) -> int:
             return call(function, at(tree), at(other))
 
         return run_tree_pass
 
-    def of_world(self, has_shapes: bool) -> Iterator[Linked | Called]:
+    def of_world(self, has_shapes: bool) -> Iterator[Linkable]:
         """The passes that a world may run; without shapes there are no pairs, only trees for queries."""
-        yield Called(self._call, int, int, int)
+        yield self._call
         for function in (*BUILDING, *(PAIR_FUNCTIONS if has_shapes else ())):
             yield self.linked[function.__name__]
 

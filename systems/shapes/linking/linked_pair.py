@@ -24,7 +24,6 @@ from .signatures import (
     batch_signature,
     corner_signature,
     evaluate_signature,
-    named,
     sweep_signature,
 )
 from .user_functions import as_argument, is_long, user_function
@@ -73,9 +72,13 @@ class LinkedPair:
     def __init__(self, first: Shape | None, second: Shape | None, pair: Pair, dimensions: int) -> None:
         self.first, self.second, self.pair, self.dimensions = first, second, pair, dimensions
 
+    @property
+    def _what(self) -> str:
+        return f"plugin {self.pair.plugin}: pair {self.pair.names}, {self.dimensions}D,"
+
     @cached_property
     def evaluate(self) -> Linked:
-        return Linked(named(make_evaluate(self._contact, *self._records)), evaluate_signature(self.dimensions))
+        return Linked(make_evaluate(self._contact, *self._records), evaluate_signature(self.dimensions), self._what)
 
     @cached_property
     def batch(self) -> Linked:
@@ -83,21 +86,21 @@ class LinkedPair:
             return _batch_by_address(self.dimensions)
         order = in_given_order if self.first is self.second else in_order_of_shapes
         made = make_batch(self._contact, order, *self._records)
-        return Linked(named(made), batch_signature(self.dimensions))
+        return Linked(made, batch_signature(self.dimensions), self._what)
 
     @cached_property
     def sweep(self) -> Linked | None:
         if self.pair.sweep is None:
             return None
         swept = self._registered("swept", self.pair.sweep, "d, v")
-        return Linked(named(make_sweep(swept, *self._records)), sweep_signature(self.dimensions))
+        return Linked(make_sweep(swept, *self._records), sweep_signature(self.dimensions), self._what)
 
     @cached_property
     def corner(self) -> Linked | None:
         if self.pair.corner is None:
             return None
         touches = self._registered("touches", self.pair.corner, "d, slop")
-        return Linked(named(make_corner(touches, *self._records)), corner_signature(self.dimensions))
+        return Linked(make_corner(touches, *self._records), corner_signature(self.dimensions), self._what)
 
     def functions(self, sweeps: bool) -> Iterator[Linked]:
         """Those that there are; sweeps: also that of swept bodies and casts."""
@@ -177,4 +180,4 @@ def convex_sides(first: Shape, second: Shape, pair: Pair) -> tuple[bool, bool]:
 
 @lru_cache(maxsize=CACHE_SIZE)
 def _batch_by_address(dimensions: int) -> Linked:
-    return Linked(named(batch_by_address), batch_signature(dimensions))
+    return Linked(batch_by_address, batch_signature(dimensions))

@@ -10,7 +10,8 @@ import numpy as np
 
 from ....framework.compilation import kernel
 from ....framework.data.arrays.column import ArrayColumn
-from ....framework.jit.linking import CACHE_SIZE, Called, Linked
+from ....framework.jit.kinds import Signature
+from ....framework.jit.linking import CACHE_SIZE, Linked
 from ....framework.jit.records.record import make_record
 from ....framework.jit.records.record_type import record_at, rows_of
 from ....framework.jit.records.schema import Schema, vectors
@@ -57,7 +58,7 @@ class LinkedShape:
             "return half",
             function=self.shape.bounds,
         )
-        return Linked(made.bounds, bounds_signature(self.dimensions))
+        return self._linked(made.bounds, bounds_signature(self.dimensions))
 
     @cached_property
     def rotated(self) -> Linked | None:
@@ -81,19 +82,19 @@ class LinkedShape:
             "return 0",
             function=self.shape.turned,
         )
-        return Linked(made.rotated, rotated_signature(self.dimensions))
+        return self._linked(made.rotated, rotated_signature(self.dimensions))
 
     @cached_property
     def support(self) -> Linked:
         source = f"return function({self._parameters('p')}, direction)"
         made = self._function("def support(p, i, direction):", source, function=self.shape.support)
-        return Linked(made.support, support_signature(self.dimensions))
+        return self._linked(made.support, support_signature(self.dimensions))
 
     @cached_property
     def rounding(self) -> Linked:
         source = f"return function({self._parameters('p')})"
         made = self._function("def rounding(p, i):", source, function=self.shape.rounding)
-        return Linked(made.rounding, rounding_signature())
+        return self._linked(made.rounding, rounding_signature())
 
     @cached_property
     def moments(self) -> Linked | None:
@@ -102,7 +103,7 @@ class LinkedShape:
             return None
         source = f"return function({self._parameters('p')}, {self.dimensions})"
         made = self._function("def moments(state, p, i):", source, function=self.shape.second_moments)
-        return Linked(made.moments, moments_signature(self.dimensions))
+        return self._linked(made.moments, moments_signature(self.dimensions))
 
     def all_functions(self, by_address: bool) -> Iterator[Linked]:
         """by_address: whether some pair takes the shape by the addresses of support and rounding."""
@@ -114,6 +115,11 @@ class LinkedShape:
 
     def _parameters(self, address: str) -> str:
         return parameters_source(self.shape, f"at({address})", "i", "Parameters")
+
+    def _linked(self, function: Any, signature: Signature) -> Linked:
+        shape = self.shape
+        what = f"plugin {shape.plugin}: {function.__name__} of {shape.component.__name__}, {self.dimensions}D,"
+        return Linked(function, signature, what)
 
     def _function(self, header: str, *lines: str, function: Any) -> Any:
         scope = {
@@ -137,21 +143,18 @@ _HALF_EXTENTS = Schema("HalfExtents", half=vectors())
 
 
 @lru_cache(maxsize=2)
-def _half_extents_kernel(dimensions: int) -> Any:
+def half_extents_kernel(dimensions: int) -> Any:
+    """What :func:`half_extents_of` calls beside the shape's bounds, where an entity gets several colliders."""
     state_at, result_at = record_at(STATE, dimensions), record_at(_HALF_EXTENTS, dimensions)
 
     @kernel
-    def half_extents(state_address, address, parameters, result_address):
+    def half_extents(state_address: int, address: int, parameters: int, result_address: int) -> int:
         state, result = state_at(state_address), result_at(result_address)
         for i in range(len(result.half)):
             result.half[i] = call_bounds(address, state, parameters, i)
+        return 0
 
     return half_extents
-
-
-def half_extents_call(dimensions: int) -> Called:
-    """What :func:`half_extents_of` calls beside the shape's bounds, where an entity gets several colliders."""
-    return Called(_half_extents_kernel(dimensions), int, int, int, int)
 
 
 @lru_cache(maxsize=2)
@@ -167,5 +170,5 @@ def half_extents_of(shape: Shape, columns: Mapping[str, np.ndarray], axes: np.nd
     result.half = np.empty((count, dimensions))
     state = _scratch_state(dimensions)
     address = linked_shape(shape, dimensions).bounds.address
-    _half_extents_kernel(dimensions)(state.address, address, parameters.address, result.address)
+    half_extents_kernel(dimensions)(state.address, address, parameters.address, result.address)
     return result.half

@@ -12,7 +12,7 @@ from ....framework.compilation import inlined
 from ....framework.jit.linking import CACHE_SIZE, Linked
 from ....framework.plugins.registry import Registry
 from ....framework.settings import MIXING_RULES
-from .signatures import call_mixing, mixing_signature, named
+from .signatures import call_mixing, mixing_signature
 from .user_functions import user_function
 
 AVERAGE, GEOMETRIC_MEAN, MAX, MIN, MULTIPLY = range(len(MIXING_RULES))  # in their order
@@ -65,7 +65,7 @@ def linked_rule(function: Any) -> Linked:
             raise ValueError("a mixing rule of a plugin returned no number from 0")
         return value
 
-    return Linked(named(mixed), mixing_signature())
+    return Linked(mixed, mixing_signature())
 
 
 def rule_number(registry: Registry, name: str) -> int:

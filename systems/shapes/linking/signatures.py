@@ -6,9 +6,10 @@ from collections.abc import Callable
 from functools import cache, partial
 from typing import Any
 
+from ....framework.jit.kinds import BOOL, FLOAT, INT, Kind, Signature, floats, record_kind, tuple_of
 from ....framework.jit.lazy import JIT, LazyIntrinsic, operation, types
 from ....framework.jit.linking import linked_call
-from ....framework.jit.records.record_type import record_code, record_type
+from ....framework.jit.records.record_type import record_code
 from ...records import STATE
 
 # Values of ``state.unsound``: what was wrong with an answer of a plugin's function.
@@ -17,76 +18,70 @@ OUT_OF_TIME = 2  # a sweep's time is not from 0 to 1
 ALONE = -1  # in place of a second row: the bounds of the first
 
 
-def vector_type(dimensions: int) -> Any:
-    """d floats."""
-    return types.UniTuple(types.float64, dimensions)
-
-
-def _two_rows() -> tuple[Any, ...]:
-    return (types.int64,) * 4  # parameters of a, row a, parameters of b, row b
+TWO_ROWS: tuple[Kind, ...] = (INT,) * 4  # parameters of a, row a, parameters of b, row b
 
 
 @cache
-def evaluate_signature(dimensions: int) -> Any:
+def evaluate_signature(dimensions: int) -> Signature:
     """(state, parameters of a, row a, parameters of b, row b, d) -> (hit, depth, normal, point)."""
-    state, vector = record_type(STATE, dimensions), vector_type(dimensions)
-    contact = types.Tuple((types.boolean, types.float64, vector, vector))
-    return contact(state, *_two_rows(), vector)
+    state, vector = record_kind(STATE, dimensions), floats(dimensions)
+    contact = tuple_of(BOOL, FLOAT, vector, vector)
+    return contact(state, *TWO_ROWS, vector)
 
 
 @cache
-def batch_signature(dimensions: int) -> Any:
+def batch_signature(dimensions: int) -> Signature:
     """(state, start, stop) -> whether all answers were sound, see batches."""
-    return types.int64(record_type(STATE, dimensions), types.int64, types.int64)
+    return INT(record_kind(STATE, dimensions), INT, INT)
 
 
 @cache
-def sweep_signature(dimensions: int) -> Any:
+def sweep_signature(dimensions: int) -> Signature:
     """(state, parameters of a, row a, parameters of b, row b, d, v) -> (hit, time)."""
-    state, vector = record_type(STATE, dimensions), vector_type(dimensions)
-    return types.Tuple((types.boolean, types.float64))(state, *_two_rows(), vector, vector)
+    state, vector = record_kind(STATE, dimensions), floats(dimensions)
+    return tuple_of(BOOL, FLOAT)(state, *TWO_ROWS, vector, vector)
 
 
 @cache
-def corner_signature(dimensions: int) -> Any:
+def corner_signature(dimensions: int) -> Signature:
     """(state, parameters of a, row a, parameters of b, row b, d, slop) -> bool."""
-    state, vector = record_type(STATE, dimensions), vector_type(dimensions)
-    return types.boolean(state, *_two_rows(), vector, types.float64)
+    state, vector = record_kind(STATE, dimensions), floats(dimensions)
+    return BOOL(state, *TWO_ROWS, vector, FLOAT)
 
 
 @cache
-def bounds_signature(dimensions: int) -> Any:
+def bounds_signature(dimensions: int) -> Signature:
     """(state, parameters, row) -> half extents."""
-    return vector_type(dimensions)(record_type(STATE, dimensions), types.int64, types.int64)
+    return floats(dimensions)(record_kind(STATE, dimensions), INT, INT)
 
 
 @cache
-def moments_signature(dimensions: int) -> Any:
+def moments_signature(dimensions: int) -> Signature:
     """(state, own parameters, row) -> measure, centre, means of products of coordinates."""
     count = 1 + dimensions + dimensions * (dimensions + 1) // 2
-    return types.UniTuple(types.float64, count)(record_type(STATE, dimensions), types.int64, types.int64)
+    return floats(count)(record_kind(STATE, dimensions), INT, INT)
 
 
 @cache
-def rotated_signature(dimensions: int) -> Any:
+def rotated_signature(dimensions: int) -> Signature:
     """(state, own parameters, parameters as rotated, row, whether bodies are rotated) -> 0."""
-    return types.int64(record_type(STATE, dimensions), types.int64, types.int64, types.int64, types.boolean)
+    return INT(record_kind(STATE, dimensions), INT, INT, INT, BOOL)
 
 
 @cache
-def support_signature(dimensions: int) -> Any:
+def support_signature(dimensions: int) -> Signature:
     """(parameters, row, direction) -> farthest point of the core."""
-    return vector_type(dimensions)(types.int64, types.int64, vector_type(dimensions))
+    return floats(dimensions)(INT, INT, floats(dimensions))
 
 
-def rounding_signature() -> Any:
+def rounding_signature() -> Signature:
     """(parameters, row) -> rounding."""
-    return types.float64(types.int64, types.int64)
+    return FLOAT(INT, INT)
 
 
-def mixing_signature() -> Any:
+def mixing_signature() -> Signature:
     """(a's value, b's value) -> that of the pair."""
-    return types.float64(types.float64, types.float64)
+    return FLOAT(FLOAT, FLOAT)
 
 
 def call_in_dimension(signature_of: Callable[[int], Any]) -> Any:
@@ -103,11 +98,10 @@ def call_in_dimension(signature_of: Callable[[int], Any]) -> Any:
                 return calls[kind.count].made._defn(context, address, *given)
         return None
 
-    def make() -> Any:
-        depends_on = tuple(call.carom_depends_on for call in calls.values())
-        return operation("call", 1 + len(signature_of(2).args), typing, depends_on)
-
-    return LazyIntrinsic(make)
+    return LazyIntrinsic(
+        lambda: operation("call", 1 + len(signature_of(2).arguments), typing),
+        label=lambda: f"calls {signature_of(2)}, {signature_of(3)}",
+    )
 
 
 call_evaluate = call_in_dimension(evaluate_signature)
@@ -120,16 +114,3 @@ call_rotated = call_in_dimension(rotated_signature)
 call_support = call_in_dimension(support_signature)
 call_rounding = linked_call(rounding_signature)
 call_mixing = linked_call(mixing_signature)
-
-
-def named(function: Any) -> Any:
-    """The function with a hash of all it depends on in its name.
-
-    Machine code is found by symbol name, and numba's names tell apart only functions of one process: of two that one
-    factory made in different processes, both loaded from the cache, one would run in place of the other.
-    """
-    if JIT:
-        from ....framework.jit.hash import deep_hash  # loads numba
-
-        function.__qualname__ = f"{function.__name__}_{deep_hash(function)[:16]}"
-    return function

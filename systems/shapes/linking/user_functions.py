@@ -55,7 +55,7 @@ def _without_address(function: Any) -> Any:
         return found.return_type(*found.args), emit
 
     plain = function.py_func
-    return LazyIntrinsic(lambda: operation(plain.__name__, plain.__code__.co_argcount, typing, function), plain)
+    return LazyIntrinsic(lambda: operation(plain.__name__, plain.__code__.co_argcount, typing), plain)
 
 
 def is_long(function: Any) -> bool:

@@ -1,0 +1,49 @@
+"""What kernels and functions called by address have in common: one signature, by which they are found or compiled."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from . import library
+from .kinds import Signature
+from .names import symbol_of
+
+if TYPE_CHECKING:
+    from .dispatchers import KeptDispatcher
+
+
+class Linkable:
+    """A function of one signature, out of a library or compiled.
+
+    py_func: the plain function; signature: None if it is compiled for whatever it is called with.
+    """
+
+    py_func: Any
+    signature: Signature | None
+    ready = False  # it has been linked
+
+    @cached_property
+    def symbol(self) -> str:
+        """Its name in libraries."""
+        assert self.signature is not None
+        return symbol_of(self.py_func, self.signature)
+
+    @property
+    def compiled(self) -> KeptDispatcher:
+        """What compiles it; MissingKernelError where there is no compiler."""
+        raise NotImplementedError
+
+    @property
+    def is_cached(self) -> bool:
+        """Whether linking it compiles nothing."""
+        return self.ready or library.holds(self) or self.compiled.is_kept(self.signature)
+
+    @property
+    def dependency_count(self) -> int:
+        """Of how many functions it is made: the more, the longer it takes to compile."""
+        return self.compiled.dependency_count
+
+    def link(self) -> None:
+        """Compile or load it now."""
+        raise NotImplementedError

@@ -1,0 +1,52 @@
+"""Errors raised in kernels of a library: what numba has written beside the machine code, made into exceptions again."""
+
+from __future__ import annotations
+
+import ctypes
+import io
+import pickle
+from typing import Any
+
+STOPPED = -3  # numba's code of StopIteration; all above 0 are exceptions with information
+
+
+class _Information(ctypes.Structure):
+    """Where numba notes an exception: class, constant arguments and place as a pickle, and arguments known only when it
+    was raised, with a function that makes a tuple of them."""
+
+    _fields_ = (
+        ("pickle", ctypes.c_void_p), ("size", ctypes.c_int32), ("values", ctypes.c_void_p),
+        ("make_tuple", ctypes.c_void_p), ("count", ctypes.c_int32),
+    )  # fmt: skip
+
+
+class _Unknown:
+    """In place of an argument that is not a constant: numba pickles its compiler's object for one."""
+
+    def __new__(cls, *_: Any) -> _Unknown:
+        return super().__new__(cls)
+
+    def __setstate__(self, state: Any) -> None:
+        del state
+
+
+class _Reader(pickle.Unpickler):
+    def find_class(self, module: str, name: str) -> Any:
+        return _Unknown if module.partition(".")[0] == "llvmlite" else super().find_class(module, name)
+
+
+def raise_error(status: int, address: int) -> None:
+    """Raise what a function has returned a status and information of; called by the library."""
+    if status <= 0:
+        raise StopIteration if status == STOPPED else SystemError(f"a kernel returned status {status}")
+    found = _Information.from_address(address)
+    kind, arguments, place = _Reader(io.BytesIO(ctypes.string_at(found.pickle, found.size))).load()
+    given = list(arguments or ())
+    if found.count > 0:
+        values = iter(ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p)(found.make_tuple)(found.values))
+        given = [next(values) if isinstance(value, _Unknown) else value for value in given]
+    error = kind(*given)
+    if place is not None:
+        function, file, line = place
+        error.add_note(f"raised by {function}, {file}:{line}")
+    raise error
