@@ -12,11 +12,15 @@ from typing import Any, ParamSpec, TypeVar
 from ..compilation import inlined, part, pasted
 from ..data.component import Component
 from ..errors import NoPhysicsError, PluginError
+from ..jit.linking import CACHE_SIZE
 from ..jit.records.schema import Schema
 from ..settings import Settings
 from ..vectors import dot, scale
 from . import checks
 from .registry import Convex, Pair, PluginStage, Registry, Shape
+
+# One for a function, however many plugins register it, of as many worlds: these share its machine code.
+_stage_part = functools.lru_cache(maxsize=CACHE_SIZE)(part)
 
 Thing = TypeVar("Thing")
 P = ParamSpec("P")
@@ -291,7 +295,7 @@ class Plugin:
             columns = {"reads": reads, "writes": writes}
             place, used = checks.check_stage(self, function, (after, before), (records, optional), columns)
             why = " ".join((inspect.getdoc(function) or "").partition("\n\n")[0].split()).rstrip(".")
-            stage = PluginStage(part(function), place, bool(after), *used, needed, why, self.name, optional)
+            stage = PluginStage(_stage_part(function), place, bool(after), *used, needed, why, self.name, optional)
             self._register(self.stages, stage.name, stage)
             return function
 
