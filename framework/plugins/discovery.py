@@ -32,6 +32,19 @@ def offers() -> list[Offer]:
     return [_load(point, names.count(point.name) > 1) for point in points]
 
 
+def shipped() -> list[Plugin]:
+    """Those that come with carom, in order of the names; PluginError if one is broken, or carom is not installed."""
+    try:
+        points = importlib.metadata.distribution("carom").entry_points.select(group=GROUP)
+    except importlib.metadata.PackageNotFoundError:
+        raise PluginError("carom is not installed as a package, so nothing says which plugins ship with it") from None
+    found = [_load(point, False) for point in sorted(points, key=lambda point: point.name)]
+    for offer in found:
+        if offer.plugin is None:
+            raise PluginError(f"plugin {offer.name!r} of package {offer.package} cannot be loaded: {offer.problem}")
+    return [offer.plugin for offer in found if offer.plugin is not None]
+
+
 def find(name: str) -> Plugin:
     """The plugin on offer under that name; PluginError if there is none, or if it is broken."""
     known = importlib.metadata.entry_points(group=GROUP)

@@ -1,4 +1,4 @@
-"""``carom warm-up``: compile in advance the kernels that scenes, or worlds of the shapes that ship, need."""
+"""``carom warm-up``: compile in advance the kernels that scenes, or worlds of all that ships, need."""
 
 from __future__ import annotations
 
@@ -12,26 +12,23 @@ from functools import partial
 from pathlib import Path
 
 import click
-import numpy as np
 from rich.console import Console
 
 from ... import scenes
-from ...components import AABBCollider, RigidBody, SphereCollider, Transform
-from ...framework import Plugin, Settings, World
 from ...framework.compilation import log
 from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_folder, clear_cache
-from ...plugins import Physics, capsule, convex_hull, convex_polygon, half_space, terrain, tile_grid
-from ...plugins.joints import Joints
-from ...plugins.rotation import BoxCollider, Rotation, Spin
+from ...framework.jit.link_all import link_all
+from ...framework.jit.linkable import Linkable
+from ...framework.plugins.discovery import shipped
+from ...framework.plugins.registry import Registry
+from ...plugins import Physics
+from ...systems.linking.preparation import all_functions
 from ..reporting.progress import Progress
 from ..reporting.text import TextTable
 from .loading import Loaded, load, stdout_kept_clean
 from .options import json_option, traceback_option
 from .usage_errors import Problem
 
-# The plugins that ship and bring shapes.
-SHIPPED_SHAPES = capsule, convex_hull, convex_polygon, half_space, tile_grid
-SHIPPED = tuple(module.plugin for module in SHIPPED_SHAPES)
 STEPS = 10  # of a scene, to compile what its own systems call
 
 Work = tuple[str, Callable[[], None]]
@@ -52,7 +49,7 @@ class Row:
 
 @click.command("warm-up", short_help="Compile ahead, so that the first run does not wait.")
 @click.argument("targets", metavar="[SCENE|FILE.py]...", nargs=-1)
-@click.option("--all", "everything", is_flag=True, help="The built-in shapes and every scene of the library.")
+@click.option("--all", "everything", is_flag=True, help="All that ships and every scene of the library.")
 @click.option("--dimensions", type=click.Choice(["2", "3"]), help="Only worlds of so many dimensions.")
 @click.option("--clear", is_flag=True, help="Empty the cache folder instead; old versions' kernels are in it too.")
 @json_option
@@ -60,7 +57,7 @@ class Row:
 def warm_up_command(
     targets: tuple[str, ...], everything: bool, dimensions: str | None, clear: bool, as_json: bool
 ) -> None:
-    """Compile what the scenes or files need; without any: what worlds of the shapes that ship need."""
+    """Compile what the scenes or files need; without any: what worlds of all that ships can need."""
     if clear and (targets or everything or dimensions):
         raise Problem("--clear goes alone: it compiles nothing")
     if targets and (everything or dimensions):
@@ -103,52 +100,18 @@ def warm_up(work: Iterator[Work], say: Callable[[str], None]) -> list[Row]:
 def _work(targets: tuple[str, ...], everything: bool, dimensions: list[int]) -> Iterator[Work]:
     if not targets:
         for d in dimensions:
-            for name, prepare in SHIPPED_WORLDS.items():
-                yield f"{name}, {d}D", partial(prepare, d)
+            yield f"all that ships, {d}D", lambda d=d: link_all(shipped_kernels(d))
     names = [name for name in scenes.names() if scenes.get(name).dimensions in dimensions] if everything else targets
     for loaded in [load(name) for name in names]:  # report missing scenes before anything compiles
         yield loaded.name, partial(_prepare_scene, loaded)
 
 
-def prepare_built_in(dimensions: int) -> None:
-    """What worlds of spheres and boxes need, with every standard integrator, in every mode of collision, asleep too."""
-    integrators = [Settings(integrator=name) for name in sorted(Physics(dimensions=dimensions).integrators)]
-    for settings in (*integrators, Settings(collision="event_driven"), Settings(sleeping=True)):
-        with closing(World(Physics(dimensions=dimensions), settings=settings)) as world:
-            world.prepare(SphereCollider, AABBCollider)
-
-
-def prepare_shipped_plugins(dimensions: int) -> None:
-    """What worlds need in which the shapes of all plugins that ship are together."""
-    plugins = [plugin for plugin in SHIPPED if any(dimensions in shape.dimensions for shape in plugin.shapes)]
-    shapes = [shape for plugin in plugins for shape in plugin.shapes if dimensions in shape.dimensions]
-    with closing(World(Physics(dimensions=dimensions), *plugins)) as world:
-        world.create_entity(Transform((0.0,) * dimensions), AABBCollider(1.0, one_way=1.0))
-        world.prepare(SphereCollider, AABBCollider, *shapes)
-
-
-def prepare_joints(dimensions: int) -> None:
-    """What worlds need in which spheres and boxes spin and have joints, on flat ground and on terrain."""
-    prepare_rotation(dimensions, Joints())
-    prepare_rotation(dimensions, Joints(), terrain.plugin)
-
-
-def prepare_rotation(dimensions: int, *plugins: Plugin) -> None:
-    """What worlds need in which spheres and boxes spin."""
-    with closing(World(Physics(dimensions=dimensions), Rotation(), *plugins)) as world:
-        for collider in (SphereCollider(0.5), BoxCollider(0.5)):
-            world.create_entity(Transform((0.0,) * dimensions), RigidBody(), Spin(), collider)
-        if terrain.plugin in plugins and dimensions == 2:
-            terrain.create_chain(world, [(-1.0, -9.0), (1.0, -9.0)])
-        elif terrain.plugin in plugins:
-            terrain.create_height_field(world, np.zeros((2, 2)), 1.0)
-        world.prepare()
-
-
-SHIPPED_WORLDS: dict[str, Callable[[int], None]] = {
-    "spheres and boxes": prepare_built_in, "shapes of the plugins": prepare_shipped_plugins,
-    "bodies that spin": prepare_rotation, "joints, terrain": prepare_joints,
-}  # fmt: skip
+def shipped_kernels(dimensions: int) -> Iterator[Linkable]:
+    """All that any world of what ships may call, whatever its plugins, bodies, settings and queries."""
+    registry = Registry()
+    for plugin in (Physics(dimensions=dimensions), *shipped()):
+        registry.add(plugin)
+    return all_functions(registry, dimensions)
 
 
 def _prepare_scene(loaded: Loaded) -> None:

@@ -25,18 +25,21 @@ from ...framework.jit.background import link_in_background
 from ...framework.jit.link_all import link_all
 from ...framework.jit.linkable import Linkable
 from ...framework.jit.tick_counter import ticks_now
+from ...framework.plugins.registry import Registry
 from ...framework.schedule.stages import Program, Stage, linked_stage, run_stages
 from ...framework.world.world import World
 from ..broad_phase.tree.passes import tree_passes
 from ..forces.accumulation import required_bodies
 from ..integration.system import Integration
+from ..joints.linked import linked_joint
+from ..plugin_stages.placement import placed
 from ..plugin_stages.plugin_stages import NEEDED, QUERYING
 from ..queries.kernels import query_kernels
 from ..records import STATE
 from ..scene import Scene
 from ..shapes.geometry_levels import in_order
 from ..shapes.linking.linked_shape import half_extents_kernel
-from ..shapes.linking.linked_shapes import LinkedShapes
+from ..shapes.linking.linked_shapes import LinkedShapes, linked_shapes
 from ..shapes.query import LinkedQuery, linked_query
 from ..stage_list import LINKED_PARTS, WITH_COLLIDERS
 from .parts import linked_part
@@ -95,6 +98,20 @@ def needed_functions(
     yield half_extents_kernel(dimensions)
     for query in queries:
         yield from query.all_functions()
+
+
+def all_functions(registry: Registry, dimensions: int) -> Iterator[Linkable]:
+    """All that any world may call that has some of these plugins, whatever its bodies, settings and queries.
+
+    What two plugins need together is what a pair of their shapes needs, so a world of all of them needs all.
+    """
+    stages = tuple(placed(registry.stages.values(), dimensions))
+    shapes = in_order(registry, (shape for shape in registry.shapes if dimensions in shape.dimensions))
+    linked = linked_shapes(registry, shapes, dimensions)
+    queries = tuple(linked_query(registry, linked, shape) for shape in shapes)
+    yield from needed_functions(dimensions, stages, frozenset(stage.needed for stage in stages), linked, queries)
+    own = (joint for joint in registry.joints.values() if dimensions in joint.component.dimensions)
+    yield from (linked_joint(joint, dimensions) for joint in own)
 
 
 @lru_cache(maxsize=128)  # once in a process for worlds alike

@@ -70,8 +70,8 @@ def test_the_second_time_everything_is_there_already(carom, tmp_path):
 def names_of_work(monkeypatch, *arguments):
     """The command's pieces of work, in order."""
     done = []
-    for name in warm_up.SHIPPED_WORLDS:
-        monkeypatch.setitem(warm_up.SHIPPED_WORLDS, name, lambda d, name=name: done.append(f"{name} {d}"))
+    monkeypatch.setattr(warm_up, "shipped_kernels", lambda d: f"all that ships {d}")
+    monkeypatch.setattr(warm_up, "link_all", done.append)
     monkeypatch.setattr(warm_up, "_prepare_scene", lambda loaded: done.append(loaded.name))
     result = CliRunner().invoke(cli, ["warm-up", *arguments])
     assert result.exit_code == 0, result.stderr
@@ -79,13 +79,12 @@ def names_of_work(monkeypatch, *arguments):
 
 
 def test_what_is_to_be_compiled_can_be_chosen(monkeypatch):
-    flat, solid = ([f"{name} {d}" for name in warm_up.SHIPPED_WORLDS] for d in (2, 3))
-    everything = [*flat, *solid]
-    assert names_of_work(monkeypatch) == everything
-    assert names_of_work(monkeypatch, "--dimensions", "3") == solid
+    everything = flat, solid = "all that ships 2", "all that ships 3"
+    assert names_of_work(monkeypatch) == [*everything]
+    assert names_of_work(monkeypatch, "--dimensions", "3") == [solid]
     assert names_of_work(monkeypatch, "jump", "gas2d") == ["jump", "gas2d"]
     planar = [name for name in scenes.names() if scenes.get(name).dimensions == 2]
-    assert names_of_work(monkeypatch, "--all", "--dimensions", "2") == [*flat, *planar]
+    assert names_of_work(monkeypatch, "--all", "--dimensions", "2") == [flat, *planar]
     assert names_of_work(monkeypatch, "--all") == [*everything, *scenes.names()]
 
 

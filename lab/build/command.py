@@ -1,0 +1,44 @@
+"""``carom build``: the kernels of a game, or of all that ships with carom, as one library per platform."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import click
+
+from ...framework.jit.library import file_name, platform_name
+from ..cli.options import traceback_option
+from ..cli.usage_errors import Problem
+from .errors import BuildError
+from .kernels import collect
+from .library import build_library
+from .platforms import PLATFORMS
+
+
+@click.command("build", short_help="Build a game's kernels into a library, for players without a compiler.")
+@click.argument("games", metavar="[FILE.py]...", nargs=-1)
+@click.option(
+    "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("kernels"), show_default=True,
+    metavar="FOLDER", help="Where the libraries go, one file per platform: use_kernels(FOLDER) loads them.",
+)
+@click.option(
+    "--platform", "names", multiple=True, type=click.Choice([*PLATFORMS]), help="For which machines; else for this one."
+)
+@traceback_option
+def build_command(games: tuple[str, ...], out: Path, names: tuple[str, ...]) -> None:
+    """Compile all kernels that worlds of these files may call, and no library has; without any: all that ships."""
+    platforms = [PLATFORMS.get(name) for name in names or (platform_name(),)]
+    if None in platforms:
+        raise Problem(f"carom builds for {', '.join(PLATFORMS)}; this machine is {platform_name()}")
+    try:
+        kernels = collect(games, "generic")
+        for platform in platforms:
+            assert platform is not None
+            path = out / file_name(platform.name)
+            build_library(kernels, path, platform, compared=True)
+            click.echo(f"{path}: {len(kernels)} kernels, {path.stat().st_size / 1e6:.2f} MB")
+    except subprocess.CalledProcessError as error:
+        raise click.exceptions.Exit(error.returncode) from None
+    except BuildError as error:
+        raise Problem(str(error)) from error
