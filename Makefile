@@ -7,7 +7,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 PYTEST := $(BIN)/pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 unexport PYTHONDONTWRITEBYTECODE  # or every worker would compile all tests and carom anew in each run
 
-.PHONY: run install test test-slow test-all test-long coverage wheel bench figures typecheck lint clean
+.PHONY: run install test test-slow test-all test-long coverage kernels wheel wheels bench figures typecheck lint clean
 
 run: .venv/plot  # a scene, with pictures in out/
 	$(BIN)/carom run $(SCENE) --out out $(ARGS)
@@ -23,10 +23,12 @@ test-long: .venv/test  # more cases and steps of what the others test, before a 
 coverage: .venv/test  # which lines of the engine the tests run: kernels as plain Python, with the same bits as compiled
 	NUMBA_DISABLE_JIT=1 $(PYTEST) -m "plain and not slow and not compiled" --cov --cov-report=term $(ARGS) \
 	  $$(grep -rl --include="test_*.py" "mark\.plain" tests | sort)  # all others would be collected in vain
-wheel: .venv/plot  # for this platform and Python, with compiled kernels, into dist/
-	rm -rf framework/prebuilt build/lib build/bdist*
-	$(BIN)/carom warm-up --portable framework/prebuilt
-	$(PIP) wheel --quiet --no-deps --wheel-dir dist .; status=$$?; rm -rf framework/prebuilt build/lib build/bdist*; exit $$status
+kernels: .venv/build  # a library of all that ships, beside the package: what is not edited then compiles no more
+	$(BIN)/carom build
+wheel: .venv/build  # for this platform and every Python, with compiled kernels, into dist/
+	$(BIN)/python -m carom.lab.build.wheel dist
+wheels: .venv/build  # for all platforms
+	$(BIN)/python -m carom.lab.build.wheel dist linux-x86_64 linux-aarch64 macos-arm64 win-amd64 wasm32
 bench: .venv/bench  # carom against pymunk and Box2D; ARGS="--quick", see docs/benchmarks.md
 	$(BIN)/python -m studies bench $(ARGS)
 typecheck: .venv/test .venv/dev

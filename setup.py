@@ -1,20 +1,24 @@
-"""The wheel: with compiled kernels in framework/prebuilt it is one of this platform and Python version, else pure."""
+"""The wheel: with a library of compiled kernels in the package it is of a platform, for every Python; else pure."""
 
+import os
 import sys
 from pathlib import Path
 
 from setuptools import Distribution, setup
 
-FRAMEWORK = Path(__file__).parent / "src" / "carom" / "framework"
-PREBUILT = FRAMEWORK / "prebuilt" / "index.json"
+PACKAGE = Path(__file__).parent / "src" / "carom"
+TAG = os.environ.get("CAROM_WHEEL")  # of the platform that the library is for
 
-if not FRAMEWORK.is_dir():  # git on Windows writes links as text files unless told otherwise
+if not (PACKAGE / "framework").is_dir():  # git on Windows writes links as text files unless told otherwise
     sys.exit("src/carom holds links to the folders beside src: clone with `git clone -c core.symlinks=true`")
 
 
 class MaybeCompiled(Distribution):
     def has_ext_modules(self):
-        return PREBUILT.exists()
+        return TAG is not None
 
 
-setup(distclass=MaybeCompiled)
+setup(
+    distclass=MaybeCompiled,
+    options={"bdist_wheel": {"py_limited_api": "cp311", "plat_name": TAG}} if TAG else {},
+)

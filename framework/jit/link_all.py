@@ -33,6 +33,7 @@ def link_all(functions: Iterable[Linkable]) -> None:
     functions = [function for function in functions if not function.ready]
     if not functions:
         return
+    functions[0].compiled  # noqa: B018 - LibraryError where there is no compiler
     from .cache import cache_folder  # loads numba
 
     with dispatchers.CompilerLock():

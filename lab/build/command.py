@@ -14,20 +14,27 @@ from .errors import BuildError
 from .kernels import collect
 from .library import build_library
 from .platforms import PLATFORMS
+from .wheel import own
 
 
 @click.command("build", short_help="Build a game's kernels into a library, for players without a compiler.")
 @click.argument("games", metavar="[FILE.py]...", nargs=-1)
 @click.option(
-    "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("kernels"), show_default=True,
-    metavar="FOLDER", help="Where the libraries go, one file per platform: use_kernels(FOLDER) loads them.",
+    "--out", type=click.Path(path_type=Path, file_okay=False), metavar="FOLDER",
+    help="Where the libraries go, one file per platform, for use_kernels(FOLDER); else kernels beside the first file.",
 )
 @click.option(
     "--platform", "names", multiple=True, type=click.Choice([*PLATFORMS]), help="For which machines; else for this one."
 )
 @traceback_option
-def build_command(games: tuple[str, ...], out: Path, names: tuple[str, ...]) -> None:
-    """Compile all kernels that worlds of these files may call, and no library has; without any: all that ships."""
+def build_command(games: tuple[str, ...], out: Path | None, names: tuple[str, ...]) -> None:
+    """Compile all kernels that worlds of these files may call and carom's own library lacks.
+
+    Without files: all that ships with carom, into carom's own folder. In a checkout, what is not edited then compiles
+    no more.
+    """
+    if not games and (out or names):
+        raise Problem("--out and --platform are for a game: name its file")
     platforms = [PLATFORMS.get(name) for name in names or (platform_name(),)]
     if None in platforms:
         raise Problem(f"carom builds for {', '.join(PLATFORMS)}; this machine is {platform_name()}")
@@ -35,7 +42,7 @@ def build_command(games: tuple[str, ...], out: Path, names: tuple[str, ...]) -> 
         kernels = collect(games, "generic")
         for platform in platforms:
             assert platform is not None
-            path = out / file_name(platform.name)
+            path = (out or Path(games[0]).parent / "kernels") / file_name(platform.name) if games else own(platform)
             build_library(kernels, path, platform, compared=True)
             click.echo(f"{path}: {len(kernels)} kernels, {path.stat().st_size / 1e6:.2f} MB")
     except subprocess.CalledProcessError as error:

@@ -71,8 +71,8 @@ def collect(arguments: Iterable[str], processor: str) -> list[BuiltKernel]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "kernels"
         environment = {**os.environ, OFF: "0", "NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
-        command = [sys.executable, "-m", "carom.lab.build.kernels", str(path), *arguments]
-        subprocess.run(command, env=environment, check=True)
+        code = f"from {__name__} import write; write()"
+        subprocess.run([sys.executable, "-c", code, str(path), *arguments], env=environment, check=True)
         return pickle.loads(path.read_bytes())
 
 
@@ -82,7 +82,9 @@ def prepare(targets: Sequence[str]) -> None:
     for target in targets:
         loaded = load(target)
         with closing(loaded.build(None, {}, 0)) as world, loaded.attribute_errors():
-            functions.update(dict.fromkeys(all_functions(world.registry, world.dimensions)))
+            dimensions = world.dimensions
+            assert dimensions is not None  # a file without physics is no game, see load
+            functions.update(dict.fromkeys(all_functions(world.registry, dimensions)))
             world.prepare()
             for _ in range(STEPS):
                 world.step()
@@ -92,7 +94,8 @@ def prepare(targets: Sequence[str]) -> None:
     link_all(functions)
 
 
-if __name__ == "__main__":
+def write() -> None:
+    """What that process does."""
     log.processes, log.background = os.cpu_count() or 1, False
     prepare(sys.argv[2:])
     Path(sys.argv[1]).write_bytes(pickle.dumps(linked_kernels()))
