@@ -11,6 +11,7 @@ from ..framework.compilation import part
 from ..framework.data.columns import Column, special_column
 from ..framework.data.component import Component
 from ..framework.errors import CaromError
+from ..framework.matrices import matrix_product
 from ..framework.typing import Vector
 from ..framework.vectors import item
 from .colliders import AABBCollider, Collider
@@ -21,6 +22,7 @@ UNKNOWN = "Spin.inertia is None, and it has no collider that tells it, or severa
 FASTEST_TURN = 1e150  # rad/s: squares of it are finite
 MOST_TORQUE = 1e150  # N m
 ROUNDING = 1e-9  # by which sums of moments may be too small
+SINGULAR = 1e-13  # of the trace cubed: a determinant below it is that of a line, and rounding
 Angular = float | np.ndarray
 # Arguments, checked like fields.
 TORQUE = Column(item="angular", owner="Spin", name="apply_torque", largest=MOST_TORQUE)
@@ -152,7 +154,7 @@ class Spin(Component):
         if not np.ndim(moments):
             return float(twist / moments) if moments > 0.0 else 0.0
         axes = self._axes()
-        return axes @ np.linalg.pinv(moments, hermitian=True) @ axes.T @ twist  # 0 about an axis without inertia
+        return matrix_product(_turned_tensor(axes, _inverse(moments)), twist)
 
     def _axes(self) -> np.ndarray:
         """The matrix of the body's quaternion w, x, y, z."""
@@ -194,7 +196,23 @@ def axes_of(rotation: np.ndarray) -> np.ndarray:
     """The matrix of a quaternion w, x, y, z."""
     w, x, y, z = rotation.tolist()
     across = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
-    return np.eye(3) + 2.0 * w * across + 2.0 * across @ across
+    return np.eye(3) + 2.0 * w * across + 2.0 * matrix_product(across, across)
+
+
+def _inverse(moments: np.ndarray) -> np.ndarray:
+    """Of a symmetric matrix; 0 about an axis without inertia."""
+    diagonal = np.diagonal(moments)
+    if not (moments - np.diag(diagonal)).any():
+        return np.diag([1.0 / x if x > 0.0 else 0.0 for x in diagonal.tolist()])
+    adjoint = np.array([np.cross(moments[k - 2], moments[k - 1]) for k in range(3)])
+    size, whole = float((adjoint[0] * moments[0]).sum()), float(diagonal.sum())
+    if size > SINGULAR * whole * whole * whole:
+        return adjoint / size
+    return np.linalg.pinv(moments, hermitian=True)  # of a line askew
+
+
+def _turned_tensor(axes: np.ndarray, tensor: Any) -> np.ndarray:
+    return matrix_product(matrix_product(axes, tensor), axes.T)
 
 
 class MassOfShape(NamedTuple):
@@ -216,7 +234,7 @@ class MassOfShape(NamedTuple):
         if len(self.offset) == 2:
             return float(zz)
         axes = axes_of(turn) if np.ndim(turn) else np.eye(3)
-        return axes @ np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))) @ axes.T
+        return _turned_tensor(axes, ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
 
 
 def mass_of_shape(store: Any, row: Any) -> MassOfShape | None:
@@ -245,7 +263,7 @@ def inertia_without_parts(store: Any, row: Any, mass: float, turn: Any = 0.0) ->
         return mass * float(own)
     (xx, yy, zz), (xy, xz, yz) = own, products
     axes = axes_of(turn) if np.ndim(turn) else np.eye(3)
-    return axes @ (mass * np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))) @ axes.T
+    return _turned_tensor(axes, mass * np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))))
 
 
 def keep_gyration(store: Any, component: type[Component], rows: np.ndarray) -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from ..components.colliders import Collider
 from ..framework import Plugin, array_column
+from ..framework.elementary import atan2, power
 from ..framework.typing import ArrayField
 from .corners import bounds_of, support_of
 
@@ -35,7 +37,10 @@ def faces_of(points: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     order = np.argsort(-areas, kind="stable")  # of all triples of a face the widest gives its normal
     order = order[areas[order] > NARROW * np.linalg.norm(edges, axis=2).max(axis=1)[order]]
     normals, triples = normals[order] / areas[order, None], triples[order]
-    heights = normals @ points.T - (normals * points[triples[:, 0]]).sum(axis=1)[:, None]
+    heights = np.multiply.outer(normals[:, 0], points[:, 0])  # no BLAS, whose bits are the processor's
+    for k in (1, 2):
+        heights += np.multiply.outer(normals[:, k], points[:, k])
+    heights -= (normals * points[triples[:, 0]]).sum(axis=1)[:, None]
     side = np.where((heights <= FLAT).all(axis=1), 1.0, -1.0)
     left = np.flatnonzero((side[:, None] * heights <= FLAT).all(axis=1))
     faces = []
@@ -49,7 +54,18 @@ def faces_of(points: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
 def around(ring: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """The order of the corners of a face, counter-clockwise about its normal."""
     ways = ring - ring.mean(axis=0)
-    return np.argsort(np.arctan2(np.cross(ways[0], ways) @ normal, ways @ ways[0]))
+    aside, along = (np.cross(ways[0], ways) * normal).sum(axis=1), (ways * ways[0]).sum(axis=1)
+    return np.argsort([atan2(y, x) for y, x in zip(aside.tolist(), along.tolist(), strict=True)])
+
+
+def cholesky(m: np.ndarray) -> np.ndarray:
+    """Of a positive definite matrix (3, 3), the lower one. numpy asks LAPACK, whose bits are the processor's."""
+    (xx, _, _), (xy, yy, _), (xz, yz, zz) = m.tolist()
+    a = math.sqrt(xx)
+    b, d = xy / a, xz / a
+    c = math.sqrt(yy - b * b)
+    e = (yz - b * d) / c
+    return np.array(((a, 0.0, 0.0), (b, c, 0.0), (d, e, math.sqrt(zz - d * d - e * e))))
 
 
 @functools.lru_cache(maxsize=256)
@@ -76,10 +92,11 @@ def _hull_of(data: bytes) -> np.ndarray | str:
     a, b, c = np.array(triangles).transpose(1, 0, 2)
     six = (a * np.cross(b, c)).sum(axis=1)  # times the volumes of the tetrahedra from the middle
     volume, whole = six.sum() / 6.0, a + b + c
-    centre = six @ whole / (24.0 * volume)
-    means = np.einsum("t,vti,vtj->ij", six, *2 * [np.array((a, b, c, whole))]) / (120.0 * volume)
-    roots = np.linalg.cholesky(means - np.outer(centre, centre))
-    sides = np.diag(roots) * np.cbrt(volume / np.diag(roots).prod())
+    centre = (six[:, None] * whole).sum(axis=0) / (24.0 * volume)
+    corners = np.array((a, b, c, whole))
+    products = six[:, None, None] * corners[..., None] * corners[..., None, :]
+    roots = cholesky(products.reshape(-1, 3, 3).sum(axis=0) / (120.0 * volume) - np.outer(centre, centre))
+    sides = np.diag(roots) * power(float(volume / np.diag(roots).prod()), 1.0 / 3.0)
     return np.array(
         (points[0] + (centre + middle) * size, *roots.T * size, sides * size, *points[np.sort(index[corner])])
     )

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..components.colliders import Collider
 from ..framework import Column, Plugin, array_column, column
+from ..framework.elementary import atan2, cos, sin, sines_and_cosines
 from ..framework.typing import ArrayField
 from .corners import bounds_of, support_of
 
@@ -91,8 +92,8 @@ class ConvexPolygonCollider(Collider):
         ValueError if ``n`` is below 3 or the radius not above 0.
         """
         count, reach = CORNERS.checked(n), RADIUS.checked(radius)
-        angles = np.arange(count) * (FULL_TURN / count)
-        return cls(reach * np.stack((np.cos(angles), np.sin(angles)), axis=1), **common)
+        sines, cosines = sines_and_cosines(np.arange(count) * (FULL_TURN / count))
+        return cls(reach * np.stack((cosines, sines), axis=1), **common)
 
     @classmethod
     def sample(cls, **common: Any) -> Self:
@@ -134,15 +135,16 @@ class ConvexPolygonCollider(Collider):
                 xx += strip * (cx * cx + along * ny * ny + across * nx * nx)
                 xy += strip * (cx * cy + (across - along) * nx * ny)
                 yy += strip * (cy * cy + along * nx * nx + across * ny * ny)
-                before = math.atan2(py - shape.vertices[i, 1], px - shape.vertices[i, 0])
-                turn = (math.atan2(ty, tx) - before) % FULL_TURN
+                before = atan2(py - shape.vertices[i, 1], px - shape.vertices[i, 0])
+                turn = atan2(ty, tx) - before
+                turn += FULL_TURN if turn < 0.0 else 0.0
                 middle = before - 0.5 * math.pi + 0.5 * turn  # direction of the corner's sector
-                ux, uy, sector = math.cos(middle), math.sin(middle), 0.5 * turn * r * r
-                first, wide = 2.0 / 3.0 * r * r * r * math.sin(0.5 * turn), r * r * r * r / 8.0
+                ux, uy, sector = cos(middle), sin(middle), 0.5 * turn * r * r
+                first, wide = 2.0 / 3.0 * r * r * r * sin(0.5 * turn), r * r * r * r / 8.0
                 area, mx, my = area + sector, mx + sector * px + first * ux, my + sector * py + first * uy
-                xx += sector * px * px + 2.0 * first * px * ux + wide * (turn + math.sin(turn) * (ux * ux - uy * uy))
-                xy += sector * px * py + first * (px * uy + py * ux) + wide * 2.0 * math.sin(turn) * ux * uy
-                yy += sector * py * py + 2.0 * first * py * uy + wide * (turn - math.sin(turn) * (ux * ux - uy * uy))
+                xx += sector * px * px + 2.0 * first * px * ux + wide * (turn + sin(turn) * (ux * ux - uy * uy))
+                xy += sector * px * py + first * (px * uy + py * ux) + wide * 2.0 * sin(turn) * ux * uy
+                yy += sector * py * py + 2.0 * first * py * uy + wide * (turn - sin(turn) * (ux * ux - uy * uy))
         if not area > 0.0:
             return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         return area, mx / area, my / area, xx / area, xy / area, yy / area

@@ -17,6 +17,7 @@ from weakref import WeakValueDictionary
 import numpy as np
 
 from ..framework import Bodies, CaromError, ForceSystem, Phase, Plugin, System, World
+from ..framework.vectors import length
 
 __all__ = ["Spring", "Springs"]
 
@@ -142,7 +143,7 @@ class Springs(Plugin):
                 ) from None
         if a == b:
             raise ValueError(f"springs.connect: a spring needs two bodies, got entity {a} twice")
-        rest = math.hypot(*(places[1] - places[0])) if rest_length is None else rest_length
+        rest = length(tuple((places[1] - places[0]).tolist())) if rest_length is None else rest_length
         number = next(n for n in self._numbers if n not in self._by_number)
         return self._add(Spring(self, number, int(a), int(b), rest, stiffness, damping, only_pulls))
 
@@ -238,9 +239,9 @@ class _Columns:
         """(length (n,), unit vector (n, d) from the lower to the higher id, attractive force (n,))."""
         position, velocity = bodies.position, bodies.linear_velocity
         apart = position[self.high] - position[self.low]
-        length = np.abs(apart[:, 0])
-        for k in range(1, apart.shape[1]):
-            length = np.hypot(length, apart[:, k])  # avoids overflow of a square
+        largest = np.abs(apart).max(axis=1)
+        unit = np.divide(apart, largest[:, None], out=np.zeros_like(apart), where=largest[:, None] > 0)
+        length = largest * np.sqrt((unit * unit).sum(axis=1))  # no square overflows
         unit = np.divide(apart, length[:, None], out=np.zeros_like(apart), where=length[:, None] > 0)
         speed = ((velocity[self.high] - velocity[self.low]) * unit).sum(axis=1)
         tension = self.stiffness * (length - self.rest_length) + self.damping * speed

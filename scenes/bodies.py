@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..components import AABBCollider, RigidBody, SphereCollider, Transform
 from ..components.spin import Spin
 from ..framework import World
+from ..framework.elementary import sines_and_cosines
 from ..plugins.capsule import CapsuleCollider
 from ..plugins.convex_polygon import ConvexPolygonCollider
 from ..plugins.rotation import BoxCollider
@@ -25,7 +26,8 @@ def lattice(n: int, per_row: int, dimensions: int = 2) -> NDArray[np.float64]:
 def random_velocities(random: np.random.Generator, n: int, speeds: tuple[float, float]) -> NDArray[np.float64]:
     """(n, 2) m/s: in all directions, with speeds from .. to."""
     heading, speed = random.uniform(0, 2 * math.pi, n), random.uniform(*speeds, n)
-    return speed[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    sines, cosines = sines_and_cosines(heading)
+    return speed[:, None] * np.stack([cosines, sines], axis=1)
 
 
 def add_spheres(

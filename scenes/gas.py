@@ -18,7 +18,7 @@ from ..framework import Settings, World
 from ..plugins import Physics
 from .bodies import add_spheres, lattice
 from .random_numbers import uniform
-from .sizes import ceil_root, whole
+from .sizes import ceil_root, root, whole
 from .walls import enclose
 
 RADIUS = 0.5
@@ -39,7 +39,7 @@ def gas3d(settings: Settings | None = None, seed: int = 0, *, n: int = BODIES[3]
 
 def side(n: int, dimensions: int) -> float:
     """The side of the box, metres."""
-    return (n * BODY_VOLUME[dimensions] / FILLING[dimensions]) ** (1 / dimensions)
+    return root(n * BODY_VOLUME[dimensions] / FILLING[dimensions], dimensions)
 
 
 def initial_state(n: int, dimensions: int, seed: int = 0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from ..framework.elementary import power
+
 
 def whole(value: Any, name: str, least: int = 1) -> int:
     """``value`` as an int; TypeError if it is not a whole number, ValueError below ``least``, both with its name."""
@@ -24,6 +26,11 @@ def real(value: Any, name: str, least: float = 0.0, *, above: bool = False) -> f
     if not math.isfinite(number) or number < least or (above and number == least):
         raise ValueError(f"{name} must be {'above' if above else 'at least'} {least:g}, got {value!r}")
     return number
+
+
+def root(x: float, degree: int) -> float:
+    """The ``degree``-th root, the same on every platform."""
+    return math.sqrt(x) if degree == 2 else power(x, 1 / degree)
 
 
 def floor_root(n: int, degree: int) -> int:

@@ -54,4 +54,4 @@ def gravity_vector(gravity: Any, dimensions: int) -> np.ndarray:
 
 def cubed(dt: float) -> float:
     """dt^3, inf where that overflows."""
-    return dt**3 if dt < 1e100 else math.inf
+    return dt * dt * dt if dt < 1e100 else math.inf

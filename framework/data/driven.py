@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ..elementary import atan2
+
 STOPS = "_stops"  # column on demand: which step stops the body at its end, and whether it stops to turn, too
 THIS, NEXT, TURNS = 1, 2, 4
 VELOCITY, SPIN, SPINS = "linear_velocity", "spin.angular_velocity", "has:spin."
@@ -66,5 +68,6 @@ def _turns(now: np.ndarray, then: np.ndarray) -> np.ndarray:
     real = a * w - b * x - c * y - d * z
     turn = np.stack((a * x + b * w + c * z - d * y, a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w), 1)
     size = np.linalg.norm(turn, axis=1)
-    angle = np.where(real < 0.0, -2.0, 2.0) * np.arctan2(size, np.abs(real))
+    half = [atan2(aside, along) for aside, along in zip(size.tolist(), np.abs(real).tolist(), strict=True)]
+    angle = np.where(real < 0.0, -2.0, 2.0) * np.array(half)
     return turn * np.divide(angle, size, out=np.zeros_like(size), where=size > 0.0)[:, None]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import inlined, part
+from ...framework.elementary import cos
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, scale, sub
 from ...systems.queries.compiled import (
     half_extents_of_row,
@@ -369,7 +370,7 @@ def move_one(state, near, character, ladder, work, i, dt):
     extents, dropping = half_extents_of_row(state, i), character.since_drop[i] < DROPS_FOR
     walker = Walker(
         state, near, character, work, i, start, extents, least(extents), up, character.skin[i],
-        math.cos(character.max_slope[i]), dropping, gravity, wish, look_around(state, near, i, start, extents, reach),
+        cos(character.max_slope[i]), dropping, gravity, wish, look_around(state, near, i, start, extents, reach),
     )  # fmt: skip
     work.hits, work.inside = 0, False
     at, crusher = carried(walker, ride, floor, left, put, rising)

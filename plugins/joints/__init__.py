@@ -12,6 +12,8 @@ from ...components.part_of import Changes as PartChanges
 from ...components.part_of import PartOf
 from ...components.spin import Spin
 from ...framework import Plugin, World
+from ...framework.elementary import cos, sin
+from ...framework.matrices import unit
 from ...systems.double_buffers import BEFORE_STEP
 from ...systems.joints.own import Placed, rows_of
 from ...systems.joints.records import CUSTOM, FREE, HOLD, JOINTS, POINT, TURN
@@ -397,7 +399,7 @@ class Joints(Plugin):
         row = self._row(entity)
         rotation = table.column("rotation")[row]
         angle = float(rotation) if d == 2 else 0.0
-        c, s = np.cos(angle), np.sin(angle)
+        c, s = cos(angle), sin(angle)
         axes = np.array(((c, -s), (s, c))) if d == 2 else _matrix(rotation)
         return Place(table.column("position")[row].copy(), axes, angle)
 
@@ -424,7 +426,7 @@ class Joints(Plugin):
 
 def _matrix(q: Any) -> np.ndarray:
     """The rotation matrix of a quaternion."""
-    w, x, y, z = np.asarray(q) / np.linalg.norm(q)
+    w, x, y, z = unit(q)
     return np.array((
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
         (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),

@@ -12,6 +12,7 @@ from ...components import RigidBody
 from ...components.part_of import PartOf
 from ...framework.data.columns import Column, special_column
 from ...framework.data.component import NOTHING, Component
+from ...framework.matrices import matrix_product, unit
 from ...framework.typing import Vector
 from ...systems.joints.own import OwnJoint, own_joint
 from ...systems.joints.records import ALIGN, CUSTOM, DRIVE, FREE, HOLD, LIMIT, SPRING, TURN
@@ -60,12 +61,16 @@ class Place(NamedTuple):
     axes: Any  # (d, d), those of the body as columns
     angle: float
 
+    def along(self, vector: Any) -> np.ndarray:
+        """A vector of the world along the axes of the body."""
+        return matrix_product(self.axes.T, vector)
+
     def local(self, point: Any) -> np.ndarray:
         """A point of the world, as the body has it."""
-        return self.axes.T @ (np.asarray(point, float) - self.position)
+        return self.along(np.asarray(point, float) - self.position)
 
     def point(self, local: Any) -> np.ndarray:
-        return self.position + self.axes @ np.asarray(local, float)
+        return self.position + matrix_product(self.axes, local)
 
 
 class Watched(Column):
@@ -304,10 +309,9 @@ class Joint(Component, abstract=True):
         """In 3D, keep ``axis`` as the axis of both."""
         if len(a.position) == 2:
             return
-        axis = np.asarray(axis, float) / np.linalg.norm(axis)
-        side = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-        side /= np.linalg.norm(side)
-        self.keep(axis_a=a.axes.T @ axis, axis_b=b.axes.T @ axis, side_a=a.axes.T @ side, side_b=b.axes.T @ side)
+        axis = unit(axis)
+        side = unit(np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))]))
+        self.keep(axis_a=a.along(axis), axis_b=b.along(axis), side_a=a.along(side), side_b=b.along(side))
 
     def turn(self, dimensions: int) -> Row:
         """About the axis; its value is 0 where the joint took hold."""

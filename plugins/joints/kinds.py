@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...framework.data.columns import special_column
+from ...framework.matrices import magnitude, matrix_product, unit
 from ...framework.typing import Vector
 from ...framework.units import warn_of_degrees
 from ...systems.joints.records import (
@@ -97,7 +98,7 @@ class Distance(Joint):
         if not self.held_b:
             self.keep(at_b=self.local(b, self.b, b.position if self.point_b is None else self.point_b))
         if new:
-            self.keep(start=float(np.linalg.norm(b.point(self.at_b) - a.point(self.at_a))))
+            self.keep(start=magnitude(b.point(self.at_b) - a.point(self.at_a)))
         self.keep(held_a=True, held_b=True)
 
     def rows(self, dimensions: int) -> list[Row]:
@@ -217,7 +218,7 @@ class Slider(Driven):
         self.hold(a, b, b.position if self.b != WORLD else a.position)
         self.hold_axis(a, b, self.direction)
         if len(a.position) == 2:
-            self.keep(axis_a=a.axes.T @ (np.asarray(self.direction) / np.linalg.norm(self.direction)))
+            self.keep(axis_a=a.along(unit(self.direction)))
 
     def rows(self, dimensions: int) -> list[Row]:
         along = np.asarray(self.axis_a)
@@ -264,14 +265,14 @@ class Wheel(Driven):
             raise ValueError(f"Wheel.direction must not be 0, got {along.tolist()}")
         if along.shape != (3,) or axis.shape != (3,):
             return
-        if abs(along @ axis) > SQUARE * np.linalg.norm(along) * np.linalg.norm(axis):
+        if abs(matrix_product(along, axis)) > SQUARE * magnitude(along) * magnitude(axis):
             raise ValueError(f"Wheel.axis must be at right angles to its direction, got {axis.tolist()}")
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, self.anchor)
         self.hold_axis(a, b, self.axis)
-        along = np.asarray(self.direction) / np.linalg.norm(self.direction)
-        self.keep(side_a=a.axes.T @ along, side_b=b.axes.T @ along)
+        along = unit(self.direction)
+        self.keep(side_a=a.along(along), side_b=b.along(along))
 
     def rows(self, dimensions: int) -> list[Row]:
         along = np.asarray(self.side_a)

@@ -6,6 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...framework.elementary import cos, sin
+from ...framework.matrices import matrix_product
+
 
 class Pose(NamedTuple):
     """A position (d,) and a rotation: an angle, in space a unit quaternion (w, x, y, z)."""
@@ -24,17 +27,17 @@ class Pose(NamedTuple):
     def axes(self) -> np.ndarray:
         """(d, d): its axes as columns."""
         if len(self.position) == 2:
-            c, s = np.cos(self.rotation), np.sin(self.rotation)
+            c, s = cos(self.rotation), sin(self.rotation)
             return np.array(((c, -s), (s, c)))
         w, x, y, z = self.rotation
         across = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
-        return np.eye(3) + 2.0 * w * across + 2.0 * across @ across
+        return np.eye(3) + 2.0 * w * across + 2.0 * matrix_product(across, across)
 
     def point(self, local: Any) -> np.ndarray:
-        return self.position + self.axes() @ np.asarray(local, float)
+        return self.position + matrix_product(self.axes(), local)
 
     def local(self, point: Any) -> np.ndarray:
-        return self.axes().T @ (np.asarray(point, float) - self.position)
+        return matrix_product(self.axes().T, np.asarray(point, float) - self.position)
 
     def then(self, inner: Pose) -> Pose:
         """The pose of what is at ``inner`` along the axes of this."""

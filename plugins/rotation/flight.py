@@ -11,15 +11,16 @@ import math
 
 from ...components.spin import UNKNOWN, inertia_about
 from ...framework.compilation import inlined, part
+from ...framework.elementary import exp
 from ...framework.jit.records.record_type import zero_of
-from ...systems.integration.stages import CUBIC, LINE, phi1, phi2
+from ...systems.integration.stages import CUBE_ROOT_OF_2, CUBIC, LINE, phi1, phi2
 from ...systems.parts.inertia import inertia_with_parts
 from ...systems.parts.rows import has_parts
 from ...systems.shapes.dispatch import second_moments
 from ...systems.shapes.free_rotation import diagonalised, turn_freely, turn_to_energy
 from ...systems.shapes.quaternions import product, rotate, rotation_in_space, set_rotation
 
-TRIPLE = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))  # of the step: the outer two of Yoshida's three
+TRIPLE = 1.0 / (2.0 - CUBE_ROOT_OF_2)  # of the step: the outer two of Yoshida's three
 HEAVY = 5.0  # damping times the step: above it the middle one, which goes back in time, enlarges rounding too much
 NOT_POSITIVE = "Spin.inertia must be positive and finite"
 NO_EXTENT = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -107,7 +108,7 @@ def turn_in_plane(state, spin, turns, i, h):
     w = at_most(spin.angular_velocity[i, 0], most)
     new = w + acceleration * h
     if z != 0.0:
-        new = w * math.exp(z) + acceleration * h * phi1(z)
+        new = w * exp(z) + acceleration * h * phi1(z)
     turn = h * new
     if state.usual_path_degree > LINE:
         turn = h * (w * phi1(z) + acceleration * h * phi2(z))
@@ -122,7 +123,7 @@ def turn_in_plane(state, spin, turns, i, h):
 def pushed(q, m, inverse, act, h):
     """The angular momentum along the principal axes after h seconds of torque and damping. act: (torque along the axes
     of the world, damping)."""
-    along, decay, gain = rotate(q, act[0], True), math.exp(-act[1] * h), h * phi1(-act[1] * h)
+    along, decay, gain = rotate(q, act[0], True), exp(-act[1] * h), h * phi1(-act[1] * h)
     return (
         m[0] * decay + along[0] * gain if inverse[0] > 0.0 else 0.0,
         m[1] * decay + along[1] * gain if inverse[1] > 0.0 else 0.0,

@@ -12,6 +12,7 @@ from ...components import SphereCollider
 from ...components.spin import FASTEST_TURN, Spin
 from ...framework import Plugin
 from ...framework.compilation import part
+from ...framework.elementary import cos, sin
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import item, length, replace, scale
 from ...systems.forces.stages import is_zero
@@ -43,8 +44,8 @@ def turn_about(state, i, angle):
         return
     size = length(angle)
     if size > 0.0:
-        s = math.sin(0.5 * size) / size
-        turn = math.cos(0.5 * size), s * item(angle, 0), s * item(angle, 1), s * item(angle, 2)
+        s = sin(0.5 * size) / size
+        turn = cos(0.5 * size), s * item(angle, 0), s * item(angle, 1), s * item(angle, 2)
         set_rotation(state, i, product(turn, rotation_in_space(state, i)))
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
+from ...framework.elementary import cos, exp, sin
 from ...systems.integration.stages import kick_gain, phi1, phi2, runge_kutta_weights
 from ...systems.shapes.free_rotation import turn_to_energy
 from ...systems.shapes.quaternions import product, rotate, rotation_in_space, set_rotation
@@ -113,7 +114,7 @@ def drift_of_turn(state, spin, turns, i, h):
     if is_plane(state):
         z, a = -c * h, spin_by(state, spin, i, torque)[0]
         state.bodies.rotation[i] += h * (w[0] * phi1(z) + a * h * phi2(z))
-        put_spin(state, spin, i, (w[0] * math.exp(z) + a * h * phi1(z), 0.0, 0.0))
+        put_spin(state, spin, i, (w[0] * exp(z) + a * h * phi1(z), 0.0, 0.0))
         return
     principal, inverse, own = principal_moments(state, spin, i)
     q = product(rotation_in_space(state, i), own)
@@ -143,8 +144,8 @@ def turn_from_start(state, turns, i, turned):
         return
     start = turns.start_rotation
     size = math.sqrt(turned[0] * turned[0] + turned[1] * turned[1] + turned[2] * turned[2])
-    s = math.sin(0.5 * size) / size if size > 0.0 else 0.5
-    turn = math.cos(0.5 * size), s * turned[0], s * turned[1], s * turned[2]
+    s = sin(0.5 * size) / size if size > 0.0 else 0.5
+    turn = cos(0.5 * size), s * turned[0], s * turned[1], s * turned[2]
     set_rotation(state, i, product(turn, (start[i, 0], start[i, 1], start[i, 2], start[i, 3])))
 
 
@@ -158,7 +159,8 @@ def runge_kutta_turn(state, spin, turns, i, h):
     half = 0.5 * h * half_gain
     if stage == 0:
         put(turns.pushed, i, torque)
-        turns.fast[i] = not is_plane(state) and w[0] * w[0] + w[1] * w[1] + w[2] * w[2] > (FAST_TURN / h) ** 2
+        turned = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+        turns.fast[i] = not is_plane(state) and turned * h * h > FAST_TURN * FAST_TURN
     turns.changed[i] |= torque != triple(turns.pushed, i)
     if stage == 3 and not turns.changed[i]:
         turns.gained[i] = 0.0

@@ -11,6 +11,7 @@ import math
 
 from ...components.spin import number
 from ...framework.compilation import part
+from ...framework.elementary import atan2, cos, sin
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import item
 from ...systems.shapes.dispatch import half_extents, second_moments
@@ -63,7 +64,7 @@ def box_below(n, h, s):
             x += low * at if corner & 1 else -low * at
             y += low * at if corner & 2 else -low * at
             z += low * at if corner & 4 else -low * at
-    least = math.gamma(m) * slopes  # (m - 1)!
+    least = slopes if m < 3 else 2.0 * slopes  # (m - 1)!
     level, volume, above = rest * level / least, rest * volume / (least * m), rest * above / (least * m * (m + 1))
     by = rest / (least * m)
     return (
@@ -79,7 +80,8 @@ def ball_below(r, s, d):
     """Area or volume of a disc or ball of radius r below what is s above its centre."""
     s = min(max(s, -r), r)
     if d == 2:
-        return r * r * math.acos(-s / r) + s * math.sqrt(r * r - s * s)
+        across = math.sqrt(r * r - s * s)
+        return r * r * atan2(across, -s) + s * across
     return math.pi / 3.0 * (r + s) * (r + s) * (2.0 * r - s)
 
 
@@ -159,8 +161,8 @@ def submerged(state, i, up, top, bottom):
         return ball_below(radius, top - height, d) - ball_below(radius, bottom - height, d), from_body
     own = 1.0, 0.0, 0.0, 0.0  # from its principal axes to those of the body
     if d == 2 and xy != 0.0:
-        angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
-        own, mean, apart = (math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle)), 0.5 * (xx + yy), 0.5 * (xx - yy)
+        angle = 0.5 * atan2(2.0 * xy, xx - yy)
+        own, mean, apart = (cos(0.5 * angle), 0.0, 0.0, sin(0.5 * angle)), 0.5 * (xx + yy), 0.5 * (xx - yy)
         apart = math.sqrt(apart * apart + xy * xy)
         xx, yy = mean + apart, mean - apart
     elif xy != 0.0 or xz != 0.0 or yz != 0.0:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import collections
-import math
 
 from ...components.spin import Spin
 from ...framework import Plugin
 from ...framework.compilation import part
+from ...framework.elementary import exp, power
 from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.records.schema import Schema, floats, integer, ints, table, vectors
 from ...framework.vectors import add, add_scaled, item, length, replace, scale, sub
@@ -134,7 +134,8 @@ def attract(state, dt, field, zones):
                 if is_in(state, j, half, i) and is_first(state, zones, i):
                     o = owner_of(state, i)
                     way = sub(centre_of(state, j), bodies.position[o])
-                    by = bodies.mass[o] * field.strength[j] * max(length(way), core) ** -(field.falloff[j] + 1.0)
+                    by = power(max(length(way), core), -(field.falloff[j] + 1.0))
+                    by *= bodies.mass[o] * field.strength[j]
                     bodies.force[o] = add_scaled(bodies.force[o], way, by)
     return state.count
 
@@ -234,7 +235,7 @@ def turn_in_water(state, dt, spin, zones):
     for i in range(state.first, state.dynamic if wet else 0):
         if not spin.present[i] or bodies.sleep_state[i] > 0 or bodies.quarantined[i] or zones.displaced[i] == 0.0:
             continue
-        decay = math.exp(-zones.rate[i] * dt)
+        decay = exp(-zones.rate[i] * dt)
         for k in range(1 if plane else 3):
             spin.step_torque[i, k] += zones.torque[i, 2 if plane else k]
             spin.angular_velocity[i, k] *= decay

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carom import AABBCollider, Physics, Settings, SphereCollider, Transform, World
+from carom.framework.elementary import sines_and_cosines
 from carom.scenes.bodies import add_spheres, lattice
 from carom.scenes.random_numbers import uniform
 from carom.scenes.sizes import ceil_root, whole
@@ -38,7 +39,8 @@ def directions(n: int, dimensions: int, seed: int) -> NDArray[np.float64]:
     """``n`` unit vectors, evenly spread (Archimedes: the height of a point on the sphere is evenly spread too)."""
     draws = uniform(2 * n, seed).reshape(n, 2)
     angle = 2 * np.pi * draws[:, 0]
-    flat = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    sines, cosines = sines_and_cosines(angle)
+    flat = np.stack([cosines, sines], axis=1)
     if dimensions == 2:
         return flat
     height = 2 * draws[:, 1:] - 1
@@ -58,9 +60,9 @@ def build(settings: Settings | None = None, seed: int = 0, *, n: int = BULLETS, 
     world.create_entities(PILLARS, Transform.many(places), pillar)
     starts = centres(whole(n, "n"), dimensions)
     from_foot = starts[:, None, :2] - feet
-    nearest = np.hypot(*from_foot.T).T.argmin(axis=1)
+    nearest = (from_foot[..., 0] ** 2 + from_foot[..., 1] ** 2).argmin(axis=1)
     away = from_foot[np.arange(n), nearest]
-    distance = np.hypot(*away.T)[:, None]
+    distance = np.sqrt((away * away).sum(axis=1))[:, None]
     starts[:, :2] += away * np.maximum(0.0, FREE / distance - 1.0)
     add_spheres(world, starts, SPEED * directions(n, dimensions, seed), radius=RADIUS, mass=1.0)
     return world

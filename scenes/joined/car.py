@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World, create_chain
+from carom.framework.elementary import cos
 from carom.plugins import terrain
 from carom.plugins.joints import Joints, Wheel
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
@@ -24,7 +25,7 @@ VIEW = ((-10.0, -4.0), (100.0, 12.0))
 def height(x: float) -> float:
     """Of the road: flat at both ends."""
     rise = min(1.0, max(0.0, x / 10.0)) * min(1.0, max(0.0, (LENGTH - 20.0 - x) / 10.0))
-    return HILL * rise * (1.0 - math.cos(2.0 * math.pi * x / WAVE))
+    return HILL * rise * (1.0 - cos(2.0 * math.pi * x / WAVE))
 
 
 def build(settings: Settings | None = None, seed: int = 0, *, speed: float = SPEED) -> World:

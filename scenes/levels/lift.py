@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from carom import AABBCollider, Component, Phase, Physics, RigidBody, Settings, System, Transform, World, column
+from carom.framework.elementary import cos
 from carom.framework.typing import VectorField
 from carom.scenes.sizes import whole
 from carom.scenes.walls import block
@@ -32,7 +33,7 @@ class Shuttle(Component):
 
     def place(self, time: float) -> NDArray[np.float64]:
         """Its position at ``time``."""
-        return np.asarray(self.start) + np.asarray(self.travel) * (1 - math.cos(2 * math.pi * time / self.period)) / 2
+        return np.asarray(self.start) + np.asarray(self.travel) * (1 - cos(2 * math.pi * time / self.period)) / 2
 
 
 class Drive(System):

@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from carom import Phase, Physics, RigidBody, Settings, SphereCollider, System, Transform, World
+from carom.framework.elementary import sin
 from carom.scenes.bodies import add_discs_and_boxes, lattice
 from carom.scenes.walls import enclose
 
@@ -39,9 +40,9 @@ class Pilot(System):
         transform = self.world.component_for_entity(self.player, Transform)
         body = self.world.component_for_entity(self.player, RigidBody)
         angle = LAP_RATE * self.world.time
-        aim = SIDE / 2 + 0.36 * SIDE * np.array([math.sin(angle), math.sin(2 * angle)])
+        aim = SIDE / 2 + 0.36 * SIDE * np.array([sin(angle), sin(2 * angle)])
         wish = 2.0 * (aim - transform.position)
-        wish *= min(1.0, SPEED / max(math.hypot(*wish), 1e-9))
+        wish *= min(1.0, SPEED / max(math.sqrt((wish * wish).sum()), 1e-9))
         body.apply_force(PLAYER_MASS * THRUST * (wish - body.linear_velocity))
 
 
@@ -72,7 +73,7 @@ def build(settings: Settings | None = None, seed: int = 0) -> World:
 
     random = np.random.default_rng(seed)
     places = (lattice(PER_ROW**2, PER_ROW) + 0.5) * SPACING
-    order = np.argsort(np.hypot(*(places - SIDE / 2).T), kind="stable")
+    order = np.argsort(((places - SIDE / 2) ** 2).sum(axis=1), kind="stable")
     places = places[np.sort(order[-OBJECTS:])]
     extents = random.uniform(0.25, 0.6, OBJECTS)  # radius or half extent
     places += random.uniform(-1, 1, (OBJECTS, 2)) * (SPACING / 2 - extents)[:, None]

@@ -9,6 +9,8 @@ sqrt(1 - e^2).
 import math
 from typing import Any
 
+import numpy as np
+
 from carom import ForceSystem, Physics, RigidBody, Settings, Transform, World
 from carom.scenes.sizes import real
 
@@ -26,7 +28,8 @@ class Sun(ForceSystem):
 
     def add_forces(self, bodies: Any, time: float) -> None:
         x = bodies.position
-        bodies.force[:] -= bodies.mass[:, None] * x / (x * x).sum(axis=1, keepdims=True) ** 1.5
+        square = (x * x).sum(axis=1, keepdims=True)
+        bodies.force[:] -= bodies.mass[:, None] * x / (square * np.sqrt(square))
 
     def potential_energy(self, bodies: Any) -> float:
         """-m / r, J: 0 at infinity."""

@@ -12,7 +12,7 @@ from carom import Physics, RigidBody, Settings, SphereCollider, Transform, World
 from carom.scenes.bodies import lattice
 from carom.scenes.gas import BODY_VOLUME, RADIUS
 from carom.scenes.random_numbers import uniform
-from carom.scenes.sizes import floor_root, whole
+from carom.scenes.sizes import floor_root, root, whole
 from carom.scenes.walls import enclose
 
 PITCH = 1.2  # of the lattice
@@ -33,7 +33,7 @@ def pile3d(settings: Settings | None = None, seed: int = 0, *, n: int = BODIES[3
 
 def width(n: int, dimensions: int) -> float:
     """Width of the bin, metres."""
-    return PITCH * n ** (1 / dimensions)
+    return PITCH * root(n, dimensions)
 
 
 def layers(n: int, dimensions: int) -> int:

@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from carom import Phase, Physics, RigidBody, Settings, SphereCollider, System, Transform, World
+from carom.framework.elementary import atan2, cos, sin
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 from carom.scenes.sizes import whole
 from carom.scenes.walls import enclose
@@ -56,10 +57,11 @@ class Flippers(System):
     def _ball_is_near(self, flipper: int, side: int) -> bool:
         """Above the outer half."""
         transform = self.world.component_for_entity(flipper, Transform)
-        along = np.array([side * math.cos(DOWN), math.sin(DOWN)])
+        along = np.array([side * cos(DOWN), sin(DOWN)])
         across = np.array([-side * along[1], side * along[0]])
         way = self.world.bodies.dynamic.position - transform.position
-        place, height = way @ along, way @ across - THICKNESS / 2 - RADIUS
+        place, height = ((way * one).sum(axis=1) for one in (along, across))
+        height -= THICKNESS / 2 + RADIUS
         return bool(((place > 0.4 * LENGTH) & (place < LENGTH + RADIUS) & (height < NEAR) & (height > -RADIUS)).any())
 
 
@@ -67,8 +69,8 @@ def _bar(world: World, start: tuple[float, float], end: tuple[float, float]) -> 
     """A static bar from one point to the other."""
     way = np.subtract(end, start)
     world.create_entity(
-        Transform(np.add(start, end) / 2, math.atan2(way[1], way[0])),
-        BoxCollider((np.hypot(*way) / 2, THICKNESS / 2), friction=FRICTION, restitution=RESTITUTION),
+        Transform(np.add(start, end) / 2, atan2(way[1], way[0])),
+        BoxCollider((math.sqrt((way * way).sum()) / 2, THICKNESS / 2), friction=FRICTION, restitution=RESTITUTION),
     )
 
 
@@ -83,7 +85,7 @@ def build(settings: Settings | None = None, seed: int = 0, *, n: int = BALLS) ->
     for side in (1, -1):
         x = PIVOT[0] if side > 0 else WIDTH - PIVOT[0]
         outside = 0.0 if side > 0 else WIDTH
-        slope = math.tan(DOWN)
+        slope = sin(DOWN) / cos(DOWN)
         _bar(world, (outside, PIVOT[1] - slope * PIVOT[0]), (x, PIVOT[1]))  # the lane that leads to it
         flipper = world.create_entity(
             Transform((x, PIVOT[1]), side * DOWN),

@@ -3,6 +3,7 @@
 import numpy as np
 
 from carom import Physics, Rotation, Settings, World, create_chain
+from carom.framework.elementary import sines_and_cosines
 from carom.plugins import capsule, convex_polygon, terrain
 from carom.scenes.bodies import add_shapes, lattice
 from carom.scenes.sizes import real, whole
@@ -21,7 +22,7 @@ VIEW = ((-1.0, -3.0), (WIDTH + 1.0, RIM))
 def ground() -> np.ndarray:
     """(k, 2) points of the hills, from left to right; both ends go steeply up."""
     x = np.arange(0.0, WIDTH + SEGMENT / 2, SEGMENT)
-    y = 1.6 * np.sin(x / 2.7) + 0.7 * np.sin(x / 1.1 + 1.0)
+    y = 1.6 * sines_and_cosines(x / 2.7)[0] + 0.7 * sines_and_cosines(x / 1.1 + 1.0)[0]
     return np.concatenate((((-1.0, RIM),), np.stack((x, y), axis=1), ((WIDTH + 1.0, RIM),)))
 
 

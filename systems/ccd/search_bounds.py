@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import inlined, part
+from ...framework.elementary import power
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, item, length, replace, sub
 from ..codes import OK
@@ -126,7 +127,9 @@ def width_that_holds(share, extents):
                 product, free, narrowest = product * extent, free + 1, min(narrowest, extent)
         if free == 0 or share >= 1.0:
             return math.inf
-        width = (share * product) ** (1.0 / free)
+        width = share * product
+        if free > 1:
+            width = math.sqrt(width) if free == 2 else power(width, 1.0 / 3.0)
         if width <= narrowest:
             return width
         filled = narrowest

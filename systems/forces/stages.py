@@ -23,7 +23,8 @@ def within(point, origin, limit):
         return point
     square = 0.0
     for k in range(len(point)):
-        square += ((item(point, k) - item(origin, k)) / largest) ** 2
+        ratio = (item(point, k) - item(origin, k)) / largest
+        square += ratio * ratio
     length = math.sqrt(square)
     if length > limit / largest:
         for k in range(len(point)):

@@ -7,9 +7,8 @@ one polynomial always describes what is left of the step.
 
 from __future__ import annotations
 
-import math
-
 from ...framework.compilation import inlined, part
+from ...framework.elementary import exp
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST
@@ -39,7 +38,7 @@ def deflect(state, i, dv, now, dt):
     if state.impacts.sweeps and state.mode == EVENT_DRIVEN:
         acting = 0.5 * dt
     fading = bodies.linear_damping[i] * acting
-    decay = math.exp(-fading) if fading > 0.0 else 1.0
+    decay = exp(-fading) if fading > 0.0 else 1.0
     while i >= 0:
         if bodies.impact_count[i] >= STOPPED:
             bodies.linear_velocity[i] = add(bodies.linear_velocity[i], dv)

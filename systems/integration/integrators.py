@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, ClassVar
 
+from .stages import CUBE_ROOT_OF_2
 from .stages import CUBIC as CUBIC
 from .stages import LINE as LINE
 from .stages import PARABOLA as PARABOLA
@@ -126,7 +127,7 @@ class Yoshida4(Integrator):
     COLUMNS = ("acceleration",)
 
     def advance(self, motion: Motion, dt: float) -> None:
-        outer = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))
+        outer = 1.0 / (2.0 - CUBE_ROOT_OF_2)
         inner = 1.0 - 2.0 * outer
         heavy = self.HEAVY_DAMPING / dt
         verlet(motion, outer * dt, 0.0, heavy, 0.0)

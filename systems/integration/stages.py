@@ -11,6 +11,7 @@ import math
 
 from ...components.rigid_body import FASTEST
 from ...framework.compilation import inlined, part
+from ...framework.elementary import exp, expm1
 from ...framework.jit.records.record_type import zero_of
 from ...framework.schedule.stages import Rows
 from ...framework.vectors import add, add_scaled, divided, dot, item, scale, sub
@@ -21,6 +22,7 @@ from ..records import CURVES, UNDO_FORCE
 from ..step_stages import KEEPS_FORCE, KEEPS_START, LARGEST_FLOAT
 
 LINE, PARABOLA, CUBIC = 1, 2, 3  # degree of the path within the step
+CUBE_ROOT_OF_2 = 1.2599210498948732  # Yoshida's
 
 UNMOVED = 1e-6  # of its extent, at least of a metre: a body that should move by more, and does not, is too far out
 NEAR_ORIGIN = 2.0**33  # m: up to here numbers are less than 2 UNMOVED apart
@@ -29,7 +31,7 @@ NEAR_ORIGIN = 2.0**33  # m: up to here numbers are less than 2 UNMOVED apart
 @inlined
 def phi1(z):
     """(e^z - 1) / z."""
-    return 1.0 if z == 0.0 else math.expm1(z) / z
+    return 1.0 if z == 0.0 else expm1(z) / z
 
 
 @part
@@ -146,7 +148,7 @@ def euler(state, h, with_new_velocity):
     for i in range(state.first, dynamic if damped else 0):
         c, decay, gain = damping[i], 1.0, h
         if c != 0.0:
-            decay, gain = math.exp(-c * h), h * phi1(-c * h)
+            decay, gain = exp(-c * h), h * phi1(-c * h)
         old = velocity[i]
         new = add(scale(old, decay), scale(scale(force[i], inverse_mass[i]), gain))
         velocity[i] = new
@@ -179,7 +181,7 @@ def verlet_drift(state, h):
         h = light_h if c <= state.heavy_damping else state.heavy_step
         decay, first, second = 1.0, 1.0, 0.5
         if c != 0.0:
-            decay, first, second = math.exp(-c * h), phi1(-c * h), phi2(-c * h)
+            decay, first, second = exp(-c * h), phi1(-c * h), phi2(-c * h)
         v, a = velocity[i], scale(force[i], bodies.inverse_mass[i])
         position[i] = add_scaled(position[i], add(scale(v, first), scale(a, h * second)), h)
         velocity[i] = add(scale(v, decay), scale(a, h * first))
@@ -219,7 +221,7 @@ def runge_kutta_weights(z):
         return 1.0 / 6.0, 1.0 / 6.0, 1.0 / 6.0, 1.0, 1.0, 1.0
     p1, p2, p3 = phi1(z), phi2(z), phi3(z)
     f1, f2, f3 = p1 - 3.0 * p2 + 4.0 * p3, p2 - 2.0 * p3, 4.0 * p3 - p2
-    return f1, f2, f3, math.exp(z), math.exp(0.5 * z), phi1(0.5 * z)
+    return f1, f2, f3, exp(z), exp(0.5 * z), phi1(0.5 * z)
 
 
 def runge_kutta_stage(state, h):
@@ -266,7 +268,7 @@ def first_half_kick(state, h):
     for i in range(state.first, state.dynamic):
         decay = 1.0
         if damping[i] != 0.0:
-            decay, damped = math.exp(-0.5 * damping[i] * h), damped or not bodies.quarantined[i]
+            decay, damped = exp(-0.5 * damping[i] * h), damped or not bodies.quarantined[i]
         a, v = scale(bodies.force[i], bodies.inverse_mass[i]), scale(velocity[i], decay)
         bodies.flight_velocity[i] = v
         bodies.acceleration[i] = scale(a, 0.5)
@@ -283,7 +285,7 @@ def second_half_kick(state, h):
         return 0
     velocity, force, damping = bodies.linear_velocity, bodies.force, bodies.linear_damping
     for i in range(state.first, state.dynamic):
-        decay = math.exp(-0.5 * damping[i] * h) if damping[i] != 0.0 else 1.0
+        decay = exp(-0.5 * damping[i] * h) if damping[i] != 0.0 else 1.0
         change = sub(scale(scale(force[i], 0.5), bodies.inverse_mass[i]), bodies.acceleration[i])
         velocity[i] = scale(add_scaled(velocity[i], change, h), decay)
     return 0

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import inlined
+from ...framework.elementary import cos, sin
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 
 SERIES = 0.06  # rad^2: below it six terms are exact
@@ -86,7 +87,7 @@ def shares_of_turn(turn):
     if s < SERIES:
         return shares_of_small_turn(turn)
     t = math.sqrt(s)
-    return math.sin(t) / t, (1.0 - math.cos(t)) / s
+    return sin(t) / t, (1.0 - cos(t)) / s
 
 
 @inlined

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
 from ...framework.compilation import inlined, part
+from ...framework.elementary import cos, sin
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 from ..codes import OK
@@ -164,7 +163,7 @@ def turned_since(state, i, v):
         if len(axes) > 0 and state.bodies.axes_rotation[i] == rotation[i]:
             c, s = axes[4 * i], axes[4 * i + 2]
         else:
-            c, s = math.cos(rotation[i]), math.sin(rotation[i])
+            c, s = cos(rotation[i]), sin(rotation[i])
         return replace(replace(v, 0, c * item(v, 0) - s * item(v, 1)), 1, s * item(v, 0) + c * item(v, 1))
     axis, k = v, 4 * i
     axis = replace(replace(replace(axis, 0, rotation[k + 1]), 1, rotation[k + 2]), len(v) - 1, rotation[k + 3])

@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import inlined, part
+from ...framework.elementary import atan2, cos, exp
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 from ..contacts.constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY, SPRING_FREQUENCY
 from ..integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
@@ -73,8 +74,10 @@ def joint_spring(angle, ratio, together):
     both = share * (1.0 + angle / damping)
     exact = min(1.0, max(0.0, 2.0 - angle * math.sqrt(together)))
     if exact > 0.0:
-        fading, swing = math.exp(-ratio * angle), angle * math.sqrt(abs(1.0 - ratio * ratio))
-        trace = 2.0 * fading * (math.cos(swing) if ratio < 1.0 else math.cosh(swing))
+        fading, swing = exp(-ratio * angle), angle * math.sqrt(abs(1.0 - ratio * ratio))
+        trace = 2.0 * fading * cos(swing)
+        if ratio >= 1.0:
+            trace = exp(swing - ratio * angle) + exp(-swing - ratio * angle)
         share += exact * (1.0 - fading * fading - share)
         both += exact * (2.0 - trace - both)
     share = max(share, LEAST_SHARE)
@@ -162,7 +165,7 @@ def turn_about(joints, j, axis, ends, axis_b):
         between = add(axis, axis_b)
         rate = scale(between, 1.0 / max(FOLDED, dot(between, axis)))
         end_b = add_scaled(end_b, rate, -dot(axis, end_b))
-    angle = math.atan2(dot(axis, cross_spin(end_a, end_b)), dot(end_a, end_b))
+    angle = atan2(dot(axis, cross_spin(end_a, end_b)), dot(end_a, end_b))
     angle += FULL_TURN * math.floor((joints.value[first] - angle) / FULL_TURN + 0.5)
     joints.value[first] = angle
     return rate, angle
@@ -184,7 +187,7 @@ def angle_of(solver, j):
     if joints.kind[j] == ALIGN:
         return axis, dot(axis, across)
     size = length(across)
-    return scale(across, 1.0 / size) if size > 0.0 else axis, math.atan2(size, dot(end_a, end_b))
+    return scale(across, 1.0 / size) if size > 0.0 else axis, atan2(size, dot(end_a, end_b))
 
 
 @part

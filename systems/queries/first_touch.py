@@ -16,6 +16,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ...framework.compilation import inlined, part, pasted
+from ...framework.elementary import exponent_of, two_to
 from ...framework.vectors import add, add_scaled, dot, item, length, negative, scale, sub
 from ..integration.trajectory import ROUNDING
 from ..narrow_phase.one_way import SLACK, front_of, is_from_front, is_one_way
@@ -38,7 +39,7 @@ Path = collections.namedtuple("Path", "start direction inverse half")
 @inlined
 def power_above(distance):
     """A power of two that is larger. With such spans a sweep finds the same digits, however long the way is."""
-    return math.ldexp(1.0, math.frexp(distance)[1])
+    return two_to(exponent_of(distance)) if distance > 0.0 else 1.0
 
 
 def make_first_touch(evaluate_at: Callable[..., Any], sweep_at: Callable[..., Any]) -> Any:

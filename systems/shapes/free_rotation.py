@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
+from ...framework.elementary import atan2, cos, sin
 from .quaternions import product
 
 JACOBI_SWEEPS = 16  # of Jacobi rotations: each squares what is off the diagonal
@@ -27,8 +28,8 @@ def turned_about(q, m, k, angle):
     """(rotation, momentum in its frame) of a body that turns about its own axis k by an angle."""
     w, x, y, z = q
     half = 0.5 * angle
-    c, s = math.cos(half), math.sin(half)
-    cosine, sine = math.cos(angle), math.sin(angle)
+    c, s = cos(half), sin(half)
+    cosine, sine = cos(angle), sin(angle)
     m0, m1, m2 = m
     if k == 0:
         turned = w * c - x * s, x * c + w * s, y * c + z * s, z * c - y * s
@@ -64,7 +65,7 @@ def turn_about_one(q, m, inverse, gained):
         if abs(change) < least and -y * y <= change <= x * x:
             axis, least = k, abs(change)
             to_x, to_y = math.sqrt(x * x - change), math.sqrt(y * y + change)
-            angle = math.atan2(y, x) - math.atan2(math.copysign(to_y, y), math.copysign(to_x, x))
+            angle = atan2(y, x) - atan2(math.copysign(to_y, y), math.copysign(to_x, x))
     return turned_about(q, m, axis, angle)
 
 
@@ -121,8 +122,8 @@ def turn_freely(q, m, inverse, h):
     pieces = 1 + (int(turned) if turned < MOST_PIECES else MOST_PIECES)
     share, half = h / pieces, 0.5 * of_axis(inverse, k) * h
     size = tensor_size(m, half)
-    sine = math.sin(size) / size * half if size > 0.0 else 0.0
-    q = product(q, (math.cos(size), sine * m[0], sine * m[1], sine * m[2]))
+    sine = sin(size) / size * half if size > 0.0 else 0.0
+    q = product(q, (cos(size), sine * m[0], sine * m[1], sine * m[2]))
     for _ in range(pieces):
         q, m = turned_about(q, m, j, 0.5 * share * about_j * of_axis(m, j))
         q, m = turned_about(q, m, other, share * about_other * of_axis(m, other))
@@ -147,15 +148,15 @@ def diagonalised(xx, yy, zz, xy, xz, yz):
                 a, b, c, d, e = zz, xx, xz, yz, xy
             if c == 0.0:
                 continue
-            angle = 0.5 * math.atan2(2.0 * c, a - b)
+            angle = 0.5 * atan2(2.0 * c, a - b)
             if angle > 0.25 * math.pi:  # the smaller turn that does it
                 angle -= 0.5 * math.pi
             elif angle < -0.25 * math.pi:
                 angle += 0.5 * math.pi
-            cosine, sine = math.cos(angle), math.sin(angle)
-            mean, apart = 0.5 * (a + b), 0.5 * (a - b) * math.cos(2.0 * angle) + c * math.sin(2.0 * angle)
+            cosine, sine = cos(angle), sin(angle)
+            mean, apart = 0.5 * (a + b), 0.5 * (a - b) * cos(2.0 * angle) + c * sin(2.0 * angle)
             a, b, d, e = mean + apart, mean - apart, cosine * d + sine * e, cosine * e - sine * d
-            half_c, half_s = math.cos(0.5 * angle), math.sin(0.5 * angle)
+            half_c, half_s = cos(0.5 * angle), sin(0.5 * angle)
             if k == 0:
                 yy, zz, yz, xy, xz = a, b, 0.0, d, e
                 q = product(q, (half_c, half_s, 0.0, 0.0))

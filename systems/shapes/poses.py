@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
+from ...framework.elementary import atan2
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, item, length, replace, scale
 from ..integration.turning import turn_of_arm
@@ -122,7 +123,7 @@ def advance_pose(state, i, spin, h):
     bodies.spin[i] = triple(spin, rotate(to, (mine[0] * inverse[0], mine[1] * inverse[1], mine[2] * inverse[2]), False))
     by = product(to, (q[0], -q[1], -q[2], -q[3]))
     sine = math.sqrt(by[1] * by[1] + by[2] * by[2] + by[3] * by[3])
-    size = 2.0 * math.atan2(sine, by[0]) / sine if sine > 0.0 else 0.0
+    size = 2.0 * atan2(sine, by[0]) / sine if sine > 0.0 else 0.0
     return triple(spin, (size * by[1], size * by[2], size * by[3]))
 
 

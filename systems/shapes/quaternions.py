@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
+from ...framework.elementary import cos, sin
 from ...framework.jit.records.record_type import zero_of
 
 
@@ -58,7 +59,7 @@ def write_axes(state, i):
     known = state.bodies.axes_rotation
     if d == 2:
         angle = known[i] = state.bodies.rotation[i]
-        cosine, sine, k = math.cos(angle), math.sin(angle), 4 * i
+        cosine, sine, k = cos(angle), sin(angle), 4 * i
         axes[k], axes[k + 1], axes[k + 2], axes[k + 3] = cosine, -sine, sine, cosine
         return
     for k in range(4 * i, 4 * i + 4):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...framework.elementary import sines_and_cosines
+
 
 def axes_of(rotation: np.ndarray, dimensions: int) -> np.ndarray:
     """Rotation matrices (n, d, d) of angles (n,) in radians or unit quaternions (n, 4), order w, x, y, z.
@@ -12,7 +14,7 @@ def axes_of(rotation: np.ndarray, dimensions: int) -> np.ndarray:
     """
     matrices = np.empty((len(rotation), dimensions, dimensions))
     if dimensions == 2:
-        cosine, sine = np.cos(rotation), np.sin(rotation)
+        sine, cosine = sines_and_cosines(rotation)
         matrices[:, 0, 0], matrices[:, 0, 1] = cosine, -sine
         matrices[:, 1, 0], matrices[:, 1, 1] = sine, cosine
         return matrices

@@ -1,5 +1,5 @@
 """Sources: no circle of imports, kernels take few arguments and are short, names have one meaning, columns a unit,
-faults a row in the docs.
+faults a row in the docs, and no libm.
 """
 
 from __future__ import annotations
@@ -137,3 +137,40 @@ def test_every_fault_stands_in_the_table_of_the_docs():
     rows = [line for line in table.splitlines() if line.startswith("| `")]
     assert all(len(row.strip("| ").split(" | ")) == 3 for row in rows)
     assert set(found.values()) == {row.split("`")[1] for row in rows}
+
+
+LIBM = {
+    "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "arcsin", "arccos", "arctan", "arctan2", "sinh", "cosh",
+    "tanh", "asinh", "acosh", "atanh", "exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "pow", "power",
+    "float_power", "cbrt", "hypot", "gamma", "lgamma", "erf", "erfc", "frexp", "ldexp", "fmod", "sinc",
+}  # fmt: skip
+REPORTS = {  # what they find goes to the user alone, or is exact
+    "framework/data/interpolation.py": {"arctan2", "sinc"},  # what is drawn
+    "framework/elementary.py": {"frexp", "ldexp"},
+    "framework/schedule/clock.py": {"fmod"},
+    "plugins/convex_polygon.py": {"hypot", "arctan2"},  # what is wrong with corners
+    "plugins/joints/measures.py": {"sin", "cos", "arctan2"},
+    "plugins/terrain/chain.py": {"hypot"},  # whether all is upside down
+}  # fmt: skip
+
+
+def test_no_libm_in_what_a_step_does():
+    found: dict[str, set[str]] = {}
+    for place, node in nodes(ast.Attribute):
+        if isinstance(node.value, ast.Name) and node.value.id in ("math", "np") and node.attr in LIBM:
+            found.setdefault(place.partition(":")[0].replace("\\", "/"), set()).add(node.attr)
+    assert found == REPORTS
+
+
+def test_no_power_but_of_whole_numbers():
+    """Python and numba leave others to libm; ``elementary.power`` does not."""
+    found = [place for place, node in nodes(ast.BinOp) if isinstance(node.op, ast.Pow) and is_broken(node.right)]
+    assert found == []
+
+
+def is_broken(exponent: ast.expr) -> bool:
+    """Whether it is written with a fraction."""
+    for node in ast.walk(exponent):
+        if isinstance(node, ast.Div) or (isinstance(node, ast.Constant) and isinstance(node.value, float)):
+            return True
+    return False

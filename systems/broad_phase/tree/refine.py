@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ....framework.elementary import exponent_of, power
 from .build import CROWDED_LEVEL, LOOSE_CELL, MAX_LEVELS, SMALLEST_CELL, TOO_MANY, TREE_CELLS_PER_BOX
 
 IMPROVED = 0.7  # finer cells are kept if they bring crowding below this share of what it was
@@ -38,9 +39,9 @@ def refine(tree: Any, assign: Callable[[], int]) -> None:
             return
         tree.finest_cell, tree.inverse_cell = finer, 1.0 / finer
         # The directory stays as large as it is, with equal widths: it no longer covers the extent.
-        widest = max(2.0, (TREE_CELLS_PER_BOX * count) ** (1 / tree.dimensions) - 1.0)
+        widest = max(2.0, power(float(TREE_CELLS_PER_BOX * count), 1.0 / tree.dimensions) - 1.0)
         tree.width[0] = np.minimum(tree.extent[0] / finer, widest)
-        tree.levels = min(MAX_LEVELS - 1, int(levels + np.ceil(np.log2(cell) - np.log2(finer))))
+        tree.levels = min(MAX_LEVELS - 1, levels + exponent_of(cell / finer))
         assign()
         if tree.crowding > IMPROVED * before:  # the boxes are in one place: the former cells again
             tree.finest_cell, tree.inverse_cell, tree.levels, tree.width[:] = former
@@ -56,4 +57,4 @@ def _spacing(tree: Any) -> float:
     inside = tree.start + np.flatnonzero(tree.keys[: tree.stop - tree.start] == fullest)
     middle = 0.5 * (tree.lower[inside] + tree.upper[inside])
     widest = float(np.max(np.ptp(middle, axis=0)))
-    return widest / float(counts[fullest]) ** (1.0 / tree.dimensions)
+    return widest / power(float(counts[fullest]), 1.0 / tree.dimensions)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from ....framework.compilation import part
+from ....framework.elementary import atan2, cos, sin
 from ....framework.vectors import add_scaled, dot, item, length, scale
 from ...integration.turning import SERIES, change_of_spin
 from ...shapes.free_rotation import diagonalised, energy_of, turn_freely, turn_to_energy
@@ -68,7 +69,7 @@ def rotate_by_small_turn(frame, m, inverse, h):
 def rotation_vector(like, q):
     """The vector by which a unit quaternion turns."""
     sine = math.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    size = 2.0 * math.atan2(math.copysign(sine, q[0]), abs(q[0])) / sine if sine > 0.0 else 0.0
+    size = 2.0 * atan2(math.copysign(sine, q[0]), abs(q[0])) / sine if sine > 0.0 else 0.0
     return triple(like, (size * q[1], size * q[2], size * q[3]))
 
 
@@ -76,9 +77,9 @@ def rotation_vector(like, q):
 def quaternion_of(turn):
     """The unit quaternion of a vector by which something turns."""
     size = length(turn)
-    sine = math.sin(0.5 * size) / size if size > 0.0 else 0.5
+    sine = sin(0.5 * size) / size if size > 0.0 else 0.5
     x, y, z = components_of(turn)
-    return math.cos(0.5 * size), sine * x, sine * y, sine * z
+    return cos(0.5 * size), sine * x, sine * y, sine * z
 
 
 @part

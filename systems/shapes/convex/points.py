@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 
 from ....framework.compilation import inlined, part
+from ....framework.elementary import cos, sin
 from ....framework.jit.stack_arrays import stack_array
 from ....framework.vectors import add, add_scaled, dot, item, negative, replace, row, scale, store, sub
 from ..linking.convex_by_address import convex_at, rounding_by_address, support_by_address
@@ -23,7 +24,7 @@ FLAT_FACE = 1e-6  # of its size: how far a face may be from flat; what is shared
 FINER = 0.25  # of the tilt: where several faces are within it the next look is so much narrower, until one lies flat
 FACE_LOOKS = 6  # at most
 DIRECTIONS = 8  # around the normal, in 3D: a face of more corners shows so many of them
-START_DIRECTION = math.cos(math.pi / 8), math.sin(math.pi / 8)  # the first: off the axes, where boxes have two corners
+START_DIRECTION = cos(math.pi / 8), sin(math.pi / 8)  # the first: off the axes, where boxes have two corners
 SLANT = math.sqrt(0.5)  # sine and cosine of the way from one to the next
 POINT_ROOM = 2 * DIRECTIONS  # each edge of a convex polygon that clips another adds at most one corner
 STEEP = 0.83  # cosine: a normal nearer to the x axis takes the y axis for its basis
