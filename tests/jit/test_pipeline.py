@@ -36,6 +36,25 @@ def recursive(x):
     return x if x < 1.0 else recursive(x - 1.0) * recursive(x - 2.0) + 1.0
 
 
+@part
+def of_no_type(x):
+    return x.of_no_type
+
+
+@part
+def sum_of(span):
+    first, (second, more) = span
+    total = first + (of_no_type(first) if len(span[1][1]) > 0 else 0.0)
+    if len(more) > 0 and second > 0.0:
+        total += of_no_type(second)
+    return total + second
+
+
+@kernel
+def sum_kernel(x):
+    return sum_of((x, (halved(x), ())))
+
+
 @kernel
 def long_kernel(x):
     return recursive(x)
@@ -92,3 +111,9 @@ def test_parts_are_private_to_their_kernel():
 @jit
 def test_functions_with_closures_compile_whole():
     assert compiled(nested)(4) == nested.py_func(4)
+
+
+@jit
+@tried
+def test_branches_that_a_tuple_within_an_argument_rules_out_are_not_compiled():
+    assert compiled(sum_kernel)(3.0) == 4.5
