@@ -9,13 +9,13 @@ its code (:mod:`hash`) is the one that it was made from. All others compile.
 from __future__ import annotations
 
 import functools
-import importlib
 import importlib.machinery
 import importlib.util
 import json
-import logging
+import math
 import os
 import platform
+import struct
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -34,8 +34,6 @@ OWN = f"carom.{NAME}"
 OFF = "CAROM_LIBRARY"  # 0 in the environment: compile everything here
 LAYOUT = "1"  # of what a library holds and how its functions are called
 
-logger = logging.getLogger("carom")
-
 
 class Library:
     """A library that is loaded."""
@@ -45,25 +43,29 @@ class Library:
         self.addresses: dict[str, int] = module.addresses
         self._known = {*module.addresses, *vars(module)}  # those that Python calls are functions of the module
         self.facts: dict[str, str] = module.facts
+        self._is_current: dict[str, bool] = {}  # by symbol
         if self.facts.get("layout") != LAYOUT:
             raise LibraryError(f"{self.path} was built by another version of carom: build it again")
         module.set_error_handler(raise_error)
 
+    @property
+    def is_compared(self) -> bool:
+        """Whether it stands beside sources that may have changed: not in a wheel, which has both."""
+        return self.facts["hashes"] != "{}"
+
     @functools.cached_property
-    def hashes(self) -> dict[str, str] | None:
-        """The hashes that its kernels were made from; None where they cannot be compared: carom's own of a wheel, which
-        holds the sources that it was made from, and those that were made by another Python."""
-        if self.facts.get("python") != PYTHON:
-            return None
-        return json.loads(self.facts["hashes"]) or None
+    def _hashes(self) -> dict[str, str]:
+        """Of the code that its kernels were made from, by symbol; none where they cannot be compared: byte code of
+        another Python is other byte code."""
+        return json.loads(self.facts["hashes"]) if self.facts["python"] == PYTHON else {}
 
     def holds(self, function: Linkable) -> bool:
         """Whether it has that function, made from the code that it has now."""
         symbol = function.symbol
-        if symbol not in self._known:
-            return False
-        hashes = self.hashes
-        return hashes is None or hashes[symbol] == short_hash(function.py_func)
+        if symbol not in self._is_current:
+            known = self._hashes.get(symbol) if symbol in self._known else ""
+            self._is_current[symbol] = known is None or known == short_hash(function.py_func)
+        return self._is_current[symbol]
 
 
 def short_hash(function: Any) -> str:
@@ -76,11 +78,11 @@ _added: dict[str, Library] = {}
 
 @functools.cache
 def _own() -> list[Library]:
-    try:
-        module = importlib.import_module(OWN)
-    except ModuleNotFoundError:
+    found = importlib.util.find_spec(OWN)
+    if found is None or found.origin is None:
         return []
-    return [Library(module)]
+    own = Library(_opened(found.origin))
+    return [] if own.is_compared and own.facts["python"] != PYTHON else [own]
 
 
 def libraries() -> list[Library]:
@@ -121,6 +123,9 @@ def file_name(system: str) -> str:
 
 
 def _opened(file: str) -> ModuleType:
+    """The library as a module; LibraryError if it cannot be loaded."""
+    if not _is_whole(file):
+        raise LibraryError(f"{file} is not whole, a part of the library is missing: copy or build it again")
     loader = importlib.machinery.ExtensionFileLoader(NAME, file)
     specification = importlib.util.spec_from_file_location(NAME, file, loader=loader)
     assert specification is not None
@@ -130,6 +135,18 @@ def _opened(file: str) -> ModuleType:
     except ImportError as error:
         raise LibraryError(f"{file} cannot be loaded, it is damaged or for another platform: {error}") from error
     return module
+
+
+def _is_whole(file: str) -> bool:
+    """Of ELF files: whether all is there that the loader of Linux maps without asking. The table at the end tells."""
+    with open(file, "rb") as opened:
+        head, size = opened.read(64), os.fstat(opened.fileno()).st_size
+    if head[:4] != b"\x7fELF":
+        return True
+    if len(head) < 64:
+        return False
+    (start,), sizes = struct.unpack_from("<Q", head, 40), struct.unpack_from("<HH", head, 58)
+    return start + math.prod(sizes) <= size
 
 
 def _holder(function: Linkable) -> Library | None:

@@ -138,8 +138,8 @@ def _entry(number: int, entry: Entry, size: str, texts: _Texts) -> str:
         failed, passed = f"%failed{k}", f"{passed}, {argument} {value}"
     none = f"(ptr, ...) @Py_BuildValue(ptr {texts('')})"
     return _ENTRY.format(
-        answer=none if entry.result == "none" else "@PyLong_FromLongLong(i64 %number)", number=number, size=size,
-        count=count, wrong_count=wrong_count, convert="\n".join(convert), failed=failed,
+        answer=none if entry.result == "none" else "@PyLong_FromLongLong(i64 %number)", number=number,
+        size=size, count=count, wrong_count=wrong_count, convert="\n".join(convert), failed=failed,
         kernel=_global(entry.symbol), passed=passed,
     )  # fmt: skip
 

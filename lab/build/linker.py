@@ -47,10 +47,12 @@ def link(objects: Sequence[bytes], output: Path, platform: Platform) -> None:
             files.append(file.name)
         options = _options(platform, module, linker, Path(folder))
         Path(folder, "all").write_text("\n".join([*options, *files]), encoding="utf-8")  # more than a command may have
-        said = _run([*linker, "@all"], folder)
+        said = _run([*linker, "@all", *(["--warn-unresolved-symbols"] if platform.is_wasm else [])], folder)
         missing = sorted(set(_UNDEFINED.findall(said)) - IN_PROCESS)
         if missing:
             raise BuildError(f"{output.name} calls {', '.join(missing)}, which no process of Python has")
+        if platform.is_wasm:  # what it warns of it does not import
+            _run([*linker, "@all", "--unresolved-symbols=import-dynamic"], folder)
         output.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(Path(folder, "linked"), output)
 
@@ -104,7 +106,7 @@ def _options(platform: Platform, module: str, linker: list[str], folder: Path) -
     if platform.is_wasm:
         return [
             "-shared", "--experimental-pic", "--no-entry", "--gc-sections", "--strip-all",
-            "--unresolved-symbols=import-dynamic", f"--export=PyInit_{module}", "-o", "linked",
+            "--warn-unresolved-symbols", f"--export=PyInit_{module}", "-o", "linked",
         ]  # fmt: skip
     return [
         "-shared", "-o", "linked", "--gc-sections", "--strip-all", "--build-id=none", "-z", "now", "-z", "defs",
@@ -119,5 +121,6 @@ def _run(command: list[str], folder: str) -> str:
     )
     said = done.stdout + done.stderr
     if done.returncode:
-        raise BuildError(f"{Path(command[0]).name} could not link: {said.strip()[-2000:] or done.returncode}")
+        errors = [line for line in said.splitlines() if "error:" in line] or said.strip().splitlines()[-1:]
+        raise BuildError(f"the linker ended with status {done.returncode}: {'; '.join(errors[:5])}")
     return said
