@@ -105,7 +105,7 @@ class Queries:
         """What touches colliders, and how deep; the hits of each deepest first."""
         shape, count = self._query_shape(component, len(positions), own=False), len(positions)
         collected = CollectedHits(self._batch, count, NEAREST_COLUMNS)
-        for some in slices_of(count if shape is not None else 0):
+        for some in slices_of(count) if shape is not None else ():
             first, stop = 0, some.stop - some.start
             excluded = self._ask(shape, columns, some, positions, wanted)
             while first < stop:

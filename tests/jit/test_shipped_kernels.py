@@ -60,9 +60,8 @@ def ask(world):
     origin, ahead = np.zeros(d), np.eye(d)[0]
     world.query_point(origin), world.query_sphere(origin, 3.0), world.query_aabb(origin, origin + 1.0)
     world.neighbours(1.0), world.query_nearest(origin), world.ray_cast(origin, ahead)
-    present = any(world.bodies.has(shape).any() for shape in world.registry.shapes)
     for shape in world.registry.shapes:
-        if present and d in shape.dimensions:
+        if d in shape.dimensions:
             world.shape_cast(shape.sample(), origin, ahead), world.overlaps(shape.sample(), origin)
 
 

@@ -158,6 +158,16 @@ def test_a_shape_on_the_floor():
     assert len(world.shape_overlaps(own, np.empty((0, 2)))) == 0
 
 
+@pytest.mark.plain
+@both_dimensions
+def test_nothing_touches_where_nothing_has_a_shape(d):
+    world = make_world(d)
+    world.create_entity(Transform((0.0,) * d), RigidBody())
+    assert world.overlaps(SphereCollider(1.0), (0.0,) * d) == []
+    hits = world.shape_overlaps(SphereCollider(1.0), np.zeros((3, d)))
+    assert (hits.offsets.tolist(), hits.points.shape) == ([0, 0, 0, 0], (0, d))
+
+
 WRONG = {
     "overlaps: position must be 2 finite": lambda w: w.overlaps(SphereCollider(1), (0, math.nan)),
     "overlaps: mask: .red. names a layer": lambda w: w.overlaps(SphereCollider(1), (0, 0), "red"),
