@@ -36,8 +36,8 @@ class Characters(Plugin):
         known = tuple(f"character.{name}" for name in WRITTEN)
         self.stage(after="sum_forces", records=(Character,), reads=(*settings, *known), writes=("force",))(press_bodies)
         self.stage(
-            after="read_bodies", records=(Character, Spin), reads=("position", *settings, *known),
-            writes=("spin.step_torque",),
+            after="read_bodies", records=(Character,), optional=(Spin,),
+            reads=("position", *settings, *known), writes=("spin.step_torque",),
         )(tilt_bodies)  # fmt: skip
         self.stage(
             before="update_sleep", records=(Character, NEAR, WORK), optional=(Ladder,), needed="colliders",

@@ -549,6 +549,23 @@ def test_its_weight_presses_on_what_it_stands_on(figure):
         assert weight or (stage.position_of(slab) == stage.at(0.0, -0.5)).all()
 
 
+@each_dimension
+@pytest.mark.parametrize(("weight", "x"), [(0.0, 1.0), (2.0, 1.0), (2.0, -2.0)])
+def test_its_weight_turns_what_it_stands_on_beside_the_middle(figure, weight, x):
+    """A slab that hovers and can turn: the weight times its arm, over the inertia of a box, times half a second."""
+    stage = Stage(figure, x=x, y=0.0, weight=weight)
+    shape, body = BoxCollider(vector(figure.d, 3.0, 0.5, 3.0)), RigidBody(mass=10.0, gravity_scale=0.0)
+    slab = stage.world.create_entity(Transform(stage.at(0.0, -0.5)), body, Spin(), shape)
+    spin = stage.world.component_for_entity(slab, Spin)
+    stage.run(20)
+    before = np.array(spin.angular_velocity, ndmin=1)
+    stage.run(30)
+    gained = np.array(spin.angular_velocity, ndmin=1) - before
+    assert gained[-1] == pytest.approx(-weight * x / (10.0 * (3.0**2 + 0.5**2) / 3) * 0.5, rel=0.05)
+    assert gained[:-1] == pytest.approx(0.0, abs=1e-12)
+    assert stage.me.state == "floor"
+
+
 # -- one-way platforms, ladders, walls ------------------------------------------------------------
 
 
