@@ -67,6 +67,11 @@ for name, build in worlds.items():
         world.step()
     ask(world)
     print(f"{name}: {world.state_hash()} compiled {len(log.compiled)} later {len(log.compiled) - before[0]}")
+for name in scenes.names() if len(sys.argv) == 1 else ():
+    world = scenes.get(name).build()
+    for step in range(10):
+        world.step()
+    ask(world)
 print("kernels", [kernel for kernel, _ in log.compiled])
 """
 
