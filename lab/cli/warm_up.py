@@ -14,7 +14,6 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from ... import scenes
 from ...framework.compilation import log
 from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_folder, clear_cache
 from ...framework.jit.link_all import link_all
@@ -49,20 +48,18 @@ class Row:
 
 @click.command("warm-up", short_help="Compile ahead, so that the first run does not wait.")
 @click.argument("targets", metavar="[SCENE|FILE.py]...", nargs=-1)
-@click.option("--all", "everything", is_flag=True, help="All that ships and every scene of the library.")
 @click.option("--dimensions", type=click.Choice(["2", "3"]), help="Only worlds of so many dimensions.")
 @click.option("--clear", is_flag=True, help="Empty the cache folder instead; old versions' kernels are in it too.")
 @json_option
 @traceback_option
 def warm_up_command(
-    targets: tuple[str, ...], everything: bool, dimensions: str | None, clear: bool, as_json: bool
+    targets: tuple[str, ...], dimensions: str | None, clear: bool, as_json: bool
 ) -> None:
     """Compile what the scenes or files need; without any: what worlds of all that ships can need."""
-    if clear and (targets or everything or dimensions):
+    if clear and (targets or dimensions):
         raise Problem("--clear goes alone: it compiles nothing")
-    if targets and (everything or dimensions):
-        option = "--all" if everything else "--dimensions"
-        raise Problem(f"{option} and scenes exclude each other: name scenes, or choose with --all and --dimensions")
+    if targets and dimensions:
+        raise Problem("--dimensions and scenes exclude each other: it is for all that ships")
     folder = cache_folder()
     if folder is None:
         raise Problem(f"no folder can be written to keep kernels in; {CACHE_FOLDER_VARIABLE} names one")
@@ -72,7 +69,7 @@ def warm_up_command(
         count, size = clear_cache()
     else:
         with Progress(Console(stderr=True)) as status:
-            rows = warm_up(_work(targets, everything, [int(dimensions)] if dimensions else [2, 3]), status.say)
+            rows = warm_up(_work(targets, [int(dimensions)] if dimensions else [2, 3]), status.say)
     after = cache_contents()
     if as_json:
         cache = {"folder": str(folder), "kernels_before": before, "kernels": after[0], "bytes": after[1]}
@@ -97,13 +94,11 @@ def warm_up(work: Iterator[Work], say: Callable[[str], None]) -> list[Row]:
     return rows
 
 
-def _work(targets: tuple[str, ...], everything: bool, dimensions: list[int]) -> Iterator[Work]:
-    if not targets:
-        for d in dimensions:
-            yield f"all that ships, {d}D", lambda d=d: link_all(shipped_kernels(d))
-    names = [name for name in scenes.names() if scenes.get(name).dimensions in dimensions] if everything else targets
-    for loaded in [load(name) for name in names]:  # report missing scenes before anything compiles
+def _work(targets: tuple[str, ...], dimensions: list[int]) -> Iterator[Work]:
+    for loaded in [load(name) for name in targets]:  # report missing scenes before anything compiles
         yield loaded.name, partial(_prepare_scene, loaded)
+    for d in dimensions if not targets else ():
+        yield f"all that ships, {d}D", lambda d=d: link_all(shipped_kernels(d))
 
 
 def shipped_kernels(dimensions: int) -> Iterator[Linkable]:

@@ -8,7 +8,6 @@ import pytest
 from click.testing import CliRunner
 from helpers_processes import copied_cache, run_carom
 
-from carom import scenes
 from carom.framework.jit.cache import cache_folder
 from carom.lab.cli import warm_up
 from carom.lab.cli.main import cli
@@ -79,13 +78,9 @@ def names_of_work(monkeypatch, *arguments):
 
 
 def test_what_is_to_be_compiled_can_be_chosen(monkeypatch):
-    everything = flat, solid = "all that ships 2", "all that ships 3"
-    assert names_of_work(monkeypatch) == [*everything]
-    assert names_of_work(monkeypatch, "--dimensions", "3") == [solid]
+    assert names_of_work(monkeypatch) == ["all that ships 2", "all that ships 3"]
+    assert names_of_work(monkeypatch, "--dimensions", "3") == ["all that ships 3"]
     assert names_of_work(monkeypatch, "jump", "gas2d") == ["jump", "gas2d"]
-    planar = [name for name in scenes.names() if scenes.get(name).dimensions == 2]
-    assert names_of_work(monkeypatch, "--all", "--dimensions", "2") == [flat, *planar]
-    assert names_of_work(monkeypatch, "--all") == [*everything, *scenes.names()]
 
 
 @pytest.mark.parametrize(
@@ -94,8 +89,7 @@ def test_what_is_to_be_compiled_can_be_chosen(monkeypatch):
         (["jumpp"], "did you mean 'jump'?"),
         (["jump", "jumpp"], "did you mean 'jump'?"),
         (["--clear", "jump"], "--clear goes alone"),
-        (["--clear", "--all"], "--clear goes alone"),
-        (["jump", "--all"], "--all and scenes exclude each other"),
+        (["--clear", "--dimensions", "2"], "--clear goes alone"),
         (["jump", "--dimensions", "2"], "--dimensions and scenes exclude each other"),
         (["--dimensions", "4"], "'4' is not one of"),
     ],
