@@ -1,0 +1,177 @@
+"""Kernels out of libraries: a game's own, built by ``carom build``, played where there is no compiler."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from helpers_processes import run_carom, with_variables
+
+from carom.framework.jit.lazy import JIT
+from carom.framework.jit.library import file_name, platform_name
+
+ROOT = Path(__file__).resolve().parents[2]
+pytestmark = [pytest.mark.slow, pytest.mark.early, pytest.mark.skipif(not JIT, reason="nothing is compiled")]
+
+# What a packed game is to carom: neither numba nor llvmlite can be imported.
+NO_COMPILER = """
+import sys
+class Missing:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in ("numba", "llvmlite"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+sys.meta_path.insert(0, Missing())
+"""
+
+
+def game_of_the_page() -> str:
+    text = (ROOT / "docs" / "ship-your-game.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```python no-run\n(.*?)```", text, re.DOTALL)
+    return block
+
+
+def python(folder: Path, code: str, **environment: str | None) -> subprocess.CompletedProcess[str]:
+    """What a player's Python says: no home, no cache, no folder that can be written to but its own."""
+    nowhere = {"HOME": str(folder), "XDG_CACHE_HOME": None, "CAROM_CACHE_DIR": str(folder / "cache")}
+    command = [sys.executable, "-c", code]
+    return subprocess.run(
+        command, cwd=folder, env=with_variables({**nowhere, **environment}), capture_output=True, text=True, check=False
+    )
+
+
+def play(folder: Path, before: str = "", after: str = "", **environment: str | None) -> str:
+    code = f"{before}\nimport runpy\nnames = runpy.run_path('jewels.py', run_name='__main__')\n{after}"
+    done = python(folder, code, **environment)
+    assert done.returncode == 0, done.stderr[-3000:]
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def game(tmp_path_factory) -> Path:
+    """The game of the page, built as the page says."""
+    folder = tmp_path_factory.mktemp("game")
+    (folder / "jewels.py").write_text(game_of_the_page(), encoding="utf-8")
+    done = run_carom("build", "jewels.py", cwd=folder)
+    if "there is no linker" in done.stderr:
+        pytest.skip(done.stderr)
+    assert done.returncode == 0, done.stderr
+    assert f"kernels/{file_name(platform_name())}: " in done.stdout
+    return folder
+
+
+def test_it_plays_without_a_compiler_as_with_one(game, tmp_path):
+    """The same state after 1,000 steps, from a folder that knows nothing of the compiler's."""
+    shutil.copytree(game, tmp_path, dirs_exist_ok=True)
+    alone = play(tmp_path, NO_COMPILER, "print([name for name in sys.modules if 'numba' in name])").splitlines()
+    compiled = play(game, CAROM_CACHE_DIR=None, CAROM_LIBRARY="0").splitlines()
+    assert alone[0].split()[0] == compiled[0].split()[0]
+    assert alone[0].split()[1:] == ["0", "kernels", "compiled"]
+    assert alone[1] == "[]"
+
+
+def test_errors_of_its_functions_arrive_with_text_and_values(game):
+    one_place = """
+import numpy as np
+from carom import Transform
+world = names["build"]()
+post, jewel = (world.create_entity(Transform((50, 50)), names["RigidBody"]()) for _ in range(2))
+leash = world.create_entity(names["Leash"](post, jewel, 2.5))
+try:
+    world.step()
+except Exception as error:
+    print(type(error).__name__, error)
+"""
+    said = play(game, NO_COMPILER, one_place).splitlines()[-1]
+    assert "ValueError" in said
+    assert "a leash between two bodies in one place, so long:" in said
+    assert "2.5" in said
+    assert "plugin jewels: constraint of Leash" in said
+
+
+def test_what_was_edited_compiles_and_nothing_else(game, tmp_path):
+    shutil.copytree(game, tmp_path, dirs_exist_ok=True)
+    file = tmp_path / "jewels.py"
+    before = file.read_text(encoding="utf-8")
+    file.write_text(before.replace("return length(way), scale", "return 1.0 * length(way), scale"), encoding="utf-8")
+    told = "from carom.framework.compilation import log\nprint([name for name, _ in log.compiled])"
+    said = play(tmp_path, after=told)
+    assert re.fullmatch(r"\['given_\w+'\]", said.splitlines()[-1])
+
+
+def test_what_was_not_built_is_named_before_anything_moves(game):
+    more = """
+from carom import Transform
+from carom.plugins import capsule
+world = names["build"]()
+plugin = names["Plugin"]("pebbles", version="1.0")
+
+@plugin.shape(cost=1)
+class Pebble(names["Collider"]):
+    radius = names["column"](positive=True)
+    def bounds(shape, dimensions):
+        return shape.radius, shape.radius
+    def support(shape, direction):
+        return names["scale"](direction, shape.radius)
+
+world.add_plugin(plugin)
+world.create_entity(Transform((0, 50)), names["RigidBody"](), Pebble(0.5))
+try:
+    world.prepare()
+except Exception as error:
+    print(type(error).__name__, error)
+"""
+    said = play(game, NO_COMPILER, more).splitlines()[-1]
+    assert said.startswith("LibraryError plugin")
+    assert "Pebble" in said
+    assert "pip install numba, or build the game anew" in said
+
+
+@pytest.mark.parametrize(("damage", "words"), [
+    ("half", "is not whole"), ("other", f"has no kernels for {platform_name()}"), ("none", "has no kernels for"),
+    ("version", "was built by another version of carom"), ("text", "cannot be loaded"),
+])  # fmt: skip
+def test_a_library_that_cannot_be_used_is_told_in_a_line(game, tmp_path, damage, words):
+    folder = tmp_path / "kernels"
+    shutil.copytree(game / "kernels", folder)
+    (file,) = folder.iterdir()
+    whole = file.read_bytes()
+    if damage == "half":
+        file.write_bytes(whole[: len(whole) // 2])
+    elif damage == "other":
+        file.rename(folder / file_name("macos-arm64"))
+    elif damage == "none":
+        file.unlink()
+    elif damage == "version":
+        file.write_bytes(whole.replace(b"layout\0", b"lay_ut\0"))
+    else:
+        file.write_bytes(b"no library at all")
+    done = python(tmp_path, f"from carom import use_kernels\nuse_kernels({str(folder)!r})")
+    assert done.returncode == 1
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith("carom.framework.errors.LibraryError: ")
+    assert words in last
+
+
+def test_names_are_the_same_in_every_process_and_without_the_compiler():
+    code = """
+from carom.framework.plugins.registry import Registry
+from carom.plugins import Physics, capsule, joints, rotation
+from carom.systems.linking.preparation import all_functions
+registry = Registry()
+for plugin in (Physics(2), capsule.plugin, joints.Joints(), rotation.Rotation()):
+    registry.add(plugin)
+print(sorted(function.symbol for function in all_functions(registry, 2)))
+"""
+    printed = {
+        subprocess.run(
+            [sys.executable, "-c", before + code], env=with_variables({"PYTHONHASHSEED": seed}), capture_output=True,
+            text=True, check=True,
+        ).stdout for before, seed in (("", "1"), (NO_COMPILER, "2"))
+    }  # fmt: skip
+    assert len(printed) == 1
+    names = printed.pop()
+    assert names.count("carom_") > 100
