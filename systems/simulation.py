@@ -408,6 +408,7 @@ class Simulation:
         if self.quarantine.take_back(saved["quarantine"]) or moved or not saved["followed"]:
             self.scene.forget()
         self.scene.forget_enabled()
+        self.links.version = NEVER_LINKED  # contacts may rest now
         set_counters(state, saved["counters"])
         state.impacts.logged = 0
         state.found_current = state.moved = False

@@ -10,12 +10,30 @@ from .broad_phase.boxes import bound_searches, box_rest_of_step, box_standing
 from .broad_phase.system import BroadPhase
 from .ccd.refresh_pairs import ROOM_TO_MERGE, merge_pairs
 from .ccd.time_of_impact import first_touch
+from .ccd.turning_touch import closing_point, first_touch_of_turn, touch_of_turning
+from .contacts.bodies import gather_joined
 from .contacts.events import ContactEvents
+from .contacts.points import lay_arms
 from .contacts.response import Response
+from .contacts.solving.islands import measure_joined_islands
 from .forces.accumulation import ForceAccumulation
 from .impacts.together import resolve_simultaneous
+from .impacts.turning import respond_at_arms, turn_by_impact
 from .integration.system import Integration
-from .linking.parts import BOUND_SEARCHES, FIRST_TOUCH, TAKE_TOGETHER
+from .linking.parts import (
+    ARMS_AT_REST,
+    BOUND_SEARCHES,
+    CLOSING_POINT,
+    FIRST_TOUCH,
+    FREE_TURN,
+    JOINED_BODIES,
+    JOINED_ISLANDS,
+    TAKE_TOGETHER,
+    TOUCH_OF_TURN,
+    TURN_BY_IMPACT,
+    TURNING_RESPONSE,
+    TURNING_TOUCH,
+)  # fmt: skip
 from .narrow_phase.manifolds import finish_found
 from .narrow_phase.system import NarrowPhase
 from .parts.records import PART_COLUMNS
@@ -23,6 +41,7 @@ from .parts.stages import begin_parts
 from .plugin_stages.kept import keep_written
 from .quarantine.columns import check_columns
 from .records import BODIES, COLLIDERS, STATE, TABLE_COLUMNS, all_rows
+from .shapes.poses import turn_with_unequal_moments
 from .sleeping.stages import update_sleep
 from .step_stages import KEEPS_FORCE, KEEPS_START, KEEPS_VELOCITY, close_step, index_bodies, keep_state, read_bodies
 
@@ -56,7 +75,7 @@ CLOSING = (
 ON_DEMAND = (
     Stage(
         box_standing, "for queries: boxes where the bodies are, and which have left those of the grid",
-        ("position", "rotation"), ("lower", "upper", "grid"), "many bodies",
+        ("position", "rotation"), ("lower", "upper", "grid"), "queries of many bodies",
     ),
     Stage(
         box_rest_of_step,
@@ -74,14 +93,16 @@ ON_DEMAND = (
         room=ROOM_TO_MERGE,
     ),
     Stage(
-        finish_found, "contacts where free flight leads, for code that reads them", ("pairs",), ("pairs",), "colliders"
+        finish_found, "contacts where free flight leads, for code that reads them", ("pairs",), ("pairs",),
+        "contacts are read early",
     ),
     *Integration.ON_DEMAND,
 )  # fmt: skip
 # What may be true of a scene, for ``Stage.needed``; besides, stages of integrators are needed by their own names.
 WITH_COLLIDERS = frozenset((
-    "colliders", "colliders or joints", "contacts", "no body spins, no joints", "one level", "several levels",
-    "many bodies", "swept bodies",
+    "colliders", "colliders or joints", "contacts", "contacts may rest", "contacts may rest or joints", "impacts",
+    "no body spins, no joints", "one level", "several levels", "many bodies", "swept bodies", "queries of many bodies",
+    "contacts are read early",
 ))  # fmt: skip
 CONDITIONS = (
     "", "dynamic bodies", *sorted(WITH_COLLIDERS), "bodies spin", "bodies spin, no joints", "joints", "parts",
@@ -122,7 +143,12 @@ SYSTEMS = (ForceAccumulation, Integration, BroadPhase, NarrowPhase, Response, Co
 STAGES = check_stages((*OPENING, *(stage for system in SYSTEMS for stage in system.STAGES), *CLOSING, *ON_DEMAND))
 
 # Parts of stages by their place in ``state.links``.
-LINKED_PARTS = {BOUND_SEARCHES: bound_searches, FIRST_TOUCH: first_touch, TAKE_TOGETHER: resolve_simultaneous}
+LINKED_PARTS = {
+    BOUND_SEARCHES: bound_searches, FIRST_TOUCH: first_touch, TAKE_TOGETHER: resolve_simultaneous,
+    FREE_TURN: turn_with_unequal_moments, TURNING_TOUCH: touch_of_turning, TOUCH_OF_TURN: first_touch_of_turn,
+    CLOSING_POINT: closing_point, ARMS_AT_REST: lay_arms, TURNING_RESPONSE: respond_at_arms,
+    TURN_BY_IMPACT: turn_by_impact, JOINED_ISLANDS: measure_joined_islands, JOINED_BODIES: gather_joined,
+}  # fmt: skip
 
 # The system of each stage; "" for those that open and close a step.
 SYSTEM_OF_STAGE = {

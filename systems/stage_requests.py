@@ -17,6 +17,8 @@ def handlers(simulation: Any) -> dict[int, Callable[[float], None]]:
         codes.NEED_ROOM: lambda dt: reserve(simulation),
         codes.NEED_SWEEPS: lambda dt: simulation.link(),
         codes.NEED_IMPACTS: lambda dt: simulation.links.link_impacts(),
+        codes.NEED_TOGETHER: lambda dt: simulation.links.link_together(),
+        codes.NEED_REST: lambda dt: simulation.links.link_rest(),
         codes.FIND_IN_PYTHON: partial(find_candidates, simulation),
         codes.REFRESH_PAIRS: partial(refresh_pairs, simulation),
         codes.ROTATE: lambda dt: simulation.scene.refresh_rotation(),

@@ -23,10 +23,11 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import absolute, add, add_scaled, dot, item, length, scale, sub
 from ..integration.trajectory import ROUNDING, along, bend_of, first_root, is_straight, rate_along
 from ..integration.turning import is_turned, turn_of_arm
+from ..linking.parts import CLOSING_POINT, TURNING_TOUCH, call_closing_point, call_turning_touch
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, sweep
 from ..shapes.poses import advance_pose, motion_of, set_motion
 from ..shapes.tolerances import is_turning, smaller_extent
-from .turning_touch import MOST_STRIDES, NEAR_EXTENTS, SHORTER, closing_point, touch_of_turning
+from .turning_touch import MOST_STRIDES, NEAR_EXTENTS, SHORTER
 
 MOST_ADVANCES = 100  # a graze takes about 30; whatever is still closing in after that counts as touching
 SAFETY_FACTOR, FAR_ROUNDING = 1.001, 1e-12  # more than all rounding: of an extent, of a distance
@@ -77,7 +78,8 @@ def first_touch(state, a, b, path, since, until, limits):
     if state.spinning and is_turning(state, until, a, b):
         spins, near = (state.bodies.spin[a], state.bodies.spin[b]), NEAR_EXTENTS * smaller_extent(state.bodies, a, b)
         near_limits = limits[0], near, limits[2], limits[3], SHORTER * limits[1]
-        found, (t, normal, point, at), _ = touch_of_turning(state, a, b, path, spins, (since, until), near_limits)
+        address, times = state.links[TURNING_TOUCH], (since, until)
+        found, (t, normal, point, at), _ = call_turning_touch(address, state, a, b, path, spins, times, near_limits)
         # Offsets of colliders stand as where the step ends: seen from there, so that arms are right.
         shift_a, shift_b = shift_of_offset(state, a, t - until), shift_of_offset(state, b, t - until)
         return (TOUCHES if found else APART), t, normal, add(point, shift_a), sub(at, sub(shift_b, shift_a))
@@ -97,7 +99,8 @@ def first_touch(state, a, b, path, since, until, limits):
     )
     if state.spinning and found == TOUCHES and (is_turned(state.bodies, a) or is_turned(state.bodies, b)):
         near = NEAR_EXTENTS * smaller_extent(state.bodies, a, b)
-        _, point = closing_point(state, a, b, at, (0.0, normal, point), near, rate_along(path, t))
+        address, met = state.links[CLOSING_POINT], (0.0, normal, point)
+        _, point = call_closing_point(address, state, a, b, at, met, near, rate_along(path, t))
     return found, t, normal, point, at
 
 

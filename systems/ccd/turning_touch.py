@@ -16,6 +16,7 @@ from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, length, negative, row, scale, sub
 from ..integration.trajectory import ROUNDING, along, path_of, rate_along, travel_of
 from ..integration.turning import arms_to, closing_by_spin, is_turned, size_of_turn
+from ..linking.parts import CLOSING_POINT, TURNING_TOUCH, call_closing_point, call_turning_touch
 from ..shapes.convex.points import MOST_POINTS, contact_points
 from ..shapes.dispatch import both_convex, evaluate, has_corner_rule, is_corner_touch
 from ..shapes.linking.convex_by_address import convex_at, rounding_by_address, support_by_address
@@ -34,7 +35,6 @@ MOST_SUNK = 0.5  # slops, or a graze: deeper nothing sinks in before a touch
 GRAZE = 0.125  # slops: as far as points move between looks at a pair that touches and parts, or after EXACT_LOOKS
 
 
-@part
 def closing_point(state, a, b, d, met, near, velocity):
     """(how fast the gap grows there, point): the middle of those points in which the two touch that approach; that of
     the pair if none does, and in a plane if all do: it is in their middle, to the bit. met: (depth,
@@ -70,7 +70,6 @@ def clear_along(state, a, b, d, normal):
     return max(0.0, ahead, -way - reach_along(state, a, out) - reach_along(state, b, normal))
 
 
-@part
 def touch_of_turning(state, a, b, path, spins, times, limits):
     """(whether they touch; (time, normal, point, from a's centre to b's); gap then) between two times, while they turn
     with those spins; shapes stand as at the second of these. limits:
@@ -108,7 +107,8 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
         if touches:
             rate = 0.0
             if threshold > -math.inf:
-                rate, point = closing_point(state, a, b, d, (depth + least, normal, point), near - least, w)
+                met, address = (depth + least, normal, point), state.links[CLOSING_POINT]
+                rate, point = call_closing_point(address, state, a, b, d, met, near - least, w)
             closes = rate < -threshold or (rate < 0.0 and not found)
             if closes and (corners or not is_corner_touch(state, shape_a, a, shape_b, b, d, slop)):
                 touch, found, gap = (t, normal, point, d), True, -depth
@@ -162,7 +162,6 @@ def place_on_way(state, i, share, dt):
     return add_scaled(bodies.previous_position[i], sub(bodies.position[i], bodies.previous_position[i]), share)
 
 
-@part
 def first_touch_of_turn(state, dt, a, b):
     """(whether they touch on the way, share of the step before that, gap then, normal, point from a's centre, from a's
     body to b's where that path starts, and how far that has gone), as the step leads and turns them since their last
@@ -178,5 +177,7 @@ def first_touch_of_turn(state, dt, a, b):
     way = length(travel) + way_of_turning(bodies, a, spins[0]) + way_of_turning(bodies, b, spins[1])
     stride = STRIDE * smaller_extent(bodies, a, b) / way if way > 0.0 else 1.0
     limits = (slop, TOUCH_SLOP * slop, -math.inf, -math.inf, stride)
-    found, (share, normal, point, _), gap = touch_of_turning(state, a, b, path, spins, (0.0, 1.0), limits)
+    address = state.links[TURNING_TOUCH]
+    found, touch, gap = call_turning_touch(address, state, a, b, path, spins, (0.0, 1.0), limits)
+    share, normal, point, _ = touch
     return found, since + left * share, gap, normal, point, start, scale(travel, share)

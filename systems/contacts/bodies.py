@@ -11,14 +11,16 @@ from ..codes import OK
 from ..integration.trajectory import along, path_of
 from ..integration.turning import size_of_turn
 from ..joints.bodies import build_joint_rows
+from ..joints.order import order_direct
 from ..joints.records import DIRECT_BODIES
+from ..linking.parts import JOINED_BODIES, call_joined_bodies
 from ..parts.rows import has_parts, next_row, owner_of, place_of
 from ..parts.stages import copy_to_parts
 from ..records import REST_COLUMNS, SOLVER_ARMS, SOLVER_BODIES, SOLVER_CONTACTS, SOLVER_SPINS, SOLVER_SURFACES
 from ..shapes.surfaces import any_surface_runs
 from .constants import FREQUENCY, SAG, TIPPING_FREQUENCY, TIPPING_SAG
 from .points import points_of
-from .solving.islands import order_rows
+from .solving.islands import order_joints, order_rows
 from .solving.prediction import drop_support
 from .solving.rows import rotate_body
 from .solving.turning import NOT_TUMBLING, integrate_rotation_of_joined, note_frame
@@ -137,14 +139,23 @@ def gather(state, dt):
         solver.reach[q] = reach_from_centre(state, i) if state.collides else 0.0
         solver.inverse_inertia[q] = bodies.inverse_inertia[i]
         solver.inverse_products[q] = bodies.inverse_products[i]
-        if solver.joints.active > 0 and len(nothing) == 3:
-            note_frame(state, q)
-            solver.spin_before[q] = nothing
-            if solver.frame[q, 0] != NOT_TUMBLING:
-                rotate_body(solver, q, nothing)
-                integrate_rotation_of_joined(solver, q, q + 1, -dt)
     if solver.joints.active > 0:
-        build_joint_rows(state)
+        call_joined_bodies(state.links[JOINED_BODIES], state, dt)
+    return OK
+
+
+def gather_joined(state, dt):
+    """The order of joints, where they hold their bodies, and how these turn by themselves in space."""
+    solver, nothing = state.solver, zero_of(state)
+    order_joints(state)
+    order_direct(solver)
+    for q in range(solver.bodies if len(nothing) == 3 else 0):
+        note_frame(state, q)
+        solver.spin_before[q] = nothing
+        if solver.frame[q, 0] != NOT_TUMBLING:
+            rotate_body(solver, q, nothing)
+            integrate_rotation_of_joined(solver, q, q + 1, -dt)
+    build_joint_rows(state)
     return OK
 
 

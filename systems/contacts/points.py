@@ -8,9 +8,11 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, length, row, scale, store, sub
-from ..ccd.search_bounds import FAST
-from ..ccd.turning_touch import FOLLOWED_TURN, first_touch_of_turn, turn_of_path
+from ..ccd.search_bounds import FAST, turns_far
+from ..ccd.turning_touch import FOLLOWED_TURN, turn_of_path
+from ..codes import OK
 from ..integration.turning import cross_spin, is_turned, size_of_turn, turn_of_arm
+from ..linking.parts import TOUCH_OF_TURN, call_touch_of_turn
 from ..narrow_phase.manifolds import centre_offset_at_start, evaluate_pair, forget_manifold, has_manifold
 from ..shapes.convex.points import MOST_POINTS, contact_points, is_same
 from ..shapes.linking.convex_by_address import convex_at, rounding_by_address, support_by_address
@@ -135,7 +137,8 @@ def lay_first_touch(state, dt, r):
     solver, pairs, bodies = state.solver, state.pairs, state.bodies
     c = solver.pair[r]
     a, b = pairs.a[c], pairs.b[c]
-    touches, share, gap, normal, point, begin, way = first_touch_of_turn(state, dt, a, b)
+    address = state.links[TOUCH_OF_TURN]
+    touches, share, gap, normal, point, begin, way = call_touch_of_turn(address, state, dt, a, b)
     if not touches:
         return
     start, between = sub(bodies.previous_position[b], bodies.previous_position[a]), add(begin, way)
@@ -178,3 +181,14 @@ def lay_first_touch(state, dt, r):
             solver.gap[k] = UNREACHED * solver.extent[k]
     pairs.normal[c] = normal
     forget_manifold(pairs, c)
+
+
+def lay_arms(state, dt):
+    """The points of all contacts at rest."""
+    solver, pairs = state.solver, state.pairs
+    for r in range(solver.contacts):
+        if solver.point[r] == 0:
+            build_arms(state, dt, r, solver.gap[solver.slot[r]])
+            if turns_far(state, pairs.a[solver.pair[r]], pairs.b[solver.pair[r]]):
+                lay_first_touch(state, dt, r)
+    return OK

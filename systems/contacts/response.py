@@ -26,7 +26,7 @@ from .solving.warm_start import ROOM_TO_STORE, match_warm_start, store_warm_star
 from .static_penetration import resolve_static_penetration
 
 MOVED_COLUMNS = ("position", "linear_velocity", "path_velocity")
-EITHER = "colliders or joints"
+EITHER, RESTING, RESTING_OR_JOINED = "colliders or joints", "contacts may rest", "contacts may rest or joints"
 BODIES_NEAR, REST = "bodies are near each other", "contacts rest"
 
 
@@ -43,12 +43,12 @@ class Response(StagedSystem):
         Stage(begin_response, "where the paths begin", ("pairs",), ("path_velocity",), EITHER),
         Stage(
             predict_rest, "the impulses of the last step act on the prediction, as far as there is something to hold",
-            ("warm_start",), MOVED_COLUMNS, EITHER, RESTED, ROOM_FOR_SUPPORT,
+            ("warm_start",), MOVED_COLUMNS, RESTING_OR_JOINED, RESTED, ROOM_FOR_SUPPORT,
         ),
         Stage(begin_impacts, "no impact yet", ("pairs", "restitution"), ("impacts",), "colliders"),
         Stage(
             resolve_impacts, "impacts at their time on the path, in order", ("pairs", "restitution", "friction"),
-            (*MOVED_COLUMNS, "impacts"), "colliders", BODIES_NEAR, ROOM_FOR_IMPACTS,
+            (*MOVED_COLUMNS, "impacts"), "impacts", BODIES_NEAR, ROOM_FOR_IMPACTS,
         ),
         Stage(
             find_resting, "which pairs neither bounce nor are apart", ("pairs", *MOVED_COLUMNS), ("pairs",),
@@ -56,14 +56,14 @@ class Response(StagedSystem):
         ),
         Stage(
             gather, "the resting bodies and their contacts, by island and colour; substeps of each island",
-            MOVED_COLUMNS, ("solver",), EITHER, REST, ROOM_AT_REST,
+            MOVED_COLUMNS, ("solver",), RESTING_OR_JOINED, REST, ROOM_AT_REST,
         ),
         Stage(
-            linearise, "normal and gap of each contact at rest", MOVED_COLUMNS, ("solver", "pairs"), "colliders", REST
+            linearise, "normal and gap of each contact at rest", MOVED_COLUMNS, ("solver", "pairs"), RESTING, REST
         ),
         Stage(
             match_warm_start, "the impulses of the step before, to start with", ("warm_start",), ("solver",),
-            "colliders", REST,
+            RESTING, REST,
         ),
         Stage(
             solve_contacts, "substeps: forces, warm start, push, move, relax, guard", ("solver",), ("solver",),
@@ -77,7 +77,7 @@ class Response(StagedSystem):
             solve_joined_contacts, "the same, with joints before the contacts", ("solver",), ("solver",),
             "joints", room=(Rows("solver.direct", ("values",), lambda s: s.solver.direct.blocks),),
         ),
-        Stage(put_back, "where the resting bodies are at the end", ("solver",), MOVED_COLUMNS, EITHER, REST),
+        Stage(put_back, "where the resting bodies are at the end", ("solver",), MOVED_COLUMNS, RESTING_OR_JOINED, REST),
         Stage(
             place_parts, "parts go where contacts have sent and turned their bodies", MOVED_COLUMNS,
             (*MOVED_COLUMNS, "rotation"), "parts",
@@ -85,10 +85,10 @@ class Response(StagedSystem):
         Stage(count_turns, "how far joints in space have turned", ("rotation",), ("solver",), "joints"),
         Stage(
             resolve_static_penetration, "pushes bodies out of static and kinematic bodies", ("pairs",), MOVED_COLUMNS,
-            "colliders", BODIES_NEAR,
+            RESTING, BODIES_NEAR,
         ),
         Stage(
-            store_warm_start, "the impulses, for the next step", ("solver",), ("warm_start",), "colliders", REST,
+            store_warm_start, "the impulses, for the next step", ("solver",), ("warm_start",), RESTING, REST,
             ROOM_TO_STORE,
         ),
         Stage(find_touching, "which pairs touch in the end", MOVED_COLUMNS, ("pairs",), "colliders", BODIES_NEAR),

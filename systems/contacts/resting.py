@@ -8,11 +8,12 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add_scaled, dot, item, length, replace, sub
 from ..ccd.search_bounds import FAST, is_swept, turns_far
-from ..ccd.turning_touch import first_touch_of_turn, is_followed
-from ..codes import OK
+from ..ccd.turning_touch import is_followed
+from ..codes import NEED_REST, OK
 from ..forces.stages import is_zero
 from ..impacts.impulses import STOPPED, is_beyond_cap, is_trapped
 from ..integration.turning import arms_to, closing_by_spin, size_of_turn
+from ..linking.parts import ARMS_AT_REST, TOUCH_OF_TURN, call_arms, call_touch_of_turn
 from ..narrow_phase.manifolds import (
     centre_offset,
     centre_offset_at_start,
@@ -41,7 +42,7 @@ from ..shapes.tolerances import (
     turning_travel,
 )  # fmt: skip
 from .approach import STAYS_SLOPS, first_touch_on_segment, is_stationary, meets_at_corner, segment_start
-from .points import build_arms, is_ball, lay_first_touch, points_of
+from .points import is_ball, points_of
 
 ENTRY_ITERATIONS = 24
 REST_GAP = 1e-11  # of the extent: a smaller gap is none, not even as seen past a round corner
@@ -80,7 +81,7 @@ def deepest(state, dt, c, d):
     pairs, bodies = state.pairs, state.bodies
     a, b = pairs.a[c], pairs.b[c]
     if state.spinning and turns_far(state, a, b) and depth_bound_on_path(state, c) >= -slop_of(state, a, b):
-        touches, _, _, normal, _, _, _ = first_touch_of_turn(state, dt, a, b)
+        touches, _, _, normal, _, _, _ = call_touch_of_turn(state.links[TOUCH_OF_TURN], state, dt, a, b)
         if touches or not is_followed(state, a, b, dt):
             return 2.0 * slop_of(state, a, b) if touches else -math.inf, normal, touches
     far, gap, normal = touch_of_long_way(state, dt, a, b, d)
@@ -177,7 +178,7 @@ def find_resting(state, dt):
         rows += points_of(state, pairs.resting[h]) - 1
     pairs.resting_count, state.solver.contacts, state.solver.tips = count, rows, rows > count
     state.resting_counted += count
-    return OK
+    return OK if count == 0 or state.rest_ready else NEED_REST
 
 
 @part
@@ -277,12 +278,7 @@ def linearise(state, dt):
         has_friction |= mu != 0.0
     solver.has_friction, solver.surfaces_run = has_friction, any_surface_runs(state) and find_surface_slips(state)
     solver.has_rolling = False
-    for r in range(solver.contacts if state.spinning else 0):
-        if solver.point[r] == 0:
-            build_arms(state, dt, r, solver.gap[solver.slot[r]])
-            if turns_far(state, pairs.a[solver.pair[r]], pairs.b[solver.pair[r]]):
-                lay_first_touch(state, dt, r)
-    return OK
+    return call_arms(state.links[ARMS_AT_REST], state, dt) if state.spinning else OK
 
 
 @inlined

@@ -17,11 +17,12 @@ from ...framework.compilation import part
 from ...framework.vectors import add, add_scaled, dot, item, length, scale, sub
 from ..broad_phase.boxes import find_extents
 from ..ccd.search_bounds import FAST, turns_far
-from ..ccd.turning_touch import first_touch_of_turn, turn_of_path
+from ..ccd.turning_touch import turn_of_path
 from ..codes import OK
 from ..impacts.impulses import STOPPED
 from ..integration.trajectory import along, path_of
 from ..integration.turning import turn_of_arm
+from ..linking.parts import TOUCH_OF_TURN, call_touch_of_turn
 from ..narrow_phase.manifolds import (
     centre_offset,
     centre_offset_at_start,
@@ -54,7 +55,7 @@ def depth_on_side_of_touch(state, dt, a, b, d):
     if ways <= 0.5 * smaller_extent(bodies, a, b):
         return depth, normal  # no middle has passed another one
     turner, out = a if bodies.inverse_mass[b] > 0.0 else b, bodies.min_extent[a] + bodies.min_extent[b] + travel
-    touches, share, _, way, _, _, _ = first_touch_of_turn(state, dt, a, b)
+    touches, share, _, way, _, _, _ = call_touch_of_turn(state.links[TOUCH_OF_TURN], state, dt, a, b)
     left = scale(turn_of_path(state, turner, dt), 1.0 - share)
     way = add(way, turn_of_arm(left, way))
     if not touches or length(left) > QUARTER or dot(way, normal) >= 0.0:

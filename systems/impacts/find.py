@@ -22,7 +22,7 @@ from ..integration.trajectory import (
     travel_of,
 )
 from ..integration.turning import arms_to, closing_by_spin, is_turned
-from ..linking.parts import FIRST_TOUCH, call_first_touch
+from ..linking.parts import FIRST_TOUCH, TURNING_RESPONSE, call_first_touch, call_turning_response
 from ..narrow_phase.manifolds import is_at_manifold
 from ..narrow_phase.stages import rank_rows
 from ..parts.rows import owner_of
@@ -42,7 +42,6 @@ from .impulses import (
     is_deflected,
     is_trapped,
 )
-from .turning import respond_at_arms
 
 QUICK = 1e-3  # of the step: inelastic impacts closer than this in time are treated as inelastic collapse
 REGRAZE_IMPACTS = 4  # impacts of two bodies in a step after which they sink in before the next one,
@@ -258,7 +257,8 @@ def queue_event(state, c, kind, path, touch, speed, restitution):
     change, pull, mu = -(1.0 + restitution) * speed, zero_of(state), friction_of(state, a, b)
     w = slip_of(state, a, b, rate_along(path, t))
     if state.spinning and kind != CROSSING:
-        change, pull = respond_at_arms(state, (a, b), touch, (w, speed), restitution, mu)
+        address, motion = state.links[TURNING_RESPONSE], (w, speed)
+        change, pull = call_turning_response(address, state, (a, b), touch, motion, restitution, mu)
     elif mu > 0.0:  # Coulomb: stops what slides, with at most mu times the normal impulse
         sliding = add_scaled(w, normal, -dot(w, normal))
         fast = length(sliding)

@@ -18,12 +18,13 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, scale, sub
 from ..integration.trajectory import rate_along, relative_path
 from ..integration.turning import compliance, is_turned, velocity_by_spin
+from ..linking.parts import TURN_BY_IMPACT, call_turn_by_impact
 from ..parts.rows import owner_of
 from ..shapes.dispatch import friction_of
 from ..shapes.surfaces import slip_of
 from .exact_sum import exact_sum
 from .impulses import count_impact, deflect, is_counted, is_immovable, log_impact, note_trapped
-from .turning import arms_of, turn_by_impact
+from .turning import arms_of
 
 PASSES, LEAST_PASSES = 1000, 8  # over the impacts of a group
 WORK = 1 << 16  # impacts in all passes of a step: a heap of bodies that overlap is not worth more
@@ -244,7 +245,7 @@ def push_group(state, count, dt):
     for g in range(count if rubs and state.spinning else 0):
         m = impacts.group[g]
         event = impacts.member[m]
-        turn_by_impact(state, event, arms_of(state, event), 0.0, impacts.friction_impulse[m], dt)
+        call_turn_by_impact(state.links[TURN_BY_IMPACT], state, event, 0.0, impacts.friction_impulse[m], dt)
     for g in range(count):
         m = impacts.group[g]
         event = impacts.member[m]

@@ -13,10 +13,11 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST
 from ..integration.trajectory import along, path_of, rate_along
+from ..linking.parts import TURN_BY_IMPACT, call_turn_by_impact
 from ..narrow_phase.manifolds import forget_manifold
 from ..parts.rows import next_row, owner_of
 from ..shapes.dispatch import restitution_of
-from .turning import arms_of, kinematic_normal_speed, turn_by_impact
+from .turning import kinematic_normal_speed
 
 STOPPED = 1 << 30  # added to a body's impacts: it moves no more in this step, and the solver leaves it alone
 
@@ -118,7 +119,7 @@ def bounce_pair(state, event, dt):
     change = add(scale(impacts.event_normal[event], impacts.event_change[event]), impacts.event_pull[event])
     if state.spinning:
         impulse, friction = impacts.event_change[event] * mass, scale(impacts.event_pull[event], mass)
-        turn_by_impact(state, event, arms_of(state, event), impulse, friction, dt)
+        call_turn_by_impact(state.links[TURN_BY_IMPACT], state, event, impulse, friction, dt)
     for side in range(2):
         i = a if side == 0 else b
         if inverse_mass[i] > 0.0:  # what cannot be moved is as it was: its other impacts stand, and no cap is on it

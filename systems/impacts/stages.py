@@ -8,7 +8,7 @@ from ...framework.compilation import part
 from ...framework.jit.records.record_type import request
 from ...framework.schedule.stages import Rows
 from ..ccd.search_bounds import FAST
-from ..codes import NEED_IMPACTS, NEED_ROOM, OK, REFRESH_PAIRS
+from ..codes import NEED_IMPACTS, NEED_ROOM, NEED_TOGETHER, OK, REFRESH_PAIRS
 from ..linking.parts import FIRST_TOUCH, TAKE_TOGETHER, call_take_together
 from ..narrow_phase.stages import flag_fast_bodies
 from .find import queue_next_impact
@@ -130,7 +130,7 @@ def take_event(state, event, dt):
         return OK
     if kind == IMPACT and impacts.waiting > 0 and impacts.event_time[impacts.heap[0]] - impacts.now <= EQUAL * dt:
         if state.links[TAKE_TOGETHER] == 0:
-            return NEED_IMPACTS
+            return NEED_TOGETHER
         taken = call_take_together(state.links[TAKE_TOGETHER], state, event, dt)
         if taken >= 0:
             return taken

@@ -14,6 +14,7 @@ import math
 
 from ...framework.compilation import part
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, scale, sub
+from ..codes import OK
 from ..integration.trajectory import along, path_of
 from ..integration.turning import arms_to, change_of_spin, compliance, cross_spin, lever, twist, velocity_by_spin
 from ..parts.rows import next_row, owner_of
@@ -68,7 +69,6 @@ def impulses_of(masses, speeds, e, mu):
     return normal, friction
 
 
-@part
 def respond_at_arms(state, sides, touch, motion, e, mu):
     """(change of the speed of b as a sees it, along the normal; change of its velocity along the surface) by an impact.
 
@@ -121,11 +121,10 @@ def kinematic_normal_speed(state, event):
     return dot(cross_spin(bodies.spin[q], arm), impacts.event_normal[event])
 
 
-@part
-def turn_by_impact(state, event, arms, impulse, friction, dt):
+def turn_by_impact(state, event, impulse, friction, dt):
     """An impact changes the spins of both bodies, with which they turn for the rest of the step. impulse: along the
     normal; friction: along the surface."""
-    impacts, bodies = state.impacts, state.bodies
+    impacts, bodies, arms = state.impacts, state.bodies, arms_of(state, event)
     c, normal, left = impacts.event_pair[event], impacts.event_normal[event], dt - impacts.now
     for side in range(2):
         i, arm, sign = (state.pairs.a[c], arms[0], -1.0) if side == 0 else (state.pairs.b[c], arms[1], 1.0)
@@ -146,3 +145,4 @@ def turn_by_impact(state, event, arms, impulse, friction, dt):
                 if bodies.rolling_radius[i] == 0.0:
                     turn_shape(state, i, scale(change, left))
             i = next_row(state, i)
+    return OK

@@ -1,5 +1,5 @@
 """Parts of stages that are compiled on their own and called through their address: those of swept bodies and impacts,
-which take seconds to compile and which many worlds never need."""
+of what turns and of joints. They take seconds to compile; many worlds never need them, and others in several stages."""
 
 from __future__ import annotations
 
@@ -7,14 +7,20 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from ...framework.jit.kinds import FLOAT, INT, Signature, floats, record_kind, tuple_of
+from ...framework.jit.kinds import BOOL, FLOAT, INT, Kind, Signature, floats, record_kind, tuple_of
 from ...framework.jit.linking import Linked
 from ..records import STATE
 from ..shapes.linking.signatures import call_in_dimension
 
 # Places in ``state.links``.
-BOUND_SEARCHES, FIRST_TOUCH, TAKE_TOGETHER = PLACES = range(3)
-SWEPT_PARTS, IMPACT_PARTS = (BOUND_SEARCHES, FIRST_TOUCH), (FIRST_TOUCH, TAKE_TOGETHER)
+(
+    BOUND_SEARCHES, FIRST_TOUCH, TAKE_TOGETHER, FREE_TURN, TURNING_TOUCH, TOUCH_OF_TURN, CLOSING_POINT, ARMS_AT_REST,
+    TURNING_RESPONSE, TURN_BY_IMPACT, JOINED_ISLANDS, JOINED_BODIES,
+) = PLACES = range(12)  # fmt: skip
+SWEPT_PARTS, IMPACT_PARTS = (BOUND_SEARCHES, FIRST_TOUCH), (FIRST_TOUCH,)
+TURNING_PARTS = (FREE_TURN, TURNING_TOUCH, TOUCH_OF_TURN, CLOSING_POINT, ARMS_AT_REST, TURNING_RESPONSE, TURN_BY_IMPACT)
+JOINT_PARTS = (JOINED_ISLANDS, JOINED_BODIES)
+IN_SPACE = (FREE_TURN,)  # in a plane nothing calls it
 
 
 @cache
@@ -35,8 +41,75 @@ def _take_together(dimensions: int) -> Signature:
     return INT(record_kind(STATE, dimensions), INT, FLOAT)
 
 
-SIGNATURES = _bound_searches, _first_touch, _take_together
-call_bound_searches, call_first_touch, call_take_together = map(call_in_dimension, SIGNATURES)
+@cache
+def _free_turn(dimensions: int) -> Signature:
+    vector = floats(dimensions)
+    return vector(record_kind(STATE, dimensions), INT, vector, FLOAT)
+
+
+@cache
+def _touch(dimensions: int) -> Kind:
+    vector = floats(dimensions)
+    return tuple_of(FLOAT, vector, vector, vector)  # (time, normal, point, from a's centre to b's)
+
+
+@cache
+def _turning_touch(dimensions: int) -> Signature:
+    vector, i, f = floats(dimensions), INT, FLOAT
+    spins, times, limits = tuple_of(*(vector,) * 2), floats(2), floats(5)
+    found = tuple_of(BOOL, _touch(dimensions), f)
+    return found(record_kind(STATE, dimensions), i, i, tuple_of(*(vector,) * 4), spins, times, limits)
+
+
+@cache
+def _touch_of_turn(dimensions: int) -> Signature:
+    vector, i, f = floats(dimensions), INT, FLOAT
+    found = tuple_of(BOOL, f, f, vector, vector, vector, vector)
+    return found(record_kind(STATE, dimensions), f, i, i)
+
+
+@cache
+def _closing_point(dimensions: int) -> Signature:
+    vector, i, f = floats(dimensions), INT, FLOAT
+    met = tuple_of(f, vector, vector)
+    return tuple_of(f, vector)(record_kind(STATE, dimensions), i, i, vector, met, f, vector)
+
+
+@cache
+def _of_step(dimensions: int) -> Signature:
+    return INT(record_kind(STATE, dimensions), FLOAT)
+
+
+@cache
+def _turning_response(dimensions: int) -> Signature:
+    vector, f = floats(dimensions), FLOAT
+    change, motion = tuple_of(f, vector), tuple_of(vector, f)
+    sides = tuple_of(*(INT,) * 2)
+    return change(record_kind(STATE, dimensions), sides, _touch(dimensions), motion, f, f)
+
+
+@cache
+def _turn_by_impact(dimensions: int) -> Signature:
+    f = FLOAT
+    return INT(record_kind(STATE, dimensions), INT, f, floats(dimensions), f)
+
+
+SIGNATURES = (
+    _bound_searches, _first_touch, _take_together, _free_turn, _turning_touch, _touch_of_turn, _closing_point, _of_step,
+    _turning_response, _turn_by_impact, _of_step, _of_step,
+)  # fmt: skip
+(
+    call_bound_searches, call_first_touch, call_take_together, call_free_turn, call_turning_touch, call_touch_of_turn,
+    call_closing_point, call_arms, call_turning_response, call_turn_by_impact, call_joined_islands, call_joined_bodies,
+) = map(call_in_dimension, SIGNATURES)  # fmt: skip
+
+
+def needed_places(dimensions: int, sweeps: bool, bounces: bool, turns: bool, joined: bool) -> list[int]:
+    """Of the parts that a world needs before its steps, where that may happen in it: those of several impacts at one
+    time are linked when there are some."""
+    places = {*(SWEPT_PARTS if sweeps else ()), *(IMPACT_PARTS if bounces else ())}
+    places.update(TURNING_PARTS if turns else (), JOINT_PARTS if joined else ())
+    return sorted(places.difference(IN_SPACE if dimensions == 2 else ()))
 
 
 @cache

@@ -42,7 +42,7 @@ from ..shapes.linking.linked_shape import half_extents_kernel
 from ..shapes.linking.linked_shapes import LinkedShapes, linked_shapes
 from ..shapes.query import LinkedQuery, linked_query
 from ..stage_list import LINKED_PARTS, WITH_COLLIDERS
-from .parts import linked_part
+from .parts import TAKE_TOGETHER, linked_part, needed_places
 
 QUERY_SHAPES = (SphereCollider, AABBCollider)  # that queries ask with, beside casts of the shapes of the scene
 
@@ -62,7 +62,7 @@ def kind_of_world(scene: Scene, integration: Integration, program: Program) -> K
     if linked is not None and scene.sweeps_asked:
         conditions |= {QUERYING}
     if any(plugin.name == "joints" for plugin in registry.plugins):  # which may come at any time
-        conditions |= {"joints", "colliders or joints"}
+        conditions |= {"joints", "colliders or joints", "contacts may rest or joints"}
     if scene.state.parts.count > 0:
         conditions |= {"parts"}
     if linked is None:
@@ -85,8 +85,11 @@ def needed_functions(
     """All that steps and queries of such a world may call, some more than once."""
     has_shapes = linked is not None
     yield from (run_stages, ticks_now, copy_blocks, move_rows)
-    for place, function in LINKED_PARTS.items() if has_shapes else ():
-        yield linked_part(place, function, dimensions)
+    joined = "joints" in conditions
+    turns = has_shapes and (joined or "bodies spin" in conditions)
+    places = needed_places(dimensions, has_shapes, has_shapes, turns, joined)
+    for place in (*places, *((TAKE_TOGETHER,) if has_shapes else ())):
+        yield linked_part(place, LINKED_PARTS[place], dimensions)
     for stage in stages:
         if stage.needed in conditions or stage.name in conditions:
             yield linked_stage(stage, STATE, dimensions)

@@ -18,7 +18,7 @@ from ..plugin_stages.plugin_stages import PluginStages
 from ..records import SWEEP_COLUMNS
 from ..scene import Scene
 from ..stage_list import LINKED_PARTS
-from .parts import IMPACT_PARTS, PLACES, SWEPT_PARTS, linked_part
+from .parts import PLACES, TAKE_TOGETHER, linked_part, needed_places
 from .preparation import kind_of_world, link_possible
 
 NEVER_LINKED = -1
@@ -43,6 +43,8 @@ class StepLinks:
         self._forces = NEVER_LINKED, False  # how many force systems there were, and whether some of them turn
         self._joined = False, False  # there are joints, and parts of bodies
         self._bounces = False  # some collider does, or has
+        self._rests = False  # contacts may rest, or have
+        self._turns = False  # contacts turn bodies
         self._key: Any = None  # what the linked stages depend on
         self._usual: Any = None  # what of that bodies may change
         self._shapes_key: Any = None
@@ -78,10 +80,13 @@ class StepLinks:
         state.sweeps_ready = sweeps = collides and self.needs_sweeps()
         if collides and not self._bounces:
             self._bounces = bool(np.any(state.colliders.restitution[:, : state.count]))
+        if collides and not self._rests:
+            self._rests = self._expects_rest()
         usual = (
             scene.linked, scene.registry.version, scene.table.capacity, force_systems, sweeps, collides,
             state.several_levels, state.dynamic > 0, self._search.needs_grids(), state.sleeping,
-            self._plugin_stages.present(), joined, len(state.colliders.one_way) > 0,
+            self._plugin_stages.present(), joined, len(state.colliders.one_way) > 0, self._rests,
+            self._bounces,
         )  # fmt: skip
         if self._key is not None and usual == self._usual and collides:  # bodies have come or gone, no more
             self.link_shapes()  # there may have been a query meanwhile, with other shapes
@@ -103,9 +108,23 @@ class StepLinks:
         self.version, self._forces = scene.version, force_systems
         return changed
 
+    def _expects_rest(self) -> bool:
+        """Whether contacts at rest are likely in the next steps. They are not between elastic bodies that do not turn:
+        their stages compile in the background then, and the first contact at rest waits for them."""
+        state, memory, plugins = self._state, self._state.warm_start, self._plugin_stages
+        turns = any(
+            "spin" in each.writes and found for each, found in zip(plugins.stages, plugins.present(), strict=True)
+        )
+        if turns or state.sleeping or any(self._joined) or memory.counts.any():
+            return True
+        restitution, shaped = state.colliders.restitution[:, : state.count], state.bodies.shape[: state.count] >= 0
+        return restitution.size == 0 or not bool(np.all(restitution.max(axis=0)[shaped] == 1.0))
+
     def _link_stages(self, conditions: dict[str, bool]) -> None:
         """The stages whose condition is met, and what these call."""
         state = self._state
+        self._turns = conditions["bodies spin"] or conditions["joints"]
+        state.rest_ready = conditions["contacts may rest"]
 
         def wanted(stage: Stage) -> bool:
             return conditions.get(stage.needed, False)
@@ -120,6 +139,7 @@ class StepLinks:
         """What is true of the scene now, as in ``stage_list.CONDITIONS``."""
         state = self._state
         moves, collides, (joined, parted) = state.dynamic > 0, state.collides, self._joined
+        rests = collides and self._rests
         met = {
             "": True,
             "dynamic bodies": moves,
@@ -127,6 +147,9 @@ class StepLinks:
             "joints": joined,
             "parts": parted,
             "colliders or joints": collides or joined,
+            "impacts": collides and (self._bounces or state.sweeps_ready),
+            "contacts may rest": rests,
+            "contacts may rest or joints": rests or joined,
             "contacts": collides or bool(state.contacts.counts.any()) or state.asleep > 0,  # sleepers have theirs
             "one level": collides and not state.several_levels,
             "several levels": collides and state.several_levels,
@@ -148,12 +171,12 @@ class StepLinks:
         return self._state.sweeps_ready or self._bounces or self._scene.sweeps_asked
 
     def _parts_by_address(self) -> dict[int, Linked]:
-        """The parts of stages that are called by address: those of swept bodies and of impacts only where there may be
-        any."""
-        if not self._state.collides:
-            return {}
-        places = {*(SWEPT_PARTS if self._state.sweeps_ready else ()), *(IMPACT_PARTS if self._bounces else ())}
-        return {place: linked_part(place, LINKED_PARTS[place], self._state.dimensions) for place in places}
+        """The parts of stages that are called by address, only where there may be something for them to do."""
+        state, collides = self._state, self._state.collides
+        places = needed_places(
+            state.dimensions, state.sweeps_ready, collides and self._bounces, collides and self._turns, self._joined[0]
+        )
+        return {place: linked_part(place, LINKED_PARTS[place], state.dimensions) for place in places}
 
     def link_shapes(self) -> None:
         """The functions of the shapes alone, where they are not linked yet."""
@@ -167,9 +190,23 @@ class StepLinks:
     def link_impacts(self) -> None:
         """What impacts need, where nothing could bounce when the stages were linked."""
         self._bounces = True
-        for place, part in self._parts_by_address().items():
-            self._state.links[place] = part.address
+        self._link_within_step()
+
+    def link_together(self) -> None:
+        """What impacts at the same time need."""
+        part = linked_part(TAKE_TOGETHER, LINKED_PARTS[TAKE_TOGETHER], self._state.dimensions)
+        self._state.links[TAKE_TOGETHER] = part.address
+
+    def link_rest(self) -> None:
+        """What contacts at rest need, where none was expected."""
+        self._rests = True
+        self._link_within_step()
+
+    def _link_within_step(self) -> None:
+        """Link what is needed now; the next step begins as after any other change."""
+        self._link_stages(self._conditions())
         self.link_shapes()
+        self.version = NEVER_LINKED
 
     def _link_possible(self) -> None:
         """All that this world can need, when that may be more than before."""

@@ -152,7 +152,7 @@ class PluginStages:
             NEEDED: any(needed.values()), **needed,
             QUERYING: any(needed[stage.name] for stage in self.stages if "tree" in stage.reads),
             "bodies spin": spins, "bodies spin, no joints": spins and not met["joints"],
-            "no body spins, no joints": met["colliders"] and not spins and not met["joints"],
+            "no body spins, no joints": met["contacts may rest"] and not spins and not met["joints"],
         }  # fmt: skip
 
 

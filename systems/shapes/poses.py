@@ -13,6 +13,7 @@ from ...framework.elementary import atan2
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, item, length, replace, scale
 from ..integration.turning import turn_of_arm
+from ..linking.parts import FREE_TURN, call_free_turn
 from .dispatch import write_rotated
 from .free_rotation import diagonalised, turn_freely, turn_to_energy
 from .quaternions import product, rotate, turned_tensor
@@ -109,9 +110,16 @@ def momentum_along(q, inverse, spin):
 def advance_pose(state, i, spin, h):
     """The vector by which body i turns freely in h seconds from that spin; its own spin and its inertia become those of
     that time, its shape stays."""
-    bodies, own = state.bodies, state.bodies.spin[i]
-    if h == 0.0 or length(own) + length(spin) == 0.0 or not has_unequal_moments(state, i):
+    if len(spin) == 2:  # a case of its own: what follows is not compiled then
         return scale(spin, h)
+    if h == 0.0 or length(state.bodies.spin[i]) + length(spin) == 0.0 or not has_unequal_moments(state, i):
+        return scale(spin, h)
+    return call_free_turn(state.links[FREE_TURN], state, i, spin, h)
+
+
+def turn_with_unequal_moments(state, i, spin, h):
+    """The same in space, where the axis about which body i turns moves."""
+    bodies, own = state.bodies, state.bodies.spin[i]
     inverse, q = principal_axes(state, i)
     m, mine = momentum_along(q, inverse, spin), momentum_along(q, inverse, own)
     to, m, gained = turn_freely(q, m, inverse, h)

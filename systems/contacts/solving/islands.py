@@ -16,10 +16,12 @@ from ....framework.compilation import part
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add, dot, length, sub
 from ...bits import lowest_bit
+from ...codes import OK
 from ...integration.turning import arms_to, velocity_by_spin
 from ...islands import join_roots, root_of
-from ...joints.order import choose_direct, order_direct
+from ...joints.order import choose_direct
 from ...joints.records import LIMIT, TURN
+from ...linking.parts import JOINED_ISLANDS, call_joined_islands
 from ...narrow_phase.manifolds import centre_offset_at_start
 from ...parts.rows import owner_of, place_of
 from ...shapes.tolerances import smaller_extent
@@ -162,9 +164,17 @@ def number_islands(state, dt):
     solver.islands = count
     for q in range(solver.bodies):
         island[q] = solver.number[q]
-    for e in range(solver.joints.active):
-        measure_joint(state, solver.joints.order[e], dt)
+    if solver.joints.active > 0:
+        call_joined_islands(state.links[JOINED_ISLANDS], state, dt)
+
+
+def measure_joined_islands(state, dt):
+    """What joints are to their islands."""
+    joints = state.solver.joints
+    for e in range(joints.active):
+        measure_joint(state, joints.order[e], dt)
     choose_direct(state)
+    return OK
 
 
 @part
@@ -353,6 +363,3 @@ def order_rows(state, dt):
         build_chunks(state)
     for s in range(solver.ranges):
         solver.joint_ends[s] = 0
-    if solver.joints.active > 0:
-        order_joints(state)
-        order_direct(solver)
