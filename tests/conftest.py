@@ -1,7 +1,7 @@
 """The tests have a kernel cache of their own, never the user's: made once, shared by all workers, kept between runs.
 
-Its kernels are made for any processor of this platform, as those in a wheel are: the tests run what ships.
-test_wheel packs them, and compares them with code for this processor.
+Its kernels are made for any processor of this platform, as those in a wheel are: the tests run what ships. Where there
+is a linker they are a library; what is edited since compiles. ``CAROM_LIBRARY=0`` runs the tests without it.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import gc
 import os
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 CACHE = Path(__file__).resolve().parent.parent / ".kernels"
@@ -47,5 +48,6 @@ def pytest_sessionstart(session):
     if is_worker or not several or os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
         return
     with config.pluginmanager.getplugin("capturemanager").global_and_fixture_disabled():
-        print(f"kernels that most tests need: loading or compiling, kept in {CACHE.name}", file=sys.stderr, flush=True)
-        subprocess.run([sys.executable, "-m", "carom", "warm-up"], stdout=subprocess.DEVNULL)  # says how many are left
+        print(f"kernels of all that ships: loading or compiling, kept in {CACHE.name}", file=sys.stderr, flush=True)
+        for command in ("warm-up",) if find_spec("carom._kernels") else ("build", "warm-up"):  # say how many are left
+            subprocess.run([sys.executable, "-m", "carom", command], stdout=subprocess.DEVNULL)

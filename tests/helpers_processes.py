@@ -131,7 +131,7 @@ def copied_cache(folder: Path, *without: str) -> dict[str, str]:
     shutil.copytree(
         os.environ["CAROM_CACHE_DIR"], folder, ignore=ignored, copy_function=_link_or_copy, dirs_exist_ok=True
     )
-    return {"CAROM_CACHE_DIR": str(folder)}
+    return {"CAROM_CACHE_DIR": str(folder), "CAROM_LIBRARY": "0"}
 
 
 def _execute(

@@ -8,8 +8,6 @@ windows, sound and threads of their own must not fork: only ``carom`` commands s
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
-import signal
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
@@ -57,6 +55,8 @@ def _compile(functions: Sequence[Linkable], numbers: Iterable[int]) -> None:
 def _compile_together(functions: Sequence[Linkable], helpers: int) -> None:
     """This process and others each take the next function until none is left; those that take longest come first."""
     functions = sorted(functions, key=lambda function: -function.dependency_count)
+    import multiprocessing  # half as long to import as numpy
+
     context: Any = multiprocessing.get_context("fork")
     following, compiled = context.Value("i", 0), context.SimpleQueue()
     started = [
@@ -89,6 +89,8 @@ def _taken(following: Any, count: int) -> Iterator[int]:
 
 def _help(functions: Sequence[Linkable], following: Any, compiled: Any) -> None:
     """What another process does; a function that cannot be compiled raises in the first process when that links it."""
+    import signal
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches both; the first process ends this one
     log.listeners, log.announced, log.processes = [], True, 1
     for number in _taken(following, len(functions)):
