@@ -32,6 +32,7 @@ from ..broad_phase.tree.passes import tree_passes
 from ..forces.accumulation import required_bodies
 from ..integration.system import Integration
 from ..joints.linked import linked_joint
+from ..joints.own import OwnJoint
 from ..plugin_stages.placement import placed
 from ..plugin_stages.plugin_stages import NEEDED, QUERYING
 from ..queries.kernels import query_kernels
@@ -47,8 +48,10 @@ from .parts import TAKE_TOGETHER, linked_part, needed_places
 QUERY_SHAPES = (SphereCollider, AABBCollider)  # that queries ask with, beside casts of the shapes of the scene
 
 # What the list depends on: dimension, the stages that there may be, and their conditions, the shapes of the scene,
-# those that queries ask with.
-Kind = tuple[int, tuple[Stage, ...], frozenset[str], LinkedShapes | None, tuple[LinkedQuery, ...]]
+# those that queries ask with, the joints of plugins.
+Kind = tuple[
+    int, tuple[Stage, ...], frozenset[str], LinkedShapes | None, tuple[LinkedQuery, ...], tuple[OwnJoint, ...]
+]
 
 
 def kind_of_world(scene: Scene, integration: Integration, program: Program) -> Kind:
@@ -66,7 +69,7 @@ def kind_of_world(scene: Scene, integration: Integration, program: Program) -> K
     if scene.state.parts.count > 0:
         conditions |= {"parts"}
     if linked is None:
-        return dimensions, stages, conditions, None, ()
+        return dimensions, stages, conditions, None, (), own_joints(registry, dimensions)
     asking = dict.fromkeys((*QUERY_SHAPES, *(shape.component for shape in linked.shapes)))
     queries = tuple(linked_query(registry, linked, component) for component in asking if component in registry.shapes)
     if len(scene.state.colliders.one_way) > 0:
@@ -75,12 +78,17 @@ def kind_of_world(scene: Scene, integration: Integration, program: Program) -> K
         conditions |= {"sleeping"}
     if any("spin" in stage.writes for stage in stages if stage.plugin):
         conditions |= {"bodies spin", "bodies spin, no joints"}
-    return dimensions, stages, conditions | WITH_COLLIDERS, linked, queries
+    return dimensions, stages, conditions | WITH_COLLIDERS, linked, queries, own_joints(registry, dimensions)
+
+
+def own_joints(registry: Registry, dimensions: int) -> tuple[OwnJoint, ...]:
+    """The joints of plugins that there may be."""
+    return tuple(joint for joint in registry.joints.values() if dimensions in joint.component.dimensions)
 
 
 def needed_functions(
     dimensions: int, stages: tuple[Stage, ...], conditions: frozenset[str], linked: LinkedShapes | None,
-    queries: tuple[LinkedQuery, ...],
+    queries: tuple[LinkedQuery, ...], joints: tuple[OwnJoint, ...],
 ) -> Iterator[Linkable]:  # fmt: skip
     """All that steps and queries of such a world may call, some more than once."""
     has_shapes = linked is not None
@@ -95,6 +103,7 @@ def needed_functions(
             yield linked_stage(stage, STATE, dimensions)
     yield from tree_passes(dimensions).of_world(has_shapes)
     yield from query_kernels(dimensions).of_world(has_shapes)
+    yield from (linked_joint(joint, dimensions) for joint in joints)
     if linked is None:
         return
     yield from linked.all_functions(True, any("shapes" in stage.reads for stage in stages if stage.plugin))
@@ -112,9 +121,8 @@ def all_functions(registry: Registry, dimensions: int) -> Iterator[Linkable]:
     shapes = in_order(registry, (shape for shape in registry.shapes if dimensions in shape.dimensions))
     linked = linked_shapes(registry, shapes, dimensions)
     queries = tuple(linked_query(registry, linked, shape) for shape in shapes)
-    yield from needed_functions(dimensions, stages, frozenset(stage.needed for stage in stages), linked, queries)
-    own = (joint for joint in registry.joints.values() if dimensions in joint.component.dimensions)
-    yield from (linked_joint(joint, dimensions) for joint in own)
+    conditions, joints = frozenset(stage.needed for stage in stages), own_joints(registry, dimensions)
+    return needed_functions(dimensions, stages, conditions, linked, queries, joints)
 
 
 @lru_cache(maxsize=128)  # once in a process for worlds alike
