@@ -10,7 +10,7 @@ import pytest
 from llvmlite.binding import Linkage
 from numba.core.compiler import Compiler
 
-from carom.framework.compilation import allocating_kernel, kernel, part
+from carom.framework.compilation import allocating_kernel, inlined, kernel, part
 from carom.framework.jit import pipeline
 from carom.framework.jit.cache import machine_code
 from carom.framework.jit.dispatchers import KeptDispatcher
@@ -93,6 +93,27 @@ def test_parts_raise_through_kernels():
     """The environments of parts, from which errors are made, are set though parts have no machine code."""
     with pytest.raises(ValueError, match="no root of a negative number"):
         rooted_kernel(-1.0)
+
+
+@jit
+@tried
+def test_parts_are_not_forced_into_others_by_who_compiles_them_first():
+    """numba hands the wish of an inlined function on to those that it calls: solvers became ten times as long."""
+
+    @part
+    def outlined(x):
+        return math.sqrt(x)
+
+    @inlined
+    def around(x):
+        return outlined(x) + 1.0
+
+    calling = kernel(lambda x: around(x) + outlined(x))
+    assert calling(4.0) == 5.0
+    (result,) = outlined.made.overloads.values()
+    functions = [f for f in machine_code(result)._final_module.functions if "outlined" in f.name]
+    assert functions
+    assert not any(b"alwaysinline" in f.attributes for f in functions)
 
 
 @jit
