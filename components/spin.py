@@ -199,7 +199,7 @@ def axes_of(rotation: np.ndarray) -> np.ndarray:
     return np.eye(3) + 2.0 * w * across + 2.0 * matrix_product(across, across)
 
 
-def _inverse(moments: np.ndarray) -> np.ndarray:
+def _inverse(moments: Any) -> np.ndarray:
     """Of a symmetric matrix; 0 about an axis without inertia."""
     diagonal = np.diagonal(moments)
     if not (moments - np.diag(diagonal)).any():
