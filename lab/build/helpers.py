@@ -31,7 +31,7 @@ def replacements(platform: Platform, environments: Iterable[str] = ()) -> str:
     one = (_INSTRUCTION.format(name=name, taken="double %x", kinds="double") for name in ("sqrt", "fabs", *ROUNDING))
     two = _INSTRUCTION.format(name="copysign", taken="double %x, double %y", kinds="double, double")
     there = (f'@"{name}" = hidden global ptr @"{name}"\n' for name in environments)
-    return "".join([*one, two, ticks, _COUNT_DOWN, *there])
+    return "".join([*one, two, ticks, _COUNT_DOWN, _NARROWED if platform.is_wasm else "", *there])
 
 
 def beside(platform: Platform) -> str:
@@ -83,6 +83,21 @@ define linkonce i64 @carom_ticks() alwaysinline {
   %nanoseconds = fmul double %milliseconds, 1.0e6
   %ticks = fptosi double %nanoseconds to i64
   ret i64 %ticks
+}
+"""
+
+_NARROWED = """
+declare ptr @PyTuple_New(i32)
+declare i32 @PyTuple_SetItem(ptr, i32, ptr)
+define linkonce ptr @carom_tuple_new(i64 %long) alwaysinline {
+  %count = trunc i64 %long to i32
+  %tuple = call ptr @PyTuple_New(i32 %count)
+  ret ptr %tuple
+}
+define linkonce i32 @carom_tuple_set(ptr %tuple, i64 %long, ptr %item) alwaysinline {
+  %place = trunc i64 %long to i32
+  %failed = call i32 @PyTuple_SetItem(ptr %tuple, i32 %place, ptr %item)
+  ret i32 %failed
 }
 """
 

@@ -42,6 +42,8 @@ _REPLACED = {
     "llvm.readcyclecounter": "carom_ticks", "llvm.readsteadycounter": "carom_ticks",
     "llvm.x86.atomic.sub.cc.i64": "carom_count_down",
 }  # fmt: skip
+# Functions of Python with a size that numba takes to have 64 bits.
+_NARROWED = {"PyTuple_New": "carom_tuple_new", "PyTuple_SetItem": "carom_tuple_set"}
 
 
 def retarget(bitcode: bytes, platform: Platform, exported: Mapping[str, str]) -> bytes:
@@ -57,9 +59,10 @@ def retarget(bitcode: bytes, platform: Platform, exported: Mapping[str, str]) ->
     module = binding.parse_bitcode(bitcode)
     machine = platform.target_machine
     module.triple, module.data_layout = platform.triple, str(machine.target_data)
+    replaced = {**_REPLACED, **(_NARROWED if platform.is_wasm else {})}
     for function in module.functions:
         if function.is_declaration:
-            function.name = _REPLACED.get(function.name, function.name)
+            function.name = replaced.get(function.name, function.name)
         elif function.name in exported:
             function.name = exported[function.name]
             function.linkage, function.visibility = Linkage.external, "hidden"
