@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform as machine
 import sys
+import sysconfig
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -79,9 +80,10 @@ PLATFORMS = {
 
 
 def native() -> Platform | None:
-    """The platform of this machine; None: none of those that carom builds for."""
-    system = {"linux": "linux", "darwin": "macos", "win32": "win", "emscripten": "wasm32"}.get(sys.platform)
-    processor = {"arm64": "arm64" if system == "macos" else "aarch64", "AMD64": "amd64"}.get(
-        machine.machine(), machine.machine()
-    )
-    return PLATFORMS.get("wasm32" if system == "wasm32" else f"{system}-{processor}")
+    """The platform of this Python; None: none of those that carom builds for."""
+    name = sysconfig.get_platform()
+    if sys.platform == "darwin":
+        name = f"macos-{machine.machine()}"
+    elif sys.platform == "emscripten":
+        name = "wasm32"
+    return PLATFORMS.get(name)
