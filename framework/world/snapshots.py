@@ -139,7 +139,8 @@ def state_hash(physics: PhysicsServices) -> str:
         columns = {column.key: column.hashable(table.column(column.key)) for column in component.columns.values()}
         for key, values in {mask: table.column(mask), **columns}.items():
             digest.update(key.encode())
-            digest.update(np.ascontiguousarray(values[order] + 0).tobytes())
+            zero = np.int64(0) if values.dtype == bool else 0  # numpy's own integer has another size elsewhere
+            digest.update(np.ascontiguousarray(values[order] + zero).tobytes())
     for column in (table.asleep(slice(0, table.count)), table.column(STOPS)):
         if column.any():
             digest.update(column[order].tobytes())
