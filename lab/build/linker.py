@@ -9,6 +9,7 @@ machine itself is linked by what stands there.
 from __future__ import annotations
 
 import importlib.util
+import os
 import re
 import shutil
 import subprocess
@@ -116,9 +117,11 @@ def _options(platform: Platform, module: str, linker: list[str], folder: Path) -
 
 def _run(command: list[str], folder: str) -> str:
     """What the command says; BuildError with its last words if it fails."""
+    caches = {"ZIG_GLOBAL_CACHE_DIR": folder, "ZIG_LOCAL_CACHE_DIR": folder}  # nothing is left in a home folder
     done = subprocess.run(
-        command, cwd=folder, capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL
-    )
+        command, cwd=folder, capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL,
+        env={**os.environ, **caches},
+    )  # fmt: skip
     said = done.stdout + done.stderr
     if done.returncode:
         errors = [line for line in said.splitlines() if "error:" in line] or said.strip().splitlines()[-1:]

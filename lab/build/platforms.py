@@ -74,9 +74,12 @@ PLATFORMS = {
         Platform("linux-aarch64", "aarch64-unknown-linux-gnu", "manylinux_2_17_aarch64.musllinux_1_1_aarch64"),
         Platform("macos-arm64", "arm64-apple-macosx11.0.0", "macosx_11_0_arm64"),
         Platform("win-amd64", "x86_64-pc-windows-msvc", "win_amd64", suffix=".pyd"),
-        Platform("wasm32", "wasm32-unknown-emscripten", "pyemscripten_2026_0_wasm32", pointer_bytes=4),
+        Platform(  # one file for the ABIs of Pyodide 0.27, 0.29 and 314
+            "wasm32", "wasm32-unknown-emscripten",
+            "pyodide_2024_0_wasm32.pyemscripten_2025_0_wasm32.pyemscripten_2026_0_wasm32", pointer_bytes=4,
+        ),
     )
-}
+}  # fmt: skip
 
 
 def native() -> Platform | None:
