@@ -55,7 +55,9 @@ def link(objects: Sequence[bytes], output: Path, platform: Platform) -> None:
         if platform.is_wasm:  # what it warns of it does not import
             _run([*linker, "@all", "--unresolved-symbols=import-dynamic"], folder)
         output.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(Path(folder, "linked"), output)
+        unfinished = output.with_name(f"{output.name}.unfinished")
+        shutil.copyfile(Path(folder, "linked"), unfinished)
+        os.replace(unfinished, output)  # a process may have loaded the file that stood there
 
 
 # As LLVM's linker and GNU's say it.
