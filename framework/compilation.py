@@ -25,7 +25,10 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 # A wrapper for C callers costs compile time and serves none of our kernels.
 KINDS: dict[Any, Kind] = {"int": INT, "float": FLOAT}  # of arguments, by the words of annotations
 
-_OPTIONS = {"nopython": True, "forceinline": False, "boundscheck": None, "error_model": "numpy", "no_cfunc_wrapper": True}
+# And who calls a part, inlined or not, must not decide how that is compiled, as numba has it by default.
+_OPTIONS = {
+    "nopython": True, "boundscheck": None, "error_model": "numpy", "no_cfunc_wrapper": True, "forceinline": False,
+}  # fmt: skip
 
 
 def kernel(function: Function) -> Function:

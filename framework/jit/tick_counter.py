@@ -9,33 +9,22 @@ from typing import Any
 from ..compilation import untimed_kernel
 from .lazy import JIT, cgutils, intrinsic, ir, types
 
-_HAS_CYCLES = platform.machine().lower() in ("x86_64", "amd64", "i686", "x86")  # elsewhere reading it may be forbidden
-_MONOTONIC = 1
+# Cycles of the processor's clock; reading them is forbidden elsewhere, where a steady counter is free for all.
+_IS_X86 = platform.machine().lower() in ("x86_64", "amd64", "i686", "x86")
+_COUNTER = "llvm.readcyclecounter" if _IS_X86 else "llvm.readsteadycounter"
 
 
-def _emit_cycles(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+def _emit_counter(context: Any, builder: Any, sig: Any, values: Any) -> Any:
     kind = ir.FunctionType(ir.IntType(64), [])
-    function = cgutils.get_or_insert_function(builder.module, kind, "llvm.readcyclecounter")
-    return builder.call(function, [])
-
-
-def _emit_clock(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-    word = ir.IntType(64)
-    pair = ir.LiteralStructType((word, word))
-    kind = ir.FunctionType(ir.IntType(32), [ir.IntType(32), pair.as_pointer()])
-    function = cgutils.get_or_insert_function(builder.module, kind, "clock_gettime")
-    moment = cgutils.alloca_once(builder, pair)
-    builder.call(function, [ir.IntType(32)(_MONOTONIC), moment])
-    seconds, rest = (builder.load(cgutils.gep_inbounds(builder, moment, 0, k)) for k in range(2))
-    return builder.add(builder.mul(seconds, word(1_000_000_000)), rest)
+    return builder.call(cgutils.get_or_insert_function(builder.module, kind, _COUNTER), [])
 
 
 @intrinsic
 def _compiled_ticks(typing_context: Any) -> Any:
-    return types.int64(), _emit_cycles if _HAS_CYCLES else _emit_clock
+    return types.int64(), _emit_counter
 
 
-# The counter: cycles of the processor's clock, else nanoseconds.
+# The counter; with the JIT off nanoseconds.
 read_ticks: Any = _compiled_ticks if JIT else time.perf_counter_ns
 
 
