@@ -83,13 +83,12 @@ leash = world.create_entity(names["Leash"](post, jewel, 2.5))
 try:
     world.step()
 except Exception as error:
-    print(type(error).__name__, error, error.__notes__)
+    print(type(error).__name__, error)
 """
     said = play(game, NO_COMPILER, one_place).splitlines()[-1]
     assert "ValueError" in said
     assert "a leash between two bodies in one place, so long:" in said
     assert "2.5" in said
-    assert "raised by constraint" in said
 
 
 def test_what_was_edited_compiles_and_nothing_else(game, tmp_path):
