@@ -12,6 +12,7 @@ import time
 
 from carom import scenes
 from carom.framework.jit.cache import CACHE_FOLDER_VARIABLE
+from carom.framework.jit.library import OFF
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.reporting.text import TextTable, compact, span
 
@@ -21,7 +22,6 @@ STEPS = 600  # after the first
 EMPTY, KEPT, SHIPPED = "none", "kept on disk", "shipped"  # kernels that are compiled already
 PROGRAM = f"""
 import json, resource, sys, time
-import carom.framework.jit.dispatchers  # numba, as the first kernel imports it
 from carom import scenes
 from carom.framework import use_kernels
 from carom.framework.compilation import log
@@ -67,14 +67,15 @@ def _shipped(scene: str) -> tempfile.TemporaryDirectory[str]:
 
 
 def _ship(scene: str, folder: str) -> None:
-    _run("-m", "carom", "warm-up", scene, "--portable", folder)
+    _run("-m", "carom", "build", scene, "--out", folder, **{OFF: "0"})
 
 
 def _start(scene: str, cache: str, shipped: str) -> dict[str, float]:
     """Of one process, by name: seconds by the wall clock to the end of its first step; processor seconds of imports and
     of building the world with the first step; seconds of the longest step after it; kernels that were compiled; MB."""
     started = time.time()
-    found = json.loads(_run("-c", PROGRAM, scene, shipped, **{CACHE_FOLDER_VARIABLE: cache}))
+    environment = {CACHE_FOLDER_VARIABLE: cache, **({} if shipped else {OFF: "0"})}
+    found = json.loads(_run("-c", PROGRAM, scene, shipped, **environment))
     return {"seconds": found.pop("at") - started, **found}
 
 

@@ -39,7 +39,7 @@ def build_command(games: tuple[str, ...], out: Path | None, names: tuple[str, ..
     if None in platforms:
         raise Problem(f"carom builds for {', '.join(PLATFORMS)}; this machine is {platform_name()}")
     try:
-        kernels = collect(games, "generic")
+        kernels = collect(games, "generic", everything=not games)
         for platform in platforms:
             assert platform is not None
             path = (out or Path(games[0]).parent / "kernels") / file_name(platform.name) if games else own(platform)

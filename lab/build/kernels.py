@@ -63,16 +63,22 @@ def linked_kernels() -> list[BuiltKernel]:
     return found
 
 
-def collect(arguments: Iterable[str], processor: str) -> list[BuiltKernel]:
-    """What ``carom build`` with these arguments needs, for such processors: a name that LLVM knows, as generic.
+def collect(targets: Iterable[str], processor: str, everything: bool) -> list[BuiltKernel]:
+    """What worlds of these files may call, of all that ships without any, for such processors: a name that LLVM knows,
+    as generic.
+
+    everything
+        also what carom's own library has
 
     subprocess.CalledProcessError if that process fails; it has told why.
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "kernels"
-        environment = {**os.environ, OFF: "0", "NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
+        environment = {**os.environ, "NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
+        if everything:
+            environment[OFF] = "0"
         code = f"from {__name__} import write; write()"
-        subprocess.run([sys.executable, "-c", code, str(path), *arguments], env=environment, check=True)
+        subprocess.run([sys.executable, "-c", code, str(path), *targets], env=environment, check=True)
         return pickle.loads(path.read_bytes())
 
 

@@ -30,7 +30,7 @@ def own(platform: Platform) -> Path:
 
 def make_wheels(folder: Path, names: Sequence[str]) -> None:
     """A wheel for each of these platforms, into that folder."""
-    kernels = collect((), "generic")
+    kernels = collect((), "generic", everything=True)
     for platform in [PLATFORMS[name] for name in names]:
         library = own(platform)
         try:
