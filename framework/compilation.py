@@ -22,10 +22,10 @@ from .jit.log import CHECKED, log
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-# A wrapper for C callers costs compile time and serves none of our kernels.
 KINDS: dict[Any, Kind] = {"int": INT, "float": FLOAT}  # of arguments, by the words of annotations
 
-# And who calls a part, inlined or not, must not decide how that is compiled, as numba has it by default.
+# A wrapper for C callers costs compile time and serves none of our kernels. And who calls a part, inlined or not, must
+# not decide how that is compiled, as it does where that is left to numba.
 _OPTIONS = {
     "nopython": True, "boundscheck": None, "error_model": "numpy", "no_cfunc_wrapper": True, "forceinline": False,
 }  # fmt: skip
@@ -98,11 +98,7 @@ def _dispatcher(function: Any, options: dict[str, Any], what: str, named: bool =
     except ModuleNotFoundError as error:
         if error.name not in ("numba", "llvmlite"):
             raise
-        known = ", ".join(each.path for each in library.libraries()) or "none is loaded"
-        raise LibraryError(
-            f"{what} is in no library of kernels ({known}), and numba, which would compile it, is not installed: "
-            "pip install numba, or build the game anew with all that it uses (carom build)"
-        ) from error
+        raise library.missing(what) from error
 
 
 def _kept(kind: type[Compiled], function: Any, **options: Any) -> Any:
@@ -135,7 +131,14 @@ class Compiled(LazyIntrinsic, Linkable):
 
     def _make(self) -> Any:
         entry = library.entry(self)
-        return _dispatcher(self.py_func, self.targetoptions, self.py_func.__name__) if entry is None else entry
+        if entry is not None:
+            return entry
+        try:
+            return _dispatcher(self.py_func, self.targetoptions, f"kernel {self.py_func.__name__}")
+        except LibraryError:
+            if self.signature is not None:
+                raise
+            return library.CalledWithArrays(self.py_func)
 
     @property
     def compiled(self) -> Any:

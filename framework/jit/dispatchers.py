@@ -29,6 +29,7 @@ logger = logging.getLogger("carom")
 
 # What has been compiled or loaded for functions of one signature, by their names in libraries.
 linked: dict[str, tuple[Linkable, Any]] = {}
+called: list[KeptDispatcher] = []  # those whose calls from Python have made them
 
 _NUMBERS = {"int64": types.int64, "float64": types.float64, "bool": types.boolean}
 
@@ -139,6 +140,7 @@ class KeptDispatcher(CPUDispatcher):
 
     def _compile_for_args(self, *args: Any, **kws: Any) -> Any:
         """What numba calls for arguments of new types: looks at them, then compiles."""
+        called.append(self)
         with CompilerLock():
             return super()._compile_for_args(*args, **kws)
 

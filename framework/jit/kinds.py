@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from .log import CHECKED
 
 if TYPE_CHECKING:
@@ -44,6 +46,13 @@ class RecordKind(Kind):
 
 
 @dataclass(frozen=True)
+class ArrayKind(Kind):
+    """An array of numpy with so many axes, of kernels that Python calls."""
+
+    dimensions: int
+
+
+@dataclass(frozen=True)
 class Signature:
     """What a function gives and what it gets."""
 
@@ -54,7 +63,8 @@ class Signature:
         return f"{self.result}({', '.join(map(str, self.arguments))})"
 
 
-INT, FLOAT, BOOL = Kind("int64"), Kind("float64"), Kind("bool")
+INT, FLOAT, BOOL, NONE = Kind("int64"), Kind("float64"), Kind("bool"), Kind("none")
+NUMBERS: dict[type, Kind] = {int: INT, float: FLOAT, bool: BOOL, np.float64: FLOAT, np.int64: INT, np.bool_: BOOL}
 
 
 def tuple_of(*kinds: Kind) -> TupleKind:
@@ -65,6 +75,20 @@ def tuple_of(*kinds: Kind) -> TupleKind:
 def floats(count: int) -> TupleKind:
     """A tuple of so many floats; d of them are a vector."""
     return tuple_of(*(FLOAT,) * count)
+
+
+def array_kind(dtype: object, dimensions: int, layout: str, writable: bool) -> ArrayKind:
+    """layout: C, F, or A of neither."""
+    return ArrayKind(f"array({dtype},{dimensions},{layout},{'' if writable else 'readonly'})", dimensions)
+
+
+def kind_of(value: object) -> Kind | None:
+    """Of an argument; None: none that a kernel out of a library is called with."""
+    if isinstance(value, np.ndarray):
+        flags = value.flags
+        layout = "C" if flags.c_contiguous else "F" if flags.f_contiguous else "A"
+        return array_kind(value.dtype, value.ndim, layout, flags.writeable)
+    return NUMBERS.get(type(value))
 
 
 def record_kind(schema: Schema, dimensions: int) -> RecordKind:

@@ -22,8 +22,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..errors import LibraryError
 from .hash import PYTHON, deep_hash
+from .kinds import INT, NONE, Kind, kind_of
+from .names import symbol_of
 from .raised import raise_error
 
 if TYPE_CHECKING:
@@ -170,3 +174,44 @@ def entry(function: Linkable) -> Callable[..., int] | None:
     """What Python calls; None if no library has it."""
     library = _holder(function)
     return getattr(library.module, function.symbol) if library is not None else None
+
+
+class CalledWithArrays:
+    """A kernel that Python calls with arrays, out of libraries: a function of each for every kind of arguments."""
+
+    def __init__(self, function: Any) -> None:
+        self._function = function
+        self._found: dict[tuple[Kind | None, ...], Callable[..., int | None]] = {}
+
+    def __call__(self, *arguments: Any) -> int | None:
+        kinds = tuple(map(kind_of, arguments))
+        if kinds not in self._found:
+            self._found[kinds] = self._find(kinds)
+        flat: list[Any] = []
+        for value in arguments:
+            flat += flattened(value) if isinstance(value, np.ndarray) else (value,)
+        return self._found[kinds](*flat)
+
+    def _find(self, kinds: tuple[Kind | None, ...]) -> Callable[..., int | None]:
+        known = [kind for kind in kinds if kind is not None]
+        for library in libraries() if len(known) == len(kinds) else ():
+            for result in (NONE, INT):
+                entry = getattr(library.module, symbol_of(self._function, result(*known)), None)
+                if entry is not None:
+                    return entry
+        raise missing(f"kernel {self._function.__name__} for ({', '.join(map(str, kinds))})")
+
+
+def flattened(array: np.ndarray) -> tuple[int, ...]:
+    """What machine code gets for an array: owners of its memory, for which kernels do not ask, numbers of items and of
+    bytes of each, address, lengths, strides."""
+    return 0, 0, array.size, array.itemsize, array.ctypes.data, *array.shape, *array.strides
+
+
+def missing(what: str) -> LibraryError:
+    """The error of what nothing here can compile."""
+    known = ", ".join(each.path for each in libraries()) or "none is loaded"
+    return LibraryError(
+        f"{what} is in no library of kernels ({known}), and numba, which would compile it, is not installed: "
+        "pip install numba, or build the game anew with all that it uses (carom build)"
+    )

@@ -22,6 +22,7 @@ _KINDS = {
     "int64": ("i64", "PyLong_AsLongLong", "i64"),
     "float64": ("double", "PyFloat_AsDouble", "double"),
     "bool": ("i8", "PyObject_IsTrue", "i32"),
+    "address": ("ptr", "PyLong_AsLongLong", "i64"),
 }
 
 _FAST_CALL, _ONE_ARGUMENT = 0x80, 0x08  # METH_FASTCALL, METH_O
@@ -37,7 +38,7 @@ class Entry:
     symbol
         of the kernel; with numba's calling convention ``int32 symbol(int64 *result, void **error, arguments...)``
     kinds
-        of its arguments: "int64", "float64" or "bool"
+        of its arguments: "int64", "float64", "bool" or "address"
     result
         "int64", or "none": the function returns None
     """
@@ -134,7 +135,8 @@ def _entry(number: int, entry: Entry, size: str, texts: _Texts) -> str:
         value = f"%given{k}"
         if argument != given:
             value = f"%value{k}"
-            convert.append(f"  {value} = trunc {given} %given{k} to {argument}")
+            way = "inttoptr" if argument == "ptr" else "trunc"
+            convert.append(f"  {value} = {way} {given} %given{k} to {argument}")
         failed, passed = f"%failed{k}", f"{passed}, {argument} {value}"
     none = f"(ptr, ...) @Py_BuildValue(ptr {texts('')})"
     return _ENTRY.format(

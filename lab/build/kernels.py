@@ -14,15 +14,19 @@ from collections.abc import Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ...framework.compilation import Compiled, log
+from ...framework.jit.kinds import BOOL, FLOAT, INT, NONE, ArrayKind, Kind, array_kind
 from ...framework.jit.lazy import dispatchers
 from ...framework.jit.library import OFF, short_hash
 from ...framework.jit.link_all import link_all
 from ...framework.jit.linkable import Linkable
+from ...framework.jit.names import symbol_of
 from ...systems.linking.preparation import all_functions
 from ..cli.loading import load
 from ..cli.warm_up import STEPS, shipped_kernels
+from .errors import BuildError
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,9 @@ class BuiltKernel:
     compiled_as
         its name in ``bitcode``, a module in LLVM's language
     arguments
-        int64 or float64 each, of one that Python calls; None: it is called by its address
+        int64, float64, bool or address each, of one that Python calls; None: it is called by its address
+    result
+        int64 or none
     hash
         of the code it was made from
     """
@@ -46,6 +52,7 @@ class BuiltKernel:
     compiled_as: str
     bitcode: bytes
     arguments: tuple[str, ...] | None
+    result: str
     hash: str
 
 
@@ -55,12 +62,53 @@ def linked_kernels() -> list[BuiltKernel]:
     for symbol, (function, made) in sorted(dispatchers.linked.items()):
         assert function.signature is not None
         arguments = tuple(kind.name for kind in function.signature.arguments)
-        found.append(BuiltKernel(
-            symbol, function.py_func.__name__, made.fndesc.llvm_func_name,
-            made.library._get_module_for_linking().as_bitcode(),
-            arguments if isinstance(function, Compiled) else None, short_hash(function.py_func),
-        ))  # fmt: skip
+        found.append(_built(symbol, function.py_func, made, arguments if isinstance(function, Compiled) else None))
     return found
+
+
+def called_kernels() -> list[BuiltKernel]:
+    """Those that have been called with arrays; BuildError for one that cannot be called without numba."""
+    found = {}
+    for dispatcher in dispatchers.called:
+        function = dispatcher.py_func
+        for made in dispatcher.overloads.values():
+            kinds = [_kind(given) for given in made.signature.args]
+            result = RESULTS.get(str(made.signature.return_type))
+            if result is None or None in kinds:
+                raise BuildError(
+                    f"kernel {function.__name__}: those of a library get arrays and numbers and return nothing or an "
+                    f"integer, not {made.signature}"
+                )
+            signature = result(*(kind for kind in kinds if kind is not None))
+            arguments = tuple(word for kind in signature.arguments for word in _words(kind))
+            built = _built(symbol_of(function, signature), function, made, arguments, result.name)
+            found[built.symbol] = built
+    return [found[symbol] for symbol in sorted(found)]
+
+
+RESULTS = {"none": NONE, "int64": INT}
+
+
+def _built(
+    symbol: str, function: Any, made: Any, arguments: tuple[str, ...] | None, result: str = INT.name
+) -> BuiltKernel:
+    module = made.library._get_module_for_linking().as_bitcode()
+    compiled_as = made.fndesc.llvm_func_name
+    return BuiltKernel(symbol, function.__name__, compiled_as, module, arguments, result, short_hash(function))
+
+
+def _kind(given: Any) -> Kind | None:
+    """Of numba's type of an argument."""
+    if hasattr(given, "layout"):
+        return array_kind(given.dtype, given.ndim, given.layout, given.mutable)
+    return {"int64": INT, "float64": FLOAT, "bool": BOOL}.get(str(given))
+
+
+def _words(kind: Kind) -> tuple[str, ...]:
+    """The numbers that machine code gets for an argument, see library.flattened."""
+    if isinstance(kind, ArrayKind):
+        return "address", "address", "int64", "int64", "address", *("int64",) * (2 * kind.dimensions)
+    return (kind.name,)
 
 
 def collect(targets: Iterable[str], processor: str, everything: bool) -> list[BuiltKernel]:
@@ -104,4 +152,4 @@ def write() -> None:
     """What that process does."""
     log.processes, log.background = os.cpu_count() or 1, False
     prepare(sys.argv[2:])
-    Path(sys.argv[1]).write_bytes(pickle.dumps(linked_kernels()))
+    Path(sys.argv[1]).write_bytes(pickle.dumps([*linked_kernels(), *called_kernels()]))

@@ -25,8 +25,9 @@ def build_library(kernels: Sequence[BuiltKernel], output: Path, platform: Platfo
     """
     objects = [retarget(kernel.bitcode, platform, {kernel.compiled_as: kernel.symbol}) for kernel in kernels]
     entries = [
-        Entry(kernel.symbol, kernel.symbol, kernel.arguments) for kernel in kernels if kernel.arguments is not None
-    ]
+        Entry(kernel.symbol, kernel.symbol, kernel.arguments, kernel.result)
+        for kernel in kernels if kernel.arguments is not None
+    ]  # fmt: skip
     addresses = {kernel.symbol: kernel.symbol for kernel in kernels if kernel.arguments is None}
     hashes = {kernel.symbol: kernel.hash for kernel in kernels} if compared else {}
     facts = {"layout": LAYOUT, "carom": __version__, "python": PYTHON, "hashes": json.dumps(hashes)}

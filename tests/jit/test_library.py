@@ -73,6 +73,67 @@ def test_it_plays_without_a_compiler_as_with_one(game, tmp_path):
     assert alone[1] == "[]"
 
 
+WINDY = """
+import numpy as np
+from carom import Physics, RigidBody, SphereCollider, System, Transform, World, use_kernels
+from carom.framework.compilation import kernel
+
+@kernel
+def blow(velocity, strength, steps: int):
+    if strength[0] != strength[0]:
+        raise ValueError("no wind is blowing")
+    for i in range(len(velocity)):
+        velocity[i, 0] += strength[i % 2] / (1.0 + steps)
+
+class Wind(System):
+    steps = 0
+    strength = np.array((1.0, 2.0))
+
+    def process(self, dt):
+        blow(self.world.bodies.dynamic.linear_velocity, self.strength, self.steps)
+        self.steps += 1
+
+def build(settings=None, seed=0):
+    world = World(Physics(dimensions=2), settings=settings)
+    for k in range(3):
+        world.create_entity(Transform((2 * k, 0)), RigidBody(), SphereCollider(0.5))
+    world.add_system(Wind())
+    return world
+
+if __name__ == "__main__":
+    use_kernels("kernels")
+    world = build()
+    for _ in range(50):
+        world.step()
+    print(world.state_hash())
+"""
+
+
+def test_kernels_of_systems_that_get_arrays_are_in_the_library_too(game, tmp_path):
+    file = tmp_path / "jewels.py"  # as play runs it
+    file.write_text(WINDY, encoding="utf-8")
+    done = run_carom("build", "jewels.py", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    error = """
+Wind = names["Wind"]
+Wind.strength = names["np"].array((float("nan"), 2.5))
+try:
+    names["build"]().step()
+except Exception as error:
+    print(type(error.__cause__ or error).__name__, error)
+try:
+    names["blow"](names["np"].zeros(3, np.float32), Wind.strength, 1)
+except Exception as error:
+    print(type(error).__name__, error)
+""".replace("np.float32", 'names["np"].float32')
+    alone = play(tmp_path, NO_COMPILER, error).splitlines()
+    assert alone[0] == play(tmp_path).splitlines()[0]
+    assert "ValueError" in alone[1]
+    assert "no wind is blowing" in alone[1]
+    kinds = "(array(float32,1,C,), array(float64,1,C,), int64)"
+    assert alone[2].startswith(f"LibraryError kernel blow for {kinds} is in no library")
+
+
 def test_errors_of_its_functions_arrive_with_text_and_values(game):
     one_place = """
 import numpy as np
