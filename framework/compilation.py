@@ -130,9 +130,8 @@ class Compiled(LazyIntrinsic, Linkable):
         return INT(*known) if words.get("return") == "int" and len(known) == len(arguments) else None
 
     def _make(self) -> Any:
-        entry = library.entry(self)
-        if entry is not None:
-            return entry
+        if self.library is not None:
+            return getattr(self.library.module, self.symbol)
         try:
             return _dispatcher(self.py_func, self.targetoptions, f"kernel {self.py_func.__name__}")
         except LibraryError:
@@ -145,8 +144,8 @@ class Compiled(LazyIntrinsic, Linkable):
         return self.made
 
     def link(self) -> None:
-        if not library.holds(self):
-            self.made.address_for(self)
+        if self.library is None:
+            self.made.address_for(self.symbol, self.signature)
         self.ready = True
 
     def __call__(self, *args: Any) -> Any:

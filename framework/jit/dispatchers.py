@@ -19,7 +19,6 @@ from numba.core.types import unliteral
 from .cache import KernelCache
 from .hash import deep_hash
 from .kinds import Kind, RecordKind, Signature, TupleKind
-from .linkable import Linkable
 from .log import in_background, log
 from .pipeline import kernel_compiler, part_compiler
 from .records.record_code import record_type
@@ -27,8 +26,9 @@ from .records.record_code import record_type
 logger = logging.getLogger("carom")
 
 
-# What has been compiled or loaded for functions of one signature, by their names in libraries.
-linked: dict[str, tuple[Linkable, Any]] = {}
+# What has been compiled or loaded for functions of one signature, by their names in libraries: dispatcher, signature,
+# compile result.
+linked: dict[str, tuple[Any, Signature, Any]] = {}
 called: list[KeptDispatcher] = []  # those whose calls from Python have made them
 
 _NUMBERS = {"int64": types.int64, "float64": types.float64, "bool": types.boolean}
@@ -129,13 +129,12 @@ class KeptDispatcher(CPUDispatcher):
         result, arguments = numba_types(signature)
         return any(self._cache.holds(kind, self.targetctx) for kind in (result(*arguments), arguments))
 
-    def address_for(self, function: Linkable) -> int:
-        """Where the machine code of what it compiles for a function stands."""
-        assert function.signature is not None
-        result, arguments = numba_types(function.signature)
+    def address_for(self, symbol: str, signature: Signature) -> int:
+        """Where the machine code of what it compiles for that signature stands."""
+        result, arguments = numba_types(signature)
         self.compile(result(*arguments))
         made = self.overloads[arguments]
-        linked[function.symbol] = function, made
+        linked[symbol] = self, signature, made
         return made.library.get_pointer_to_function(made.fndesc.llvm_func_name)
 
     def _compile_for_args(self, *args: Any, **kws: Any) -> Any:

@@ -37,12 +37,10 @@ if TYPE_CHECKING:
     from llvmlite import ir
     from numba.core import cgutils, types
     from numba.np import arrayobj
-
-    from . import dispatchers
 else:
     ir, arrayobj = LazyModule("llvmlite.ir"), LazyModule("numba.np.arrayobj")
     cgutils, types = (LazyModule(f"numba.core.{name}") for name in ("cgutils", "types"))
-    dispatchers = LazyModule(f"{__package__}.dispatchers")
+dispatchers: Any = LazyModule(f"{__package__}.dispatchers")
 
 
 class LazyIntrinsic:

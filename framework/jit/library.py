@@ -20,7 +20,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -29,9 +29,6 @@ from .hash import PYTHON, deep_hash
 from .kinds import INT, NONE, Kind, kind_of
 from .names import symbol_of
 from .raised import raise_error
-
-if TYPE_CHECKING:
-    from .linkable import Linkable
 
 NAME = "_kernels"  # by which their PyInit is called
 OWN = f"carom.{NAME}"
@@ -63,12 +60,11 @@ class Library:
         another Python is other byte code."""
         return json.loads(self.facts["hashes"]) if self.facts["python"] == PYTHON else {}
 
-    def holds(self, function: Linkable) -> bool:
-        """Whether it has that function, made from the code that it has now."""
-        symbol = function.symbol
+    def holds(self, symbol: str, function: Any) -> bool:
+        """Whether it has a function by that name, made from the code that this has now."""
         if symbol not in self._is_current:
             known = self._hashes.get(symbol) if symbol in self._known else ""
-            self._is_current[symbol] = known is None or known == short_hash(function.py_func)
+            self._is_current[symbol] = known is None or known == short_hash(function)
         return self._is_current[symbol]
 
 
@@ -153,27 +149,9 @@ def _is_whole(file: str) -> bool:
     return start + math.prod(sizes) <= size
 
 
-def _holder(function: Linkable) -> Library | None:
-    if function.signature is None:
-        return None
-    return next((library for library in libraries() if library.holds(function)), None)
-
-
-def holds(function: Linkable) -> bool:
-    """Whether some library has it."""
-    return _holder(function) is not None
-
-
-def address_of(function: Linkable) -> int:
-    """Its address; 0 if no library has it."""
-    library = _holder(function)
-    return library.addresses[function.symbol] if library is not None else 0
-
-
-def entry(function: Linkable) -> Callable[..., int] | None:
-    """What Python calls; None if no library has it."""
-    library = _holder(function)
-    return getattr(library.module, function.symbol) if library is not None else None
+def holder(symbol: str, function: Any) -> Library | None:
+    """The library that has that function; None if there is none."""
+    return next((library for library in libraries() if library.holds(symbol, function)), None)
 
 
 class CalledWithArrays:

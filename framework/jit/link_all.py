@@ -13,7 +13,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from ..compilation import log
-from . import library
 from .lazy import JIT, dispatchers
 from .linkable import Linkable
 
@@ -26,7 +25,7 @@ def link_all(functions: Iterable[Linkable]) -> None:
         return
     functions = [function for function in functions if not function.ready]
     for function in functions:
-        if library.holds(function):
+        if function.library is not None:
             function.link()
     functions = [function for function in functions if not function.ready]
     if not functions:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from . import library
 from .kinds import Signature
 from .names import symbol_of
-
-if TYPE_CHECKING:
-    from .dispatchers import KeptDispatcher
 
 
 class Linkable:
@@ -25,19 +22,23 @@ class Linkable:
 
     @cached_property
     def symbol(self) -> str:
-        """Its name in libraries."""
-        assert self.signature is not None
-        return symbol_of(self.py_func, self.signature)
+        """Its name in libraries; none of what is compiled for whatever it is called with."""
+        return "" if self.signature is None else symbol_of(self.py_func, self.signature)
 
     @property
-    def compiled(self) -> KeptDispatcher:
-        """What compiles it; MissingKernelError where there is no compiler."""
+    def library(self) -> library.Library | None:
+        """That which has it."""
+        return library.holder(self.symbol, self.py_func)
+
+    @property
+    def compiled(self) -> Any:
+        """numba's dispatcher that compiles it; LibraryError where there is no compiler."""
         raise NotImplementedError
 
     @property
     def is_cached(self) -> bool:
         """Whether linking it compiles nothing."""
-        return self.ready or library.holds(self) or self.compiled.is_kept(self.signature)
+        return self.ready or self.library is not None or self.compiled.is_kept(self.signature)
 
     @property
     def dependency_count(self) -> int:

@@ -14,7 +14,6 @@ from functools import cached_property
 from typing import Any
 
 from ..compilation import linked_dispatcher
-from . import library
 from .kinds import Signature
 from .lazy import JIT, LazyIntrinsic, cgutils, dispatchers, operation, types
 from .linkable import Linkable
@@ -54,7 +53,7 @@ class Linked(Linkable):
         return self._address != 0
 
     @cached_property
-    def compiled(self) -> dispatchers.KeptDispatcher:
+    def compiled(self) -> Any:
         return linked_dispatcher(self.py_func, self._what)
 
     def link(self) -> None:
@@ -64,7 +63,10 @@ class Linked(Linkable):
         if not JIT:
             _plain.append(self.py_func)
             return len(_plain) - 1
-        return library.address_of(self) or self.compiled.address_for(self)
+        library = self.library
+        if library is not None:
+            return library.addresses[self.symbol]
+        return self.compiled.address_for(self.symbol, self.signature)
 
 
 def linked_call(signature_of: Callable[[], Any]) -> Any:

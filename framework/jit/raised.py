@@ -46,7 +46,8 @@ def raise_error(status: int, address: int) -> None:
         values = iter(ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p)(found.make_tuple)(found.values))
         given = [next(values) if isinstance(value, _Unknown) else value for value in given]
     error = kind(*given)
-    if place is not None:
-        function, file, line = place
-        error.add_note(f"raised by {function}, {file}:{line}")
-    raise error
+    if place is None:
+        raise error
+    function, file, line = place  # as a line of the traceback
+    code = compile("\n" * (line - 1) + "raise error", file, "exec").replace(co_name=function)
+    exec(code, {"error": error})

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...framework.compilation import Compiled, log
+from ...framework.compilation import log
 from ...framework.jit.kinds import BOOL, FLOAT, INT, NONE, ArrayKind, Kind, array_kind
 from ...framework.jit.lazy import dispatchers
 from ...framework.jit.library import OFF, short_hash
@@ -59,10 +59,10 @@ class BuiltKernel:
 def linked_kernels() -> list[BuiltKernel]:
     """All that this process has linked, in an order that is always the same."""
     found = []
-    for symbol, (function, made) in sorted(dispatchers.linked.items()):
-        assert function.signature is not None
-        arguments = tuple(kind.name for kind in function.signature.arguments)
-        found.append(_built(symbol, function.py_func, made, arguments if isinstance(function, Compiled) else None))
+    for symbol, (dispatcher, signature, made) in sorted(dispatchers.linked.items()):
+        by_address = dispatcher.targetoptions.get("no_cpython_wrapper", False)
+        arguments = None if by_address else tuple(kind.name for kind in signature.arguments)
+        found.append(_built(symbol, dispatcher.py_func, made, arguments))
     return found
 
 

@@ -56,6 +56,8 @@ class ExposedColumns:
             return found[0]
         for (key, group), copy in self._copies.items():
             rows, bits = self._rows_now()[group], f"i{copy.itemsize}"
+            if (rows < 0).all():  # all of them are gone
+                continue
             now = self._table.column(key)[self._places[group]].view(bits)
             if not np.array_equal(now, copy.view(bits)):
                 other = (now != copy.view(bits)).reshape(len(rows), -1).any(axis=1)
