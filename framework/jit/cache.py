@@ -163,7 +163,7 @@ def announcement() -> str:
 def announce(dispatcher: Any) -> None:
     """Say that a kernel is about to compile; only INFO where no step waits for it, see background."""
     for listener in log.listeners:
-        listener(dispatcher.py_func.__qualname__)
+        listener(dispatcher.py_func.__name__)
     if not log.announced and not log.listeners and not in_background():
         logger.warning(announcement())
     logger.info("compiling %s (%d so far, %.1f s)", dispatcher.py_func.__name__, len(log.compiled), log.seconds)

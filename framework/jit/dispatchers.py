@@ -116,8 +116,13 @@ class KeptDispatcher(CPUDispatcher):
             log.loaded += 1
             logger.debug("loaded %s for %s", self.py_func.__name__, sig)
         elif was_compiled:
-            log.compiled.append((self.py_func.__qualname__, wait.own))
+            log.compiled.append((self.py_func.__name__, wait.own))
         return entry_point
+
+    def _asked(self, signature: Signature) -> Any:
+        """What numba is asked for: of what Python calls with anything only the arguments count."""
+        result, arguments = numba_types(signature)
+        return result(*arguments) if self.targetoptions.get("no_cpython_wrapper") else arguments
 
     @property
     def dependency_count(self) -> int:
@@ -126,14 +131,12 @@ class KeptDispatcher(CPUDispatcher):
 
     def is_kept(self, signature: Signature) -> bool:
         """Whether it is kept on disk for that signature, and has only to be loaded."""
-        result, arguments = numba_types(signature)
-        return any(self._cache.holds(kind, self.targetctx) for kind in (result(*arguments), arguments))
+        return self._cache.holds(self._asked(signature), self.targetctx)
 
     def address_for(self, symbol: str, signature: Signature) -> int:
         """Where the machine code of what it compiles for that signature stands."""
-        result, arguments = numba_types(signature)
-        self.compile(result(*arguments))
-        made = self.overloads[arguments]
+        self.compile(self._asked(signature))
+        made = self.overloads[numba_types(signature)[1]]
         linked[symbol] = self, signature, made
         return made.library.get_pointer_to_function(made.fndesc.llvm_func_name)
 

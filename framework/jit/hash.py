@@ -72,6 +72,8 @@ def _feed(value: Any, digest: Any, seen: set[int]) -> None:
         digest.update(f"{type(value).__qualname__}.{value.name}={value.value!r}".encode())
     elif isinstance(value, np.ndarray):
         digest.update(repr((value.dtype.str, value.shape)).encode() + value.tobytes())
+    elif isinstance(value, types.BuiltinFunctionType):
+        digest.update(f"{value.__module__}.{value.__qualname__}".encode())
     elif isinstance(value, types.ModuleType):
         digest.update(value.__name__.encode())
     else:

@@ -37,6 +37,8 @@ def structure_of(value: Any, inside: tuple[int, ...] = ()) -> str:
         return f"({', '.join(structure_of(item, inside) for item in value)})"
     if isinstance(value, functools.partial):
         return f"{structure_of(value.func, inside)}{structure_of(value.args, inside)}"
+    if isinstance(value, types.BuiltinFunctionType):
+        return f"{value.__module__}.{value.__qualname__}"
     if isinstance(value, type):
         where = vars(sys.modules[value.__module__]) if value.__module__ in sys.modules else {}
         return f"{_module(where) or value.__module__}.{value.__qualname__}{getattr(value, '_fields', '')}"

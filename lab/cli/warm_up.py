@@ -89,8 +89,7 @@ def warm_up(work: Iterator[Work], say: Callable[[str], None]) -> list[Row]:
         compiled, loaded, started = len(log.compiled), log.loaded, time.perf_counter()
         with stdout_kept_clean():
             action()
-        new = [(kernel.rpartition(".")[2], seconds) for kernel, seconds in log.compiled[compiled:]]
-        rows.append(Row(name, new, log.loaded - loaded, time.perf_counter() - started))
+        rows.append(Row(name, log.compiled[compiled:], log.loaded - loaded, time.perf_counter() - started))
     return rows
 
 

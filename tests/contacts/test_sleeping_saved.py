@@ -78,6 +78,19 @@ def test_a_world_that_does_not_sleep_goes_on_from_a_snapshot_of_one_that_does():
     sleep(world, *boxes)
 
 
+def test_a_snapshot_when_the_last_sleeper_was_deleted():
+    with World(Physics(dimensions=2), settings=Settings(sleeping=True)) as world:
+        lonely = ball(world, (0.0, 0.0))
+        world.bodies.position  # noqa: B018 - lent: what is written into it later wakes it
+        run(world, 100)
+        assert is_asleep(world, lonely) == [True]
+        world.delete_entity(lonely, immediate=True)
+        kept = world.snapshot()
+        world.step()
+        world.restore(kept)
+        assert world.step_count == 100
+
+
 def test_a_snapshot_from_before_wakes_what_sleeps():
     world = sleepy_world()
     boxes = tower(world, 0.0)

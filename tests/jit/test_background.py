@@ -84,7 +84,8 @@ except Exception as error:
 
 
 def run(code, cache, background="1"):
-    return output_of(code, anew=True, CAROM_CACHE_DIR=str(cache), CAROM_BACKGROUND=background).splitlines()
+    environment = {"CAROM_LIBRARY": "0", "CAROM_CACHE_DIR": str(cache), "CAROM_BACKGROUND": background}
+    return output_of(code, anew=True, **environment).splitlines()
 
 
 def test_one_function_after_the_other_and_nobody_waits(tmp_path):

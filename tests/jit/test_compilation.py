@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import sys
+import math
 import types
 
 import numpy as np
@@ -89,6 +90,7 @@ def test_the_hash_follows_calls_constants_captured_values_and_options():
         summing(one), summing(two), summing(one, 1.0), summing(one, 1), summing(one, options=inlined),
         summing(summing(one)), summing(part(plus(1.0))), summing(part(plus(2.0))), summing(part(plus((1.0, 2.0)))),
         summing(part(plus(np.array([1.0, 2.0])))), summing(part(plus(np.array([1.0, 3.0])))),
+        summing(part(plus(math.sin))), summing(part(plus(math.cos))),
     ]  # fmt: skip
     hashes = [deep_hash(function) for function in different]
     assert len(set(hashes)) == len(hashes)

@@ -108,7 +108,7 @@ def test_parts_are_not_forced_into_others_by_who_compiles_them_first():
     def around(x):
         return outlined(x) + 1.0
 
-    calling = kernel(lambda x: around(x) + outlined(x))
+    calling = compiled(kernel(lambda x: around(x) + outlined(x)))
     assert calling(4.0) == 5.0
     (result,) = outlined.made.overloads.values()
     functions = [f for f in machine_code(result)._final_module.functions if "outlined" in f.name]
