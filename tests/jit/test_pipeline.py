@@ -55,6 +55,21 @@ def sum_kernel(x):
     return sum_of((x, (halved(x), ())))
 
 
+@part
+def chained(x):
+    return x if x < 1.0 else chained(x - 1.0) + 1.0
+
+
+@inlined
+def forced(x):
+    return chained(x)
+
+
+@kernel
+def forced_kernel(x):
+    return forced(x)
+
+
 @kernel
 def long_kernel(x):
     return recursive(x)
@@ -138,3 +153,19 @@ def test_functions_with_closures_compile_whole():
 @tried
 def test_branches_that_a_tuple_within_an_argument_rules_out_are_not_compiled():
     assert compiled(sum_kernel)(3.0) == 4.5
+
+
+@jit
+@tried
+def test_parts_are_forced_into_their_callers_only_if_they_ask_for_it():
+    """Else a part is, wherever it is called, what the first of its callers to be compiled was."""
+    made = compiled(forced_kernel)
+    made(2.0)
+    (result,) = made.overloads.values()
+    attributes = [
+        [str(attribute) for attribute in function.attributes]
+        for function in machine_code(result)._final_module.functions
+        if "chained" in function.name
+    ]
+    assert attributes
+    assert not any("alwaysinline" in text for texts in attributes for text in texts)
