@@ -1,7 +1,7 @@
 """Linking ahead: all that the bodies of a world, its queries and its settings can need.
 
 Everything compiled that a step or a query calls has a fixed signature, so it can be compiled or loaded without a body
-that uses it. What a step needs now is linked before it in any case (see ``Simulation``). Of the rest, what is kept on
+that uses it. What a step needs now is linked before it in any case (see ``StepLinks``). Of the rest, what is kept on
 disk is loaded then too, so that it does not make a later step wait; what is not compiles in the background, unless it
 is called before: then it compiles at that call, or in ``world.prepare()``.
 """

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers_rest import SLOP, G, heights, overlaps, speed, tower
-from worlds import ball, box, floor, make_world, run
+from worlds import MODES, ball, box, floor, make_world, run
 
+from carom.components import AABBCollider, SphereCollider
 from carom.framework import Phase, StepError, System
 
 ROWS = 6
@@ -78,3 +79,19 @@ def test_a_slop_of_ones_own_reaches_the_contacts():
         world.step()
         found.append(world.stats().counters["resting_contacts"])
     assert found == [0, 1]
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_what_rests_first_in_an_elastic_world_is_held_in_that_step(mode):
+    """Nothing is expected to rest there, so the stages of contacts at rest are linked by the first contact itself."""
+    world = make_world(gravity=G, collision=mode)
+    bodies = [floor(world, restitution=1.0), ball(world, (0.0, 2.0), restitution=1.0)]
+    run(world, 5)
+    bodies.append(ball(world, (5.0, 1.0), restitution=1.0))
+    run(world, 1)
+    assert not world.physics.state.rest_ready
+    for entity, collider in zip(bodies, (AABBCollider, SphereCollider, SphereCollider), strict=True):
+        world.component_for_entity(entity, collider).restitution = 0.0
+    run(world, 200)
+    assert abs(heights(world, bodies[1:]) - 0.5).max() < SLOP
+    assert world.physics.state.rest_ready
