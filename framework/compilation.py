@@ -106,8 +106,7 @@ def _kept(kind: type[Compiled], function: Any, **options: Any) -> Any:
 
 
 def _part(function: Any, **options: Any) -> Any:
-    # else forceinline is that of whichever function is the first to call it
-    options = {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": CHECKED, "forceinline": False, **options}
+    options = {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": CHECKED, **options}
     return Part(function, options) if JIT else function
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import gc
-import sys
 import math
+import sys
 import types
 
 import numpy as np

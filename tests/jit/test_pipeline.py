@@ -112,27 +112,6 @@ def test_parts_raise_through_kernels():
 
 @jit
 @tried
-def test_parts_are_not_forced_into_others_by_who_compiles_them_first():
-    """numba hands the wish of an inlined function on to those that it calls: solvers became ten times as long."""
-
-    @part
-    def outlined(x):
-        return math.sqrt(x)
-
-    @inlined
-    def around(x):
-        return outlined(x) + 1.0
-
-    calling = compiled(kernel(lambda x: around(x) + outlined(x)))
-    assert calling(4.0) == 5.0
-    (result,) = outlined.made.overloads.values()
-    functions = [f for f in machine_code(result)._final_module.functions if "outlined" in f.name]
-    assert functions
-    assert not any(b"alwaysinline" in f.attributes for f in functions)
-
-
-@jit
-@tried
 def test_parts_are_private_to_their_kernel():
     """Else the code of two cached kernels could hold two parts of one name, and the first would serve both."""
     made = compiled(long_kernel)
