@@ -374,6 +374,9 @@ class Game(RuleBasedStateMachine):
         met = {hit.entity: hit.fraction for hit in hits if hit.entity not in self.spoiled}
         assert [hit.fraction for hit in hits] == sorted(hit.fraction for hit in hits)
         for one in self.solids():
+            if radius and not one.collider.mask & 1:  # what passes a shape of the first layer
+                assert one.entity not in met
+                continue
             until = met.get(one.entity, 1.0)
             if one.entity in met:
                 depth = one.depth_of_ball(start + until * way, radius)
