@@ -32,6 +32,15 @@ FORKED = sys.platform.startswith("linux")  # elsewhere system libraries do not s
 PATIENCE = 900  # seconds: what takes longer hangs
 RUN_CAROM = "import runpy; runpy.run_module('carom', run_name='__main__')"
 
+# What a packed game is to carom: neither numba nor llvmlite can be imported.
+NO_COMPILER = """
+import sys
+class Missing:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in ("numba", "llvmlite"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+sys.meta_path.insert(0, Missing())
+"""
 
 Environment = dict[str, "str | None"]  # None: without that variable
 

@@ -7,14 +7,15 @@ from pathlib import Path
 
 import click
 
-from ...framework.jit.library import file_name, platform_name
+import carom
+
+from ...framework.jit.library import NAME, file_name, platform_name
 from ..cli.options import traceback_option
 from ..cli.usage_errors import Problem
 from .errors import BuildError
 from .kernels import collect
 from .library import build_library
 from .platforms import PLATFORMS
-from .wheel import own
 
 
 @click.command("build", short_help="Build a game's kernels into a library, for players without a compiler.")
@@ -42,7 +43,10 @@ def build_command(games: tuple[str, ...], out: Path | None, names: tuple[str, ..
         kernels = collect(games, "generic", everything=not games)
         for platform in platforms:
             assert platform is not None
-            path = (out or Path(games[0]).parent / "kernels") / file_name(platform.name) if games else own(platform)
+            if games:
+                path = (out or Path(games[0]).parent / "kernels") / file_name(platform.name)
+            else:
+                path = Path(carom.__file__).parent / f"{NAME}{platform.suffix}"
             build_library(kernels, path, platform, compared=True)
             click.echo(f"{path}: {len(kernels)} kernels, {path.stat().st_size / 1e6:.2f} MB")
     except subprocess.CalledProcessError as error:

@@ -5,9 +5,13 @@ In a checkout; see ``make wheel`` and ``make wheels``.
 
 from __future__ import annotations
 
-import os
+import base64
+import hashlib
+import itertools
 import subprocess
 import sys
+import tempfile
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,30 +22,52 @@ from .kernels import collect
 from .library import build_library
 from .platforms import PLATFORMS, Platform
 
-PACKAGE = Path(carom.__file__).parent
-ROOT = PACKAGE.parents[1]
-TAG = "CAROM_WHEEL"  # in the environment of setup.py: the platform's tag
-
-
-def own(platform: Platform) -> Path:
-    """Where carom's own library is."""
-    return PACKAGE / f"{NAME}{platform.suffix}"
+ROOT = Path(carom.__file__).parents[2]
 
 
 def make_wheels(folder: Path, names: Sequence[str]) -> None:
-    """A wheel for each of these platforms, into that folder."""
+    """A wheel for each of these platforms, into that folder: the pure one with a library in it."""
     kernels = collect((), "generic", everything=True)
-    for platform in [PLATFORMS[name] for name in names]:
-        library = own(platform)
-        try:
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as temporary:
+        options = ["--quiet", "--disable-pip-version-check", "--no-deps", "--wheel-dir", temporary]
+        subprocess.run([sys.executable, "-m", "pip", "wheel", *options, str(ROOT)], check=True)
+        (pure,) = Path(temporary).glob("*.whl")
+        for platform in [PLATFORMS[name] for name in names]:
+            library = Path(temporary, f"{NAME}{platform.suffix}")
             build_library(kernels, library, platform, compared=False)
-            print(f"{platform.name}: {len(kernels)} kernels, {library.stat().st_size / 1e6:.2f} MB", flush=True)
-            options = ["--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir", str(folder)]
-            command = ["-m", "pip", "--disable-pip-version-check", "wheel", *options, str(ROOT)]
-            environment = {**os.environ, TAG: platform.wheel_tag}
-            subprocess.run([sys.executable, *command], env=environment, check=True)
-        finally:
-            library.unlink(missing_ok=True)
+            made = with_library(pure, library, platform, folder)
+            print(f"{made}: {len(kernels)} kernels, {made.stat().st_size / 1e6:.2f} MB", flush=True)
+
+
+def with_library(pure: Path, library: Path, platform: Platform, folder: Path) -> Path:
+    """Write the wheel that has all of a pure one, and the library beside carom's own modules."""
+    name, version, *_ = pure.name.split("-")
+    information = f"{name}-{version}.dist-info"
+    with zipfile.ZipFile(pure) as archive:
+        files = {file: archive.read(file) for file in archive.namelist()}
+    del files[f"{information}/RECORD"]
+    files[f"{name}/{library.name}"] = library.read_bytes()
+    files[f"{information}/WHEEL"] = _description(platform).encode()
+    lines = [f"{file},sha256={_digest(content)},{len(content)}\n" for file, content in files.items()]
+    files[f"{information}/RECORD"] = f"{''.join(lines)}{information}/RECORD,,\n".encode()
+    made = folder / f"{name}-{version}-{platform.python}-{platform.wheel_tag}.whl"
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        for file, content in files.items():
+            entry = zipfile.ZipInfo(file)  # of no time: the same files are the same wheel
+            entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o100644 << 16
+            archive.writestr(entry, content)
+    return made
+
+
+def _description(platform: Platform) -> str:
+    tags = itertools.product(*(part.split(".") for part in (*platform.python.split("-"), platform.wheel_tag)))
+    lines = ["Wheel-Version: 1.0", "Generator: carom", "Root-Is-Purelib: false", *(f"Tag: {'-'.join(t)}" for t in tags)]
+    return "\n".join(lines) + "\n"
+
+
+def _digest(content: bytes) -> str:
+    return base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=").decode()
 
 
 if __name__ == "__main__":

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import importlib
 import os
-import shutil
 import subprocess
 import sys
 import tarfile
 import zipfile
+from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
 import pytest
 from helpers_folders import FLOORS, ROOT, imported, package_of
+from helpers_packages import build, copied_sources
 
 import carom
 from carom.framework import Component, Plugin
@@ -29,7 +30,8 @@ def python_files(folder: str) -> list[Path]:
 def test_the_root_package_holds_names_and_links():
     root = ROOT / "src" / "carom"
     files = {"__init__.py", "__init__.pyi", "__main__.py", "py.typed"}
-    assert {path.name for path in root.iterdir() if path.name != "__pycache__"} == files | set(FLOORS)
+    built = {"__pycache__", *(path.name for path in root.glob("_kernels.*"))}
+    assert {path.name for path in root.iterdir()} - built == files | set(FLOORS)
     for floor in FLOORS:
         assert (root / floor).resolve() == ROOT / floor
 
@@ -102,20 +104,14 @@ def test_importing_physics_imports_no_drawing_and_no_command_line():
 
 @pytest.fixture(scope="module")
 def source_copy(tmp_path_factory) -> Path:
-    """The sources alone, so that building leaves nothing behind in the checkout."""
+    """The sources, so that building leaves nothing behind in the checkout, with what must be in no package: the
+    checkout's own library, and a module that was deleted after the last build."""
     copy = tmp_path_factory.mktemp("source") / "carom"  # the name a clone is likely to have
-    hidden = shutil.ignore_patterns(".*", "build", "dist", "out", "*.egg-info", "__pycache__", "uv.lock")
-    shutil.copytree(ROOT, copy, symlinks=True, ignore=hidden)
+    former = copied_sources(copy) / "build" / "lib" / "carom"
+    former.mkdir(parents=True)
+    for folder, name in ((former, "deleted.py"), (copy / "src" / "carom", f"_kernels{EXTENSION_SUFFIXES[-1]}")):
+        (folder / name).write_bytes(b"")
     return copy
-
-
-def build(kind: str, source: Path, target: Path) -> Path:
-    """Call setuptools' own build hooks, the ones pip calls: no network, no isolated environment."""
-    code = f"import sys, setuptools.build_meta as b; print(b.build_{kind}(sys.argv[1]))"
-    command = [sys.executable, "-c", code, str(target)]
-    result = subprocess.run(command, cwd=source, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": ""})
-    assert result.returncode == 0, result.stderr
-    return target / result.stdout.strip().splitlines()[-1]
 
 
 def test_a_wheel_holds_exactly_the_packages(source_copy, tmp_path):
@@ -128,6 +124,8 @@ def test_a_wheel_holds_exactly_the_packages(source_copy, tmp_path):
     for floor in FLOORS:
         for path in python_files(floor):
             expected.add("/".join((*package_of(path.parent).split("."), path.name)))
+    web = "lab/build/web"
+    expected |= {f"carom/{web}/{path.name}" for path in (ROOT / web).iterdir() if path.suffix in (".html", ".mjs")}
     assert names == expected
     assert "carom = carom.__main__:main" in entry_points
 
@@ -156,6 +154,7 @@ def test_a_source_distribution_holds_the_tests(source_copy, tmp_path):
         "src/carom/py.typed",
         "src/carom/lab/cli/main.py",
     } <= names
+    assert not [name for name in names if "/_kernels." in name or "deleted" in name]
 
 
 @pytest.mark.parametrize("code", ["import carom.framework, carom.plugins, carom.scenes", "import carom.lab.cli.main"])

@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
-import shutil
+import base64
+import hashlib
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
 
 import pytest
-from helpers_processes import NATIVE, with_variables
+from helpers_packages import build, copied_sources
+from helpers_processes import NATIVE, NO_COMPILER, with_variables
+from packaging.tags import cpython_tags
+from packaging.utils import parse_wheel_filename
 
-pytestmark = pytest.mark.early
+from carom.framework.jit.lazy import JIT
+from carom.framework.jit.library import NAME, libraries
+from carom.lab.build.errors import BuildError
+from carom.lab.build.kernels import collect
+from carom.lab.build.library import build_library
+from carom.lab.build.platforms import PLATFORMS, native
+from carom.lab.build.wheel import ROOT, with_library
+from carom.lab.cli.warm_up import shipped_kernels
 
-ROOT = Path(__file__).resolve().parents[2]
-LEFT_OUT = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "dist", "out", "tests", "docs")
+pytestmark = [pytest.mark.early, pytest.mark.slow, pytest.mark.skipif(not JIT, reason="nothing is compiled")]
 
 PLAY = """
 import sys
@@ -84,52 +94,79 @@ def run(*command, cwd=None, **environment):
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory):
-    """Built from a copy of the sources, as ``make wheel`` does, with the kernels that the tests run."""
-    folder = tmp_path_factory.mktemp("wheel")
-    source = folder / "source"
-    shutil.copytree(ROOT, source, symlinks=True, ignore=LEFT_OUT)
-    run("-m", "carom", "warm-up", "--portable", source / "framework" / "prebuilt")
-    run("-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", folder, source)
-    (made,) = folder.glob("carom-*.whl")
-    return made
-
-
-@pytest.mark.slow
-def test_the_wheel_is_of_this_platform_and_carries_the_kernels(wheel):
-    version = f"cp{sys.version_info.major}{sys.version_info.minor}"
-    assert f"-{version}-{version}-" in wheel.name
-    with zipfile.ZipFile(wheel) as archive:
-        names = archive.namelist()
-    assert "carom/framework/prebuilt/index.json" in names
-    assert sum(name.endswith(".kernel") for name in names) > 100
+def pure(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pure")
+    return build("wheel", copied_sources(folder / "source"), folder)
 
 
 @pytest.fixture(scope="module")
-def played(wheel, tmp_path_factory):
-    """What games print that have the wheel and no kernels of their own."""
+def library(tmp_path_factory):
+    """The one of this checkout, if nothing was edited since."""
+    shipped = [function for dimensions in (2, 3) for function in shipped_kernels(dimensions)]
+    for own in libraries()[:1]:
+        if Path(own.path).parent == ROOT / "src" / "carom" and all(own.holds(function) for function in shipped):
+            return Path(own.path)
+    made = tmp_path_factory.mktemp("library") / f"{NAME}{native().suffix}"
+    try:
+        build_library(collect((), "generic"), made, native(), compared=True)
+    except BuildError as error:
+        pytest.skip(str(error))
+    return made
+
+
+@pytest.mark.parametrize("name", PLATFORMS)
+def test_a_wheel_of_each_platform_is_one_that_installers_take(name, pure, tmp_path):
+    """Whatever version of Python: the first and one to come. Its list of files has the digest of each."""
+    library = tmp_path / f"{NAME}{PLATFORMS[name].suffix}"
+    library.write_bytes(b"machine code")
+    made = with_library(pure, library, PLATFORMS[name], tmp_path)
+    tags = parse_wheel_filename(made.name)[3]
+    machine = {
+        "linux-x86_64": "manylinux_2_17_x86_64", "linux-aarch64": "musllinux_1_1_aarch64",
+        "macos-arm64": "macosx_11_0_arm64", "win-amd64": "win_amd64", "wasm32": "pyodide_2024_0_wasm32",
+    }[name]  # fmt: skip
+    for minor in (11, 12, 31):
+        assert tags & set(cpython_tags((3, minor), [f"cp3{minor}"], [machine]))
+    assert not tags & set(cpython_tags((3, 10), ["cp310"], [machine]))
+    with zipfile.ZipFile(made) as archive:
+        files = {file: archive.read(file) for file in archive.namelist()}
+    with zipfile.ZipFile(pure) as archive:
+        assert {*files} == {*archive.namelist(), f"carom/{library.name}"}
+    (information,) = {file.partition("/")[0] for file in files if ".dist-info/" in file}
+    lines = files[f"{information}/WHEEL"].decode().splitlines()
+    assert sorted(line for line in lines if line.startswith("Tag: ")) == sorted(f"Tag: {tag}" for tag in tags)
+    assert "Root-Is-Purelib: false" in lines
+    recorded = dict(line.split(",", 1) for line in files[f"{information}/RECORD"].decode().splitlines())
+    assert recorded.pop(f"{information}/RECORD") == ","
+    del files[f"{information}/RECORD"]
+    digests = {file: base64.urlsafe_b64encode(hashlib.sha256(content).digest()) for file, content in files.items()}
+    assert recorded == {file: f"sha256={d.decode().rstrip('=')},{len(files[file])}" for file, d in digests.items()}
+
+
+@pytest.fixture(scope="module")
+def played(pure, library, tmp_path_factory):
+    """What games print that have the wheel, no compiler and no home."""
     folder = tmp_path_factory.mktemp("player")
     site, home = folder / "site", folder / "home"
+    wheel = with_library(pure, library, native(), folder)
     run("-m", "pip", "install", "--no-deps", "--target", site, wheel)
     home.mkdir()
-    place = {"PYTHONPATH": str(site), "HOME": str(home), "XDG_CACHE_HOME": "", "CAROM_CACHE_DIR": "", **NATIVE}
-    printed = run("-c", PLAY, cwd=folder, **place).stdout.splitlines()
-    assert not list(home.rglob("*.kernel"))
+    places = {"PYTHONPATH": str(site), "HOME": str(home), "XDG_CACHE_HOME": "", "CAROM_CACHE_DIR": ""}
+    printed = run("-c", NO_COMPILER + PLAY, cwd=folder, CAROM_LIBRARY=None, **places).stdout.splitlines()
+    assert not list(home.iterdir())
     return printed
 
 
-@pytest.mark.slow
 def test_games_with_the_wheel_compile_nothing(played):
     assert played[-1] == "kernels []"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("processor", ["any", pytest.param("this", marks=pytest.mark.long)])
 def test_they_keep_the_bits_of_the_sources(played, tmp_path, processor):
     """Of one scene with impacts, friction and rest. To compile it for this processor takes most of a minute, and
     jit/test_checked_build.py does so with all indices checked."""
     compiled = {"CAROM_CACHE_DIR": str(tmp_path), **NATIVE} if processor == "this" else {}
-    here = run("-c", PLAY, "pile", cwd=tmp_path, CAROM_PREBUILT="0", **compiled).stdout.splitlines()
+    here = run("-c", PLAY, "pile", cwd=tmp_path, CAROM_LIBRARY="0", **compiled).stdout.splitlines()
     assert (here[-1] == "kernels []") == (processor == "any")
     assert here[0].split(" compiled")[0] == played[1].split(" compiled")[0]
     assert here[0].startswith("pile: ")

@@ -9,23 +9,13 @@ import sys
 from pathlib import Path
 
 import pytest
-from helpers_processes import run_carom, with_variables
+from helpers_processes import NO_COMPILER, run_carom, with_variables
 
 from carom.framework.jit.lazy import JIT
 from carom.framework.jit.library import file_name, platform_name
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = [pytest.mark.slow, pytest.mark.early, pytest.mark.skipif(not JIT, reason="nothing is compiled")]
-
-# What a packed game is to carom: neither numba nor llvmlite can be imported.
-NO_COMPILER = """
-import sys
-class Missing:
-    def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] in ("numba", "llvmlite"):
-            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-sys.meta_path.insert(0, Missing())
-"""
 
 
 def game_of_the_page() -> str:
