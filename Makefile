@@ -40,8 +40,8 @@ clean:
 
 .venv/checks: pyproject.toml | .venv/bin/python
 	@echo "installing carom, and all that its checks need, into .venv"
-	$(PIP) install --quiet --no-compile -e ".[test,dev]"
-	touch .venv/test .venv/dev $@
+	$(PIP) install --quiet --no-compile -e ".[test,dev,build]"
+	touch .venv/test .venv/dev .venv/build $@
 .venv/%: pyproject.toml | .venv/bin/python  # the extras of pyproject.toml
 	@echo "installing carom with its extra $* into .venv"
 	$(PIP) install --quiet --no-compile -e ".[$*]"
