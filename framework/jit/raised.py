@@ -20,6 +20,26 @@ class _Information(ctypes.Structure):
     )  # fmt: skip
 
 
+class _Written(ctypes.Structure):
+    """The same as machine code writes it, if there are such arguments: numba has counted with addresses of 8 bytes."""
+
+    _fields_ = (
+        ("pickle", ctypes.c_uint64), ("size", ctypes.c_int32), ("values", ctypes.c_uint64),
+        ("make_tuple", ctypes.c_uint64), ("count", ctypes.c_int32),
+    )  # fmt: skip
+
+
+def _read(address: int) -> Any:
+    """What stands there. A constant is laid out by the platform: where addresses have 4 bytes, its count of 0 stands
+    where the code writes the address of the arguments."""
+    found = _Information.from_address(address)
+    if ctypes.sizeof(ctypes.c_void_p) == 8 or found.count == 0:
+        return found
+    written = _Written.from_address(address)
+    pickle, values, make_tuple = (value & 0xFFFFFFFF for value in (written.pickle, written.values, written.make_tuple))
+    return _Information(pickle, written.size, values, make_tuple, written.count)
+
+
 class _Unknown:
     """In place of an argument that is not a constant: numba pickles its compiler's object for one."""
 
@@ -39,7 +59,7 @@ def raise_error(status: int, address: int) -> None:
     """Raise what a function has returned a status and information of; called by the library."""
     if status <= 0:
         raise StopIteration if status == STOPPED else SystemError(f"a kernel returned status {status}")
-    found = _Information.from_address(address)
+    found = _read(address)
     kind, arguments, place = _Reader(io.BytesIO(ctypes.string_at(found.pickle, found.size))).load()
     given = list(arguments or ())
     if found.count > 0:

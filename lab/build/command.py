@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import click
@@ -15,6 +17,9 @@ from ..cli.usage_errors import Problem
 from .errors import BuildError
 from .kernels import collect
 from .library import build_library
+from .linker import linker_for
+from .page import PLATFORM as WEB
+from .page import build_page, files_of
 from .platforms import PLATFORMS
 
 
@@ -27,8 +32,15 @@ from .platforms import PLATFORMS
 @click.option(
     "--platform", "names", multiple=True, type=click.Choice([*PLATFORMS]), help="For which machines; else for this one."
 )
+@click.option(
+    "--web", type=click.Path(path_type=Path, file_okay=False), metavar="FOLDER",
+    help="Make a page of the first file there, with all kernels that worlds of all files need.",
+)
+@click.option("--pyodide", metavar="URL", help="Where the page finds Pyodide with numpy; else pyodide beside it.")
 @traceback_option
-def build_command(games: tuple[str, ...], out: Path | None, names: tuple[str, ...]) -> None:
+def build_command(
+    games: tuple[str, ...], out: Path | None, names: tuple[str, ...], web: Path | None, pyodide: str | None
+) -> None:
     """Compile all kernels that worlds of these files may call and carom's own library lacks.
 
     Without files: all that ships with carom, into carom's own folder. In a checkout, what is not edited then compiles
@@ -36,10 +48,18 @@ def build_command(games: tuple[str, ...], out: Path | None, names: tuple[str, ..
     """
     if not games and (out or names):
         raise Problem("--out and --platform are for a game: name its file")
+    if web is not None and (out or names or not games):
+        raise Problem("--web makes a page of a game: name its file, without --out and --platform")
+    if pyodide is not None and web is None:
+        raise Problem("--pyodide is for a page: --web FOLDER")
+    if web is not None:
+        with _told():
+            _page(games, web, pyodide or "pyodide")
+        return
     platforms = [PLATFORMS.get(name) for name in names or (platform_name(),)]
     if None in platforms:
         raise Problem(f"carom builds for {', '.join(PLATFORMS)}; this machine is {platform_name()}")
-    try:
+    with _told():
         kernels = collect(games, "generic", everything=not games)
         for platform in platforms:
             assert platform is not None
@@ -49,6 +69,22 @@ def build_command(games: tuple[str, ...], out: Path | None, names: tuple[str, ..
                 path = Path(carom.__file__).parent / f"{NAME}{platform.suffix}"
             build_library(kernels, path, platform, compared=True)
             click.echo(f"{path}: {len(kernels)} kernels, {path.stat().st_size / 1e6:.2f} MB")
+
+
+def _page(games: tuple[str, ...], folder: Path, pyodide: str) -> None:
+    linker_for(WEB)  # before anything compiles
+    files = files_of(games)
+    kernels = collect(games, "generic", everything=True)
+    build_page(kernels, files, folder, pyodide)
+    size = sum(file.stat().st_size for file in folder.iterdir() if file.is_file())
+    click.echo(f"{folder / 'index.html'}: {len(kernels)} kernels, {size / 1e6:.2f} MB beside Pyodide")
+
+
+@contextmanager
+def _told() -> Iterator[None]:
+    """What stops a build is told in a line."""
+    try:
+        yield
     except subprocess.CalledProcessError as error:
         raise click.exceptions.Exit(error.returncode) from None
     except BuildError as error:

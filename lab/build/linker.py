@@ -39,7 +39,7 @@ def link(objects: Sequence[bytes], output: Path, platform: Platform) -> None:
     Raises BuildError if there is no linker for the platform, if it fails, or if what the objects call is nowhere.
     """
     module = output.name.partition(".")[0]
-    linker = _linker(platform)
+    linker = linker_for(platform)
     with tempfile.TemporaryDirectory() as folder:
         files = []
         for number, content in enumerate([*objects, support(platform)]):
@@ -64,8 +64,8 @@ def link(objects: Sequence[bytes], output: Path, platform: Platform) -> None:
 _UNDEFINED = re.compile(r"undefined (?:symbol: |reference to [`'])([\w.$]+)")
 
 
-def _linker(platform: Platform) -> list[str]:
-    """The command of a linker for the platform's format."""
+def linker_for(platform: Platform) -> list[str]:
+    """The command of a linker for the platform's format; BuildError if there is none here."""
     if platform.is_windows:
         name, own = "lld-link", []
     elif platform.is_macos:

@@ -1,6 +1,5 @@
-"""A game as a page: what stands in its folder beside the library, and how it runs without a browser.
+"""A game as a page: what stands in its folder beside ``game.zip`` and ``page.json``, see :mod:`..page`.
 
-``index.html`` is a template (:class:`string.Template`: title, pyodide, module), ``loader.mjs`` starts Python on the
-page and under node, ``run.mjs`` runs such a folder under node. A folder holds the first two and ``game.zip``: the game,
-carom's sources with the library of platform wasm32, and esper.
+``loader.mjs`` starts Python in WebAssembly, in a browser (``index.html``) and under node (``run.mjs``), where it calls
+``carom_page.py``.
 """

@@ -1,16 +1,24 @@
-// Starts Python in WebAssembly with a game, on a page and under node alike.
+// Starts Python in WebAssembly with a game, in a browser and under node alike.
 //
-// loadPyodide: of the Pyodide to use
-// indexURL: where that Pyodide stands
+// page: what page.json says
+// place: URL of the folder of Pyodide, with a slash at its end; indexURL: the same, as Pyodide wants it
 // read: async (name) => bytes of a file of the page's folder
-// say: (text) => shows what happens; loading takes seconds
-export async function load(loadPyodide, indexURL, read, say) {
+// say: (text) => shows what happens, loading takes seconds; print: (line) => shows what Python prints
+export async function load(page, place, indexURL, read, say, print) {
   say('loading Python');
-  const python = await loadPyodide({ indexURL, env: { HOME: '/home/pyodide' } });
+  const { loadPyodide } = await import(`${place}pyodide.mjs`).catch(() => {
+    throw new Error(`there is no Pyodide at ${place}: put one there, or name its place in page.json`);
+  });
+  const python = await loadPyodide({ indexURL, env: { HOME: '/home/pyodide' }, stdout: print, stderr: print });
+  const abi = python.runPython(ABI);
+  if (!page.abis.includes(abi)) {
+    throw new Error(`this page was built for Pyodide with ABI ${page.abis.join(' or ')}, not for ${python.version} `
+      + `with ABI ${abi}: take such a Pyodide, or build the page with a carom that knows this one`);
+  }
   say('loading numpy');
-  await python.loadPackage('numpy', { messageCallback: () => {}, errorCallback: () => {} });
+  await python.loadPackage('numpy', { messageCallback: () => {}, errorCallback: () => {} }).catch(() => {});
   if (!python.runPython('import importlib.util; importlib.util.find_spec("numpy") is not None')) {
-    throw new Error(`the Pyodide at ${indexURL} has no numpy, which carom needs: take one that comes with its packages`);
+    throw new Error(`the Pyodide at ${place} has no numpy, which carom needs: take one that comes with its packages`);
   }
   say('loading the game');
   python.unpackArchive(await read('game.zip'), 'zip', { extractDir: '/game' });
@@ -18,7 +26,14 @@ export async function load(loadPyodide, indexURL, read, say) {
   return python;
 }
 
-// The last line of a Python error is what a player can tell its maker.
+// Of Pyodide up to 0.27, which does not tell its ABI, the version of Emscripten does.
+const ABI = `
+import sysconfig, platform
+sysconfig.get_config_var("PYODIDE_ABI_VERSION") or {"3.1.58": "2024_0"}.get(platform.release(), platform.release())
+`;
+
+// What a player can tell the game's maker, in one line: of a traceback the error itself, with its notes.
 export function reason(error) {
-  return String(error.message ?? error).trim().split('\n').pop();
+  const lines = String(error.message ?? error).trim().split('\n');
+  return lines.slice(lines.findLastIndex((line) => line.startsWith('  ')) + 1).join('; ');
 }

@@ -1,17 +1,20 @@
-// Runs a page's folder without a browser: node run.mjs FOLDER PYODIDE SCRIPT.py, where PYODIDE is a folder with Pyodide
-// and numpy; prints what the script prints. Exit code 1 and one line if it fails.
+// Runs the page of this folder without a browser: node run.mjs PYODIDE [SCRIPT.py], where PYODIDE is a folder with
+// Pyodide and numpy. Runs the game as python does, or that script; exit code 1 and one line if it fails.
 import fs from 'node:fs';
 import path from 'node:path';
-import { pathToFileURL } from 'node:url';
+import { fileURLToPath, pathToFileURL } from 'node:url';
 import { load, reason } from './loader.mjs';
 
-const [folder, pyodide, script] = process.argv.slice(2).map((name) => path.resolve(name));
+const folder = path.dirname(fileURLToPath(import.meta.url));
+const [pyodide, script] = process.argv.slice(2).map((name) => path.resolve(name));
 try {
+  if (!pyodide) throw new Error('node run.mjs PYODIDE [SCRIPT.py]: name a folder with Pyodide and numpy');
   const read = async (name) => new Uint8Array(fs.readFileSync(path.join(folder, name)));
-  const { loadPyodide } = await import(pathToFileURL(path.join(pyodide, 'pyodide.mjs')));
-  const python = await load(loadPyodide, pyodide + path.sep, read, () => {});
-  python.setStdout({ batched: (line) => console.log(line) });
-  python.runPython(fs.readFileSync(script, 'utf8'));
+  const page = JSON.parse(fs.readFileSync(path.join(folder, 'page.json'), 'utf8'));
+  const place = `${pathToFileURL(pyodide).href}/`;
+  const python = await load(page, place, pyodide + path.sep, read, () => {}, (line) => console.log(line));
+  if (script) python.runPython(fs.readFileSync(script, 'utf8'), { filename: script });
+  else python.runPython(`import runpy; runpy.run_path("/game/${page.game}.py", run_name="__main__"); None`);
 } catch (error) {
   console.error(reason(error));
   process.exit(1);
