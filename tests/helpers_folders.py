@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -23,3 +24,9 @@ def imported(path: Path) -> Iterator[str]:
         elif isinstance(node, ast.ImportFrom):
             base = package[: len(package) + 1 - node.level] if node.level else []
             yield from (".".join((*base, *filter(None, (node.module,)), alias.name)) for alias in node.names)
+
+
+def game_of_the_page() -> str:
+    """The game of docs/ship-your-game.md."""
+    text = (ROOT / "docs" / "ship-your-game.md").read_text(encoding="utf-8")
+    return re.findall(r"```python no-run\n(.*?)```", text, re.DOTALL)[0]

@@ -189,7 +189,9 @@ def flattened(array: np.ndarray) -> tuple[int, ...]:
 def missing(what: str) -> LibraryError:
     """The error of what nothing here can compile."""
     known = ", ".join(each.path for each in libraries()) or "none is loaded"
+    on_page = sys.platform == "emscripten"
+    cure = "build the page" if on_page else "pip install numba, or build the game"
     return LibraryError(
         f"{what} is in no library of kernels ({known}), and numba, which would compile it, is not installed: "
-        "pip install numba, or build the game anew with all that it uses (carom build)"
+        f"{cure} anew with all that it uses (carom build)"
     )

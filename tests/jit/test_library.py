@@ -9,19 +9,13 @@ import sys
 from pathlib import Path
 
 import pytest
+from helpers_folders import game_of_the_page
 from helpers_processes import NO_COMPILER, run_carom, with_variables
 
 from carom.framework.jit.lazy import JIT
 from carom.framework.jit.library import file_name, platform_name
 
-ROOT = Path(__file__).resolve().parents[2]
 pytestmark = [pytest.mark.slow, pytest.mark.early, pytest.mark.skipif(not JIT, reason="nothing is compiled")]
-
-
-def game_of_the_page() -> str:
-    text = (ROOT / "docs" / "ship-your-game.md").read_text(encoding="utf-8")
-    (block,) = re.findall(r"```python no-run\n(.*?)```", text, re.DOTALL)
-    return block
 
 
 def python(folder: Path, code: str, **environment: str | None) -> subprocess.CompletedProcess[str]:

