@@ -15,16 +15,19 @@ from helpers_processes import NATIVE, NO_COMPILER, with_variables
 from packaging.tags import cpython_tags
 from packaging.utils import parse_wheel_filename
 
+import carom
 from carom.framework.jit.lazy import JIT
 from carom.framework.jit.library import NAME, libraries
 from carom.lab.build.errors import BuildError
 from carom.lab.build.kernels import collect
 from carom.lab.build.library import build_library
 from carom.lab.build.platforms import PLATFORMS, native
-from carom.lab.build.wheel import ROOT, with_library
+from carom.lab.build.wheel import with_library
 from carom.lab.cli.warm_up import shipped_kernels
 
 pytestmark = [pytest.mark.early, pytest.mark.slow, pytest.mark.skipif(not JIT, reason="nothing is compiled")]
+
+PACKAGE = Path(carom.__file__).parent
 
 PLAY = """
 import sys
@@ -103,8 +106,8 @@ def pure(tmp_path_factory):
 def library(tmp_path_factory):
     """The one of this checkout, if nothing was edited since."""
     shipped = [function for dimensions in (2, 3) for function in shipped_kernels(dimensions)]
-    for own in libraries()[:1]:
-        if Path(own.path).parent == ROOT / "src" / "carom" and all(own.holds(function) for function in shipped):
+    for own in libraries():
+        if Path(own.path).parent == PACKAGE and all(own.holds(each.symbol, each.py_func) for each in shipped):
             return Path(own.path)
     made = tmp_path_factory.mktemp("library") / f"{NAME}{native().suffix}"
     try:
