@@ -111,7 +111,7 @@ def library(tmp_path_factory):
             return Path(own.path)
     made = tmp_path_factory.mktemp("library") / f"{NAME}{native().suffix}"
     try:
-        build_library(collect((), "generic"), made, native(), compared=True)
+        build_library(collect((), "generic", everything=True), made, native(), compared=True)
     except BuildError as error:
         pytest.skip(str(error))
     return made

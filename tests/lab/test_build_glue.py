@@ -200,7 +200,7 @@ def test_without_a_linker_the_error_says_what_to_install(tmp_path, monkeypatch):
 
 
 def test_arguments_that_are_no_numbers_are_refused():
-    with pytest.raises(ValueError, match=r"add: an entry takes numbers \(int64, float64, bool\), not record"):
+    with pytest.raises(ValueError, match=r"add: an entry takes numbers \(int64, float64, bool, address\), not record"):
         glue("_tried", [Entry("add", "k_add", ("record",))], {}, {}, PLATFORMS["win-amd64"])
 
 
