@@ -7,7 +7,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 PYTEST := $(BIN)/pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 unexport PYTHONDONTWRITEBYTECODE  # or every worker would compile all tests and carom anew in each run
 
-.PHONY: run install test test-slow test-all test-long coverage kernels wheel wheels bench figures typecheck lint clean
+.PHONY: run install test test-slow test-all test-long test-numba coverage kernels wheel wheels bench figures typecheck lint clean
 
 run: .venv/plot  # a scene, with pictures in out/
 	$(BIN)/carom run $(SCENE) --out out $(ARGS)
@@ -20,6 +20,8 @@ test-all: .venv/test
 	$(PYTEST) $(ARGS)
 test-long: .venv/test  # more cases and steps of what the others test, before a release
 	$(PYTEST) -m long $(ARGS)
+test-numba: .venv/test  # laws, scenes and joints on kernels that numba has compiled here, not on the library of them
+	CAROM_LIBRARY=0 $(PYTEST) -m "not slow" tests/laws tests/scenes tests/joints $(ARGS)
 coverage: .venv/test  # which lines of the engine the tests run: kernels as plain Python, with the same bits as compiled
 	NUMBA_DISABLE_JIT=1 $(PYTEST) -m "plain and not slow and not compiled" --cov --cov-report=term $(ARGS) \
 	  $$(grep -rl --include="test_*.py" "mark\.plain" tests | sort)  # all others would be collected in vain
