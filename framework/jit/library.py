@@ -23,6 +23,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from numpy._core._multiarray_umath import __cpu_features__
 
 from ..errors import LibraryError
 from .hash import PYTHON, deep_hash
@@ -33,6 +34,7 @@ from .raised import raise_error
 NAME = "_kernels"  # by which their PyInit is called
 OWN = f"carom.{NAME}"
 OFF = "CAROM_LIBRARY"  # 0 in the environment: compile everything here
+AVX2 = "_avx2"  # behind the symbols of kernels for processors that have it
 LAYOUT = "1"  # of what a library holds and how its functions are called
 
 
@@ -41,7 +43,7 @@ class Library:
 
     def __init__(self, module: ModuleType) -> None:
         self.module, self.path = module, str(module.__file__)
-        self.addresses: dict[str, int] = module.addresses
+        self.addresses = _for_this_processor(module.addresses)
         self._known = {*module.addresses, *vars(module)}  # those that Python calls are functions of the module
         self.facts: dict[str, str] = module.facts
         self._is_current: dict[str, bool] = {}  # by symbol
@@ -66,6 +68,12 @@ class Library:
             known = self._hashes.get(symbol) if symbol in self._known else ""
             self._is_current[symbol] = known is None or known == short_hash(function)
         return self._is_current[symbol]
+
+
+def _for_this_processor(addresses: dict[str, int]) -> dict[str, int]:
+    """Those of the kernels that it is best at; all have the same bits."""
+    wide = {name.removesuffix(AVX2): address for name, address in addresses.items() if name.endswith(AVX2)}
+    return addresses | wide if wide and __cpu_features__["AVX2"] else addresses
 
 
 def short_hash(function: Any) -> str:

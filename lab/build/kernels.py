@@ -111,12 +111,16 @@ def _words(kind: Kind) -> tuple[str, ...]:
     return (kind.name,)
 
 
-def collect(targets: Iterable[str], processor: str, everything: bool) -> list[BuiltKernel]:
+def collect(
+    targets: Iterable[str], processor: str, everything: bool, names: Iterable[str] = ()
+) -> list[BuiltKernel]:
     """What worlds of these files may call, of all that ships without any, for such processors: a name that LLVM knows,
     as generic.
 
     everything
         also what carom's own library has
+    names
+        of all that ships only functions of these names
 
     subprocess.CalledProcessError if that process fails; it has told why.
     """
@@ -125,12 +129,12 @@ def collect(targets: Iterable[str], processor: str, everything: bool) -> list[Bu
         environment = {**os.environ, "NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
         if everything:
             environment[OFF] = "0"
-        code = f"from {__name__} import write; write()"
+        code = f"from {__name__} import write; write({[*names]})"
         subprocess.run([sys.executable, "-c", code, str(path), *targets], env=environment, check=True)
         return pickle.loads(path.read_bytes())
 
 
-def prepare(targets: Sequence[str]) -> None:
+def prepare(targets: Sequence[str], names: Sequence[str]) -> None:
     """Link all that worlds of these files may call that no library has; of all that ships, if there are none."""
     functions: dict[Linkable, None] = {}
     for target in targets:
@@ -144,12 +148,13 @@ def prepare(targets: Sequence[str]) -> None:
                 world.step()
     if not targets:
         for dimensions in (2, 3):
-            functions.update(dict.fromkeys(shipped_kernels(dimensions)))
+            kernels = (each for each in shipped_kernels(dimensions) if not names or each.py_func.__name__ in names)
+            functions.update(dict.fromkeys(kernels))
     link_all(functions)
 
 
-def write() -> None:
+def write(names: Sequence[str]) -> None:
     """What that process does."""
     log.processes, log.background = os.cpu_count() or 1, False
-    prepare(sys.argv[2:])
+    prepare(sys.argv[2:], names)
     Path(sys.argv[1]).write_bytes(pickle.dumps([*linked_kernels(), *called_kernels()]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 from carom import __version__
 
 from ...framework.jit.hash import PYTHON
-from ...framework.jit.library import LAYOUT, NAME
+from ...framework.jit.library import AVX2, LAYOUT, NAME
 from .glue import Entry, glue
 from .kernels import BuiltKernel
 from .linker import link
@@ -17,11 +18,16 @@ from .objects import assemble, retarget
 from .platforms import Platform
 
 
-def build_library(kernels: Sequence[BuiltKernel], output: Path, platform: Platform, compared: bool) -> None:
+def build_library(
+    kernels: Sequence[BuiltKernel], output: Path, platform: Platform, compared: bool,
+    wide: Sequence[BuiltKernel] = (),
+) -> None:  # fmt: skip
     """Write the library; BuildError if the machine cannot link for that platform.
 
     compared
         it stands beside sources that may change: it holds the hashes of what it was made from
+    wide
+        some of the kernels as they are for processors with AVX2, which take these; with the same bits
     """
     objects = [retarget(kernel.bitcode, platform, {kernel.compiled_as: kernel.symbol}) for kernel in kernels]
     entries = [
@@ -29,6 +35,11 @@ def build_library(kernels: Sequence[BuiltKernel], output: Path, platform: Platfo
         for kernel in kernels if kernel.arguments is not None
     ]  # fmt: skip
     addresses = {kernel.symbol: kernel.symbol for kernel in kernels if kernel.arguments is None}
+    with_avx2 = dataclasses.replace(platform, features="+avx2")  # no more than that: what has it is asked for it alone
+    for kernel in wide:
+        symbol = kernel.symbol + AVX2
+        objects.append(retarget(kernel.bitcode, with_avx2, {kernel.compiled_as: symbol}))
+        addresses[symbol] = symbol
     hashes = {kernel.symbol: kernel.hash for kernel in kernels} if compared else {}
     facts = {"layout": LAYOUT, "carom": __version__, "python": PYTHON, "hashes": json.dumps(hashes)}
     link([*objects, assemble(glue(NAME, entries, addresses, facts, platform), platform)], output, platform)

@@ -50,6 +50,10 @@ class Platform:
         return self.triple.startswith("wasm")
 
     @property
+    def is_x86(self) -> bool:
+        return self.triple.startswith("x86_64")
+
+    @property
     def is_arm(self) -> bool:
         return self.triple.startswith(("aarch64", "arm64"))
 

@@ -23,19 +23,29 @@ from .library import build_library
 from .platforms import PLATFORMS, Platform
 
 ROOT = Path(carom.__file__).parents[2]
+# The loops over all bodies, pairs and contacts: with vectors of four numbers they make steps 3 to 12 % faster, and all
+# other kernels nothing.
+WIDE = (
+    "box_motions", "check_flight", "compare_contacts", "evaluate_pairs", "find_resting", "order_candidates",
+    "place_moving", "resolve_impacts", "search_uniform_grid", "select_pairs", "solve_contacts", "solve_joined_contacts",
+    "solve_turning_contacts",
+)  # fmt: skip
 
 
 def make_wheels(folder: Path, names: Sequence[str]) -> None:
     """A wheel for each of these platforms, into that folder: the pure one with a library in it."""
     kernels = collect((), "generic", everything=True)
+    platforms = [PLATFORMS[name] for name in names]
+    any_wide = any(platform.is_x86 for platform in platforms)
+    wide = collect((), "x86-64-v3", everything=True, names=WIDE) if any_wide else []
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as temporary:
         options = ["--quiet", "--disable-pip-version-check", "--no-deps", "--wheel-dir", temporary]
         subprocess.run([sys.executable, "-m", "pip", "wheel", *options, str(ROOT)], check=True)
         (pure,) = Path(temporary).glob("*.whl")
-        for platform in [PLATFORMS[name] for name in names]:
+        for platform in platforms:
             library = Path(temporary, f"{NAME}{platform.suffix}")
-            build_library(kernels, library, platform, compared=False)
+            build_library(kernels, library, platform, compared=False, wide=wide if platform.is_x86 else ())
             made = with_library(pure, library, platform, folder)
             print(f"{made}: {len(kernels)} kernels, {made.stat().st_size / 1e6:.2f} MB", flush=True)
 

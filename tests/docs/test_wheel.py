@@ -16,8 +16,9 @@ from packaging.tags import cpython_tags
 from packaging.utils import parse_wheel_filename
 
 import carom
+from carom.framework.jit import library as library_module
 from carom.framework.jit.lazy import JIT
-from carom.framework.jit.library import NAME, libraries
+from carom.framework.jit.library import AVX2, NAME, libraries
 from carom.lab.build.errors import BuildError
 from carom.lab.build.kernels import collect
 from carom.lab.build.library import build_library
@@ -173,3 +174,21 @@ def test_they_keep_the_bits_of_the_sources(played, tmp_path, processor):
     assert (here[-1] == "kernels []") == (processor == "any")
     assert here[0].split(" compiled")[0] == played[1].split(" compiled")[0]
     assert here[0].startswith("pile: ")
+
+
+@pytest.mark.skipif(not native() or not native().is_x86, reason="other processors have no AVX2")
+def test_only_processors_with_avx2_run_what_is_made_for_it(tmp_path, monkeypatch):
+    """That it has the same bits is told where the wheel plays the scenes of scenes/test_scene_hashes.py."""
+    generic, wide = (collect((), each, everything=True, names=("box_motions",)) for each in ("generic", "x86-64-v3"))
+    file = tmp_path / f"{NAME}{native().suffix}"
+    try:
+        build_library(generic, file, native(), compared=False, wide=wide)
+    except BuildError as error:
+        pytest.skip(str(error))
+    module = library_module._opened(str(file))
+    assert {f"{kernel.symbol}{AVX2}" for kernel in wide} <= {*module.addresses}
+    assert len(wide) == 2
+    for has, behind in ((True, AVX2), (False, "")):
+        monkeypatch.setitem(library_module.__cpu_features__, "AVX2", has)
+        chosen = library_module.Library(module).addresses
+        assert all(chosen[kernel.symbol] == module.addresses[kernel.symbol + behind] for kernel in wide)
