@@ -30,7 +30,7 @@ from numba.core.caching import _Cache
 from numba.core.runtime import _nrt_python
 from numba.core.serialize import dumps
 
-from .hash import PYTHON, hash_and_reach
+from .hash import PYTHON, hash_and_reach, writing_digest
 from .log import in_background, log
 
 CACHE_FOLDER_VARIABLE = "CAROM_CACHE_DIR"
@@ -262,12 +262,6 @@ def toolchain() -> str:
     switches = [(name, getattr(config, name, None)) for name in SWITCHES]
     versions = PYTHON, numba.__version__, llvmlite.__version__, np.__version__
     return hashlib.sha256(repr((versions, switches, writing_digest())).encode()).hexdigest()
-
-
-def writing_digest() -> str:
-    """The hash of the modules that write code in LLVM's language."""
-    files = Path(__file__).with_name("pipeline.py"), Path(__file__).parent / "records" / "record_code.py"
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files if file.exists())).hexdigest()
 
 
 def type_names(kind: Any) -> str:

@@ -12,6 +12,7 @@ import hashlib
 import sys
 import types
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,14 @@ import numpy as np
 from .lazy import LazyModule
 
 PYTHON = f"{sys.implementation.name} {sys.version_info.major}.{sys.version_info.minor}"  # whose byte code it is
+
+
+def writing_digest() -> str:
+    """The hash of the modules that write code in LLVM's language; empty where their sources are not at hand."""
+    files = Path(__file__).with_name("pipeline.py"), Path(__file__).parent / "records" / "record_code.py"
+    if not all(file.exists() for file in files):
+        return ""
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
 def is_packed(function: Any) -> bool:

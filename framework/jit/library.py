@@ -17,6 +17,7 @@ import os
 import platform
 import struct
 import sys
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -26,7 +27,7 @@ import numpy as np
 from numpy._core._multiarray_umath import __cpu_features__
 
 from ..errors import LibraryError
-from .hash import PYTHON, deep_hash
+from .hash import PYTHON, deep_hash, writing_digest
 from .kinds import INT, NONE, Kind, kind_of
 from .names import symbol_of
 from .raised import raise_error
@@ -46,9 +47,11 @@ class Library:
         self.addresses = _for_this_processor(module.addresses)
         self._known = {*module.addresses, *vars(module)}  # those that Python calls are functions of the module
         self.facts: dict[str, str] = module.facts
-        self._is_current: dict[str, bool] = {}  # by symbol
         if self.facts.get("layout") != LAYOUT:
             raise LibraryError(f"{self.path} was built by another version of carom: build it again")
+        writing = self.facts.get("writing", ""), writing_digest()
+        if self.is_compared and "" not in writing and len({*writing}) > 1:
+            self._known.clear()  # each kernel would be compiled to other machine code now
         module.set_error_handler(raise_error)
 
     @property
@@ -64,10 +67,10 @@ class Library:
 
     def holds(self, symbol: str, function: Any) -> bool:
         """Whether it has a function by that name, made from the code that this has now."""
-        if symbol not in self._is_current:
-            known = self._hashes.get(symbol) if symbol in self._known else ""
-            self._is_current[symbol] = known is None or known == short_hash(function)
-        return self._is_current[symbol]
+        return symbol in self._known and self._hashes.get(symbol) in (None, short_hash(function))
+
+
+_short_hashes: weakref.WeakKeyDictionary[Any, str] = weakref.WeakKeyDictionary()
 
 
 def _for_this_processor(addresses: dict[str, int]) -> dict[str, int]:
@@ -78,7 +81,9 @@ def _for_this_processor(addresses: dict[str, int]) -> dict[str, int]:
 
 def short_hash(function: Any) -> str:
     """The hash of a kernel in a library."""
-    return deep_hash(function)[:16]
+    if function not in _short_hashes:  # several functions may have one symbol: what was redefined, or reloaded
+        _short_hashes[function] = deep_hash(function)[:16]
+    return _short_hashes[function]
 
 
 _added: dict[str, Library] = {}
@@ -182,9 +187,9 @@ class CalledWithArrays:
         known = [kind for kind in kinds if kind is not None]
         for library in libraries() if len(known) == len(kinds) else ():
             for result in (NONE, INT):
-                entry = getattr(library.module, symbol_of(self._function, result(*known)), None)
-                if entry is not None:
-                    return entry
+                symbol = symbol_of(self._function, result(*known))
+                if library.holds(symbol, self._function):
+                    return getattr(library.module, symbol)
         raise missing(f"kernel {self._function.__name__} for ({', '.join(map(str, kinds))})")
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from carom import __version__
 
-from ...framework.jit.hash import PYTHON
+from ...framework.jit.hash import PYTHON, writing_digest
 from ...framework.jit.library import AVX2, LAYOUT, NAME
 from .glue import Entry, glue
 from .kernels import BuiltKernel
@@ -41,5 +41,8 @@ def build_library(
         objects.append(retarget(kernel.bitcode, with_avx2, {kernel.compiled_as: symbol}))
         addresses[symbol] = symbol
     hashes = {kernel.symbol: kernel.hash for kernel in kernels} if compared else {}
-    facts = {"layout": LAYOUT, "carom": __version__, "python": PYTHON, "hashes": json.dumps(hashes)}
+    facts = {
+        "layout": LAYOUT, "carom": __version__, "python": PYTHON, "writing": writing_digest(),
+        "hashes": json.dumps(hashes),
+    }  # fmt: skip
     link([*objects, assemble(glue(NAME, entries, addresses, facts, platform), platform)], output, platform)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -12,8 +13,11 @@ import pytest
 from helpers_folders import game_of_the_page
 from helpers_processes import NO_COMPILER, run_carom, with_variables
 
+from carom.framework.jit.hash import PYTHON, writing_digest
+from carom.framework.jit.kinds import FLOAT
 from carom.framework.jit.lazy import JIT
-from carom.framework.jit.library import file_name, platform_name
+from carom.framework.jit.library import LAYOUT, Library, file_name, platform_name, short_hash
+from carom.framework.jit.names import symbol_of
 
 pytestmark = [pytest.mark.slow, pytest.mark.early, pytest.mark.skipif(not JIT, reason="nothing is compiled")]
 
@@ -217,3 +221,51 @@ print(sorted(function.symbol for function in all_functions(registry, 2)))
     assert len(printed) == 1
     names = printed.pop()
     assert names.count("carom_") > 100
+
+
+class Module:
+    """In place of the extension module: a library of one function, made from this one."""
+
+    __file__ = "a library"
+
+    def __init__(self, symbol, function, **facts):
+        self.addresses = {symbol: 1}
+        hashes = json.dumps({symbol: short_hash(function)})
+        self.facts = {"layout": LAYOUT, "python": PYTHON, "writing": writing_digest(), "hashes": hashes, **facts}
+
+    def set_error_handler(self, handler):
+        pass
+
+
+def times(factor):
+    def product(x):
+        return x * factor
+
+    return product
+
+
+def test_of_two_functions_by_one_name_a_library_holds_that_which_it_was_made_from():
+    """As when a function is defined again, in a notebook, or its module reloaded."""
+
+    def defined(shift):
+        def add(x, shift=shift):
+            return x + shift
+
+        return add
+
+    one, other = defined(1.0), defined(2.0)
+    symbol = symbol_of(one, FLOAT(FLOAT))
+    assert symbol == symbol_of(other, FLOAT(FLOAT))
+    library = Library(Module(symbol, one))
+    assert library.holds(symbol, one)
+    assert not library.holds(symbol, other)
+
+
+def test_a_library_made_before_carom_wrote_other_machine_code_holds_nothing():
+    made = times(2.0)
+    symbol = symbol_of(made, FLOAT(FLOAT))
+    held = [
+        Library(Module(symbol, made, **facts)).holds(symbol, made)
+        for facts in ({}, {"writing": "by others"}, {"writing": "by others", "hashes": "{}"}, {"writing": ""})
+    ]
+    assert held == [True, False, True, True]  # a wheel's has no hashes; in a packed game there are no sources
