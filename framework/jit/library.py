@@ -24,7 +24,11 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy._core._multiarray_umath import __cpu_features__
+
+try:
+    from numpy._core._multiarray_umath import __cpu_features__
+except ImportError:  # numpy 1
+    from numpy.core._multiarray_umath import __cpu_features__
 
 from ..errors import LibraryError
 from .hash import PYTHON, deep_hash, writing_digest
