@@ -130,22 +130,26 @@ class Compiled(LazyIntrinsic, Linkable):
         return INT(*known) if words.get("return") == "int" and len(known) == len(arguments) else None
 
     def _make(self) -> Any:
-        if self.library is not None:
-            return getattr(self.library.module, self.symbol)
+        found = self.library
+        if found is not None:
+            return getattr(found.module, self.symbol)
         try:
-            return _dispatcher(self.py_func, self.targetoptions, f"kernel {self.py_func.__name__}")
+            return self.compiled
         except LibraryError:
             if self.signature is not None:
                 raise
             return library.CalledWithArrays(self.py_func)
 
-    @property
+    @functools.cached_property
     def compiled(self) -> Any:
-        return self.made
+        return self.__dict__.setdefault("compiled", self._new_dispatcher())  # one object, though two threads ask
+
+    def _new_dispatcher(self) -> Any:
+        return _dispatcher(self.py_func, self.targetoptions, f"kernel {self.py_func.__name__}")
 
     def link(self) -> None:
         if self.library is None:
-            self.made.address_for(self.symbol, self.signature)
+            self.compiled.address_for(self.symbol, self.signature)
         self.ready = True
 
     def __call__(self, *args: Any) -> Any:
@@ -155,9 +159,8 @@ class Compiled(LazyIntrinsic, Linkable):
     def carom_depends_on(self) -> Any:
         return repr(sorted(self.targetoptions.items())), self.py_func
 
-    @staticmethod
-    def _type_of(made: Any) -> Any:
-        return made._numba_type_
+    def _type(self) -> Any:
+        return self.compiled._numba_type_  # for kernels that call it, though Python calls that of a library
 
 
 class Kernel(Compiled):
@@ -181,6 +184,9 @@ class Part(Compiled):
     __call__ = LazyIntrinsic.__call__
 
     def _make(self) -> Any:
+        return self.compiled
+
+    def _new_dispatcher(self) -> Any:
         return dispatchers.PartDispatcher(self.py_func, self.targetoptions)
 
 

@@ -82,15 +82,14 @@ class LazyIntrinsic:
     @property
     def _numba_type_(self) -> Any:
         try:
-            return self._type_of(self.made)
+            return self._type()
         except AttributeError as error:  # numba would take it for an object that it does not know
             raise RuntimeError(f"{self!r} cannot be made: {error}") from error
 
-    @staticmethod
-    def _type_of(made: Any) -> Any:
+    def _type(self) -> Any:
         from numba.core.registry import cpu_target
 
-        context = cpu_target.typing_context
+        made, context = self.made, cpu_target.typing_context
         context.refresh()  # made just now
         return context.resolve_value_type(made)
 

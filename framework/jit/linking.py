@@ -54,7 +54,7 @@ class Linked(Linkable):
 
     @cached_property
     def compiled(self) -> Any:
-        return linked_dispatcher(self.py_func, self._what)
+        return self.__dict__.setdefault("compiled", linked_dispatcher(self.py_func, self._what))  # one for all threads
 
     def link(self) -> None:
         self.address  # noqa: B018 - asking for it links
