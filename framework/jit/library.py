@@ -38,7 +38,7 @@ from .raised import raise_error
 
 NAME = "_kernels"  # by which their PyInit is called
 OWN = f"carom.{NAME}"
-OFF = "CAROM_LIBRARY"  # 0 in the environment: compile everything here
+OFF = "CAROM_LIBRARY"  # 0 in the environment: compile everything here; own: all that carom's own library lacks
 AVX2 = "_avx2"  # behind the symbols of kernels for processors that have it
 LAYOUT = "1"  # of what a library holds and how its functions are called
 
@@ -114,6 +114,8 @@ def use_kernels(folder: str | os.PathLike[str]) -> None:
 
     LibraryError if there is none for this platform, or one by another version of carom.
     """
+    if os.environ.get(OFF, "") in ("0", "own"):  # as when it is built
+        return
     path = Path(folder).absolute()
     file, files = str(path / file_name(platform_name())), sorted(path.glob(file_name("*")))
     if not os.path.isfile(file):

@@ -126,7 +126,8 @@ def collect(
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "kernels"
-        environment = {**os.environ, "NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
+        environment = {OFF: "own", **os.environ, "NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
+        environment |= {"NUMBA_DISABLE_JIT": "0", "CAROM_CHECK": "0"}
         if everything:
             environment[OFF] = "0"
         code = f"from {__name__} import write; write({[*names]})"
