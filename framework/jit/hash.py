@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from .lazy import LazyModule
+from .names import structure_of
 
 PYTHON = f"{sys.implementation.name} {sys.version_info.major}.{sys.version_info.minor}"  # whose byte code it is
 
@@ -74,7 +75,7 @@ def _feed(value: Any, digest: Any, seen: set[int]) -> None:
         for item in value:
             _feed(item, digest, seen)
     elif isinstance(value, type):
-        digest.update(f"{value.__module__}.{value.__qualname__}{getattr(value, '_fields', '')}".encode())
+        digest.update(structure_of(value).encode())  # the same whether a game is run or loaded
         if issubclass(value, enum.Enum):
             digest.update(repr([(member.name, member.value) for member in value]).encode())
     elif isinstance(value, enum.Enum):

@@ -41,7 +41,7 @@ def structure_of(value: Any, inside: tuple[int, ...] = ()) -> str:
         return f"{value.__module__}.{value.__qualname__}"
     if isinstance(value, type):
         where = vars(sys.modules[value.__module__]) if value.__module__ in sys.modules else {}
-        return f"{_module(where) or value.__module__}.{value.__qualname__}{getattr(value, '_fields', '')}"
+        return f"{module_name(where) or value.__module__}.{value.__qualname__}{getattr(value, '_fields', '')}"
     if isinstance(value, enum.Enum):
         return f"{type(value).__qualname__}.{value.name}"
     if isinstance(value, np.ndarray):
@@ -52,7 +52,7 @@ def structure_of(value: Any, inside: tuple[int, ...] = ()) -> str:
 
 
 def _function(function: types.FunctionType, inside: tuple[int, ...]) -> str:
-    named = f"{_module(function.__globals__)}.{function.__code__.co_qualname}"
+    named = f"{module_name(function.__globals__)}.{function.__code__.co_qualname}"
     if id(function) in inside or not function.__closure__:
         return named
     inside = (*inside, id(function))
@@ -60,7 +60,7 @@ def _function(function: types.FunctionType, inside: tuple[int, ...]) -> str:
     return f"{named}[{', '.join(f'{name}={structure_of(cell.cell_contents, inside)}' for name, cell in captured)}]"
 
 
-def _module(names: Mapping[str, Any]) -> str:
+def module_name(names: Mapping[str, Any]) -> str:
     """Of which module these are the global names; of a file outside of packages its stem: a game is run, imported, or
     loaded by a command."""
     file = names.get("__file__")

@@ -5,7 +5,12 @@ from __future__ import annotations
 import ctypes
 import io
 import pickle
+import re
+import sys
+import types
 from typing import Any
+
+from .names import module_name
 
 STOPPED = -3  # numba's code of StopIteration; all above 0 are exceptions with information
 
@@ -50,9 +55,23 @@ class _Unknown:
         del state
 
 
+# What commands call the module of a game's file while they build a library of it, see lab/cli/loading.
+_LOADED_FILE = re.compile("carom_file_(.+)_[0-9a-f]{8}")
+
+
 class _Reader(pickle.Unpickler):
     def find_class(self, module: str, name: str) -> Any:
-        return _Unknown if module.partition(".")[0] == "llvmlite" else super().find_class(module, name)
+        if module.partition(".")[0] == "llvmlite":
+            return _Unknown
+        file = _LOADED_FILE.fullmatch(module)
+        if file is not None and module not in sys.modules:  # here it has another name: __main__, or that of the file
+            for names in [vars(each) for each in [*sys.modules.values()] if isinstance(each, types.ModuleType)]:
+                if name in names and module_name(names) == file[1]:
+                    return names[name]
+        try:
+            return super().find_class(module, name)
+        except (AttributeError, ImportError):  # the error counts, not that its class is out of reach
+            return type(name, (RuntimeError,), {})
 
 
 def raise_error(status: int, address: int) -> None:

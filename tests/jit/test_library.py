@@ -71,6 +71,9 @@ from carom.framework.compilation import kernel
 
 use_kernels("kernels")
 
+class Calm(ValueError):
+    pass
+
 @kernel
 def doubled(steps: int) -> int:
     return 2 * steps
@@ -78,7 +81,7 @@ def doubled(steps: int) -> int:
 @kernel
 def blow(velocity, strength, steps: int):
     if strength[0] != strength[0]:
-        raise ValueError("no wind is blowing")
+        raise Calm("no wind is blowing")
     for i in range(len(velocity)):
         velocity[i, 0] += strength[i % 2] / (1.0 + doubled(steps))
 
@@ -118,7 +121,7 @@ Wind.strength = names["np"].array((float("nan"), 2.5))
 try:
     names["build"]().step()
 except Exception as error:
-    print(type(error.__cause__ or error).__name__, error)
+    print(error)
 try:
     names["blow"](names["np"].zeros(3, np.float32), Wind.strength, 1)
 except Exception as error:
@@ -126,8 +129,7 @@ except Exception as error:
 """.replace("np.float32", 'names["np"].float32')
     alone = play(tmp_path, NO_COMPILER, error).splitlines()
     assert alone[0] == play(tmp_path).splitlines()[0]
-    assert "ValueError" in alone[1]
-    assert "no wind is blowing" in alone[1]
+    assert "Calm: no wind is blowing" in alone[1]
     kinds = "(array(float32,1,C,), array(float64,1,C,), int64)"
     assert alone[2].startswith(f"LibraryError kernel blow for {kinds} is in no library")
     file.write_text(WINDY.replace("1.0 + doubled", "2.0 + doubled"), encoding="utf-8")
