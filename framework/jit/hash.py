@@ -20,7 +20,9 @@ import numpy as np
 from .lazy import LazyModule
 from .names import structure_of
 
-PYTHON = f"{sys.implementation.name} {sys.version_info.major}.{sys.version_info.minor}"  # whose byte code it is
+# Whose byte code it is: -O leaves out assertions, -OO docstrings, and numbers constants otherwise.
+PYTHON = f"{sys.implementation.name} {sys.version_info.major}.{sys.version_info.minor}"
+PYTHON += " optimised" * sys.flags.optimize
 
 
 def writing_digest() -> str:

@@ -64,4 +64,6 @@ def module_name(names: Mapping[str, Any]) -> str:
     """Of which module these are the global names; of a file outside of packages its stem: a game is run, imported, or
     loaded by a command."""
     file = names.get("__file__")
-    return names.get("__name__", "") if names.get("__package__") or not file else PurePath(file).stem
+    name = names.get("__name__", "")
+    in_package = names.get("__package__") and name != "__main__"  # which python -m runs
+    return name if in_package or not file else PurePath(file).stem

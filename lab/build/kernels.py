@@ -25,6 +25,7 @@ from ...framework.jit.linkable import Linkable
 from ...framework.jit.names import symbol_of
 from ...systems.linking.preparation import all_functions
 from ..cli.loading import load
+from ..cli.usage_errors import Problem
 from ..cli.warm_up import STEPS, shipped_kernels
 from .errors import BuildError
 
@@ -157,5 +158,10 @@ def prepare(targets: Sequence[str], names: Sequence[str]) -> None:
 def write(names: Sequence[str]) -> None:
     """What that process does."""
     log.processes, log.background = os.cpu_count() or 1, False
-    prepare(sys.argv[2:], names)
-    Path(sys.argv[1]).write_bytes(pickle.dumps([*linked_kernels(), *called_kernels()]))
+    try:
+        prepare(sys.argv[2:], names)
+        kernels = [*linked_kernels(), *called_kernels()]
+    except (BuildError, Problem) as error:
+        print(f"Error: {error}", file=sys.stderr)
+        sys.exit(Problem.exit_code)
+    Path(sys.argv[1]).write_bytes(pickle.dumps(kernels))
