@@ -125,7 +125,10 @@ def use_kernels(folder: str | os.PathLike[str]) -> None:
             f"carom build --platform {platform_name()} makes them"
         )
     if file not in _added:
-        _added[file] = Library(_opened(file))
+        library, version = Library(_opened(file)), sys.modules[OWN.partition(".")[0]].__version__
+        if library.facts["carom"] != version:  # kernels work on records and stages of that version
+            raise LibraryError(f"{file} was built by carom {library.facts['carom']}, this is {version}: build it again")
+        _added[file] = library
 
 
 def platform_name() -> str:

@@ -285,3 +285,9 @@ def test_a_library_made_before_carom_wrote_other_machine_code_holds_nothing():
         for facts in ({}, {"writing": "by others"}, {"writing": "by others", "hashes": "{}"}, {"writing": ""})
     ]
     assert held == [True, False, True, True]  # a wheel's has no hashes; in a packed game there are no sources
+
+
+def test_a_library_of_another_version_of_carom_is_refused(game):
+    code = "import carom\ncarom.__version__ = '0.0.9'\ncarom.use_kernels('kernels')"
+    last = python(game, code).stderr.splitlines()[-1]
+    assert re.search(r"was built by carom \S+, this is 0\.0\.9: build it again", last)
