@@ -115,4 +115,4 @@ def needed_places(dimensions: int, sweeps: bool, bounces: bool, turns: bool, joi
 @cache
 def linked_part(place: int, function: Callable[..., Any], dimensions: int) -> Linked:
     """The function that belongs to a place in ``state.links``, one for the process."""
-    return Linked(function, SIGNATURES[place](dimensions))
+    return Linked(function, SIGNATURES[place](dimensions), f"{function.__name__}, {dimensions}D,")

@@ -65,7 +65,7 @@ def linked_rule(function: Any) -> Linked:
             raise ValueError("a mixing rule of a plugin returned no number from 0")
         return value
 
-    return Linked(mixed, mixing_signature())
+    return Linked(mixed, mixing_signature(), f"mixing rule {getattr(function, '__name__', mixed.__name__)}")
 
 
 def rule_number(registry: Registry, name: str) -> int:
