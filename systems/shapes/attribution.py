@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...framework.data.component import Component
-from ...framework.errors import PluginError
+from ...framework.errors import LibraryError, PluginError
 from ...framework.jit.lazy import is_of_compiler
 from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Registry, Shape
@@ -45,7 +45,9 @@ class ErrorAttribution:
         self.check(query)
 
     def describe(self, error: BaseException, query: type[Component] | None = None) -> None:
-        """Add to an error which plugin's function it comes from."""
+        """Add to an error which plugin's function it comes from; one of libraries says that itself."""
+        if isinstance(error, LibraryError):
+            return
         state, joints = self._state, self._state.solver.joints
         uncompiled = is_of_compiler(error) or state.row_a == NOTHING_TESTED
         if joints.asked:

@@ -182,12 +182,14 @@ class Pebble(names["Collider"]):
 
 world.add_plugin(plugin)
 world.create_entity(Transform((0, 50)), names["RigidBody"](), Pebble(0.5))
-try:
-    world.prepare()
-except Exception as error:
-    print(type(error).__name__, error)
+for needs in (world.prepare, world.step):
+    try:
+        needs()
+    except Exception as error:
+        print(type(error).__name__, error)
 """
-    said = play(game, NO_COMPILER, more).splitlines()[-1]
+    said, stepping = play(game, NO_COMPILER, more).splitlines()[-2:]
+    assert re.match("LibraryError plugin pebbles: [a-z]+ of Pebble", stepping)  # no other pair is blamed
     assert said.startswith("LibraryError plugin")
     assert "Pebble" in said
     assert "pip install numba, or build the game anew" in said
