@@ -45,12 +45,12 @@ def deep_hash(function: Any) -> str:
 
 def hash_and_reach(function: Any) -> tuple[str, int]:
     """The hash, and of how many functions the code is made: how long it takes to compile, roughly."""
-    digest, seen = hashlib.sha256(), set[int]()
+    digest, seen = hashlib.sha256(), dict[int, int]()
     _feed(function, digest, seen)
     return digest.hexdigest(), len(seen)
 
 
-def _feed(value: Any, digest: Any, seen: set[int]) -> None:
+def _feed(value: Any, digest: Any, seen: dict[int, int]) -> None:
     """Add ``value`` to ``digest``; functions are followed into what they call, each once."""
     if isinstance(value, LazyModule):
         return
@@ -61,9 +61,9 @@ def _feed(value: Any, digest: Any, seen: set[int]) -> None:
         value = value.py_func
     if isinstance(value, types.FunctionType):
         if id(value) in seen:
-            digest.update(b"again")
+            digest.update(f"again {seen[id(value)]}".encode())  # which of them
             return
-        seen.add(id(value))
+        seen[id(value)] = len(seen)
         _feed_code(value.__code__, digest)
         digest.update(b"packed" if is_packed(value) else b"")
         captured = [cell.cell_contents for cell in value.__closure__ or ()]
@@ -73,7 +73,7 @@ def _feed(value: Any, digest: Any, seen: set[int]) -> None:
             digest.update(name.encode())
             _feed(item, digest, seen)
     elif isinstance(value, (tuple, list)):
-        digest.update(f"{type(value).__name__}{len(value)}".encode())
+        digest.update(f"{type(value).__name__}{len(value)}{getattr(value, '_fields', '')}".encode())
         for item in value:
             _feed(item, digest, seen)
     elif isinstance(value, type):
@@ -84,8 +84,8 @@ def _feed(value: Any, digest: Any, seen: set[int]) -> None:
         digest.update(f"{type(value).__qualname__}.{value.name}={value.value!r}".encode())
     elif isinstance(value, np.ndarray):
         digest.update(repr((value.dtype.str, value.shape)).encode() + value.tobytes())
-    elif isinstance(value, types.BuiltinFunctionType):
-        digest.update(f"{value.__module__}.{value.__qualname__}".encode())
+    elif isinstance(value, (types.BuiltinFunctionType, np.ufunc)) or type(value) is type(np.dot):
+        digest.update(structure_of(value).encode())
     elif isinstance(value, types.ModuleType):
         digest.update(value.__name__.encode())
     else:

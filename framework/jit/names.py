@@ -39,6 +39,8 @@ def structure_of(value: Any, inside: tuple[int, ...] = ()) -> str:
         return f"{structure_of(value.func, inside)}{structure_of(value.args, inside)}"
     if isinstance(value, types.BuiltinFunctionType):
         return f"{value.__module__}.{value.__qualname__}"
+    if isinstance(value, np.ufunc) or type(value) is type(np.dot):
+        return f"numpy.{value.__name__}"
     if isinstance(value, type):
         where = vars(sys.modules[value.__module__]) if value.__module__ in sys.modules else {}
         return f"{module_name(where) or value.__module__}.{value.__qualname__}{getattr(value, '_fields', '')}"

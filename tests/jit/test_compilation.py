@@ -70,6 +70,13 @@ def summing(helper, shift=0.0, options=part):
     return total
 
 
+def in_turn(first, second, third):
+    def through(x):
+        return third(second(first(x)))
+
+    return through
+
+
 def plus(n):
     def add(x):
         return x + n
@@ -90,11 +97,13 @@ def test_the_hash_follows_calls_constants_captured_values_and_options():
         summing(one), summing(two), summing(one, 1.0), summing(one, 1), summing(one, options=inlined),
         summing(summing(one)), summing(part(plus(1.0))), summing(part(plus(2.0))), summing(part(plus((1.0, 2.0)))),
         summing(part(plus(np.array([1.0, 2.0])))), summing(part(plus(np.array([1.0, 3.0])))),
-        summing(part(plus(math.sin))), summing(part(plus(math.cos))),
+        summing(part(plus(math.sin))), summing(part(plus(math.cos))), summing(part(plus(np.sin))),
+        summing(part(plus(np.cos))), summing(part(plus(np.dot))), summing(part(plus(np.sum))),
     ]  # fmt: skip
     hashes = [deep_hash(function) for function in different]
     assert len(set(hashes)) == len(hashes)
     assert deep_hash(summing(one)) == hashes[0]
+    assert deep_hash(in_turn(one, two, one)) != deep_hash(in_turn(one, two, two))
 
 
 def shear(x, y, out):
