@@ -17,6 +17,7 @@ import os
 import platform
 import struct
 import sys
+import sysconfig
 import weakref
 from collections.abc import Callable
 from pathlib import Path
@@ -99,8 +100,11 @@ def _own() -> list[Library]:
     found = importlib.util.find_spec(OWN)
     if found is None or found.origin is None:
         return []
-    own = Library(_opened(found.origin))
-    return [] if own.is_compared and own.facts["python"] != PYTHON else [own]
+    module = _opened(found.origin)
+    made_for = module.facts.get("layout"), module.facts.get("python")
+    if module.facts.get("hashes") != "{}" and made_for != (LAYOUT, PYTHON):  # in a checkout, which has moved on
+        return []
+    return [Library(module)]
 
 
 def libraries() -> list[Library]:
@@ -136,8 +140,7 @@ def platform_name() -> str:
     """What libraries call this kind of machine: linux-x86_64, linux-aarch64, macos-arm64, win-amd64, wasm32."""
     if sys.platform == "emscripten":
         return "wasm32"
-    system = {"darwin": "macos", "win32": "win"}.get(sys.platform, sys.platform)
-    return f"{system}-{platform.machine().lower()}"
+    return f"macos-{platform.machine()}" if sys.platform == "darwin" else sysconfig.get_platform()
 
 
 def file_name(system: str) -> str:
@@ -215,6 +218,6 @@ def missing(what: str) -> LibraryError:
     on_page = sys.platform == "emscripten"
     cure = "build the page" if on_page else "pip install numba, or build the game"
     return LibraryError(
-        f"{what} is in no library of kernels ({known}), and numba, which would compile it, is not installed: "
-        f"{cure} anew with all that it uses (carom build)"
+        f"{what} is in no library of kernels ({known}) or was edited since, and numba, which would compile it, is not "
+        f"installed: {cure} anew with all that it uses (carom build)"
     )

@@ -34,7 +34,6 @@ def ticks_now() -> int:
     return read_ticks()
 
 
-
 class TickClock:
     """Seconds per tick, from the time that has passed since this object was made."""
 

@@ -152,6 +152,13 @@ def prepare(targets: Sequence[str], names: Sequence[str]) -> None:
         for dimensions in (2, 3):
             kernels = (each for each in shipped_kernels(dimensions) if not names or each.py_func.__name__ in names)
             functions.update(dict.fromkeys(kernels))
+    by_symbol: dict[str, Linkable] = {}
+    for function in functions:
+        known = by_symbol.setdefault(function.symbol, function)
+        if short_hash(known.py_func) != short_hash(function.py_func):
+            raise BuildError(
+                f"two functions {function.py_func.__name__} of one place are different code: name them differently"
+            )
     link_all(functions)
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import platform as machine
-import sys
-import sysconfig
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
+
+from ...framework.jit.library import platform_name
 
 
 @dataclass(frozen=True)
@@ -88,9 +87,4 @@ PLATFORMS = {
 
 def native() -> Platform | None:
     """The platform of this Python; None: none of those that carom builds for."""
-    name = sysconfig.get_platform()
-    if sys.platform == "darwin":
-        name = f"macos-{machine.machine()}"
-    elif sys.platform == "emscripten":
-        name = "wasm32"
-    return PLATFORMS.get(name)
+    return PLATFORMS.get(platform_name())

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import os
+
 import pytest
 from helpers_processes import copied_cache, output_of
-from worlds import make_world
 
-from carom.components import AABBCollider, SphereCollider
 from carom.framework.jit.link_all import CAN_FORK
 
 FUNCTIONS = """
@@ -101,8 +101,8 @@ def test_it_ends_with_the_program(tmp_path):
 
 @pytest.mark.slow
 def test_what_queries_need_is_compiled_while_the_game_runs(tmp_path):
-    with make_world(gravity=9.81) as world:
-        world.prepare(SphereCollider, AABBCollider)  # all is in the cache
+    prepared = WORLD[: WORLD.index("world.step()")] + "world.prepare()"
+    run(prepared, os.environ["CAROM_CACHE_DIR"], background="0")  # all is in the cache
     copied_cache(tmp_path, "find_hits")
     assert run(WORLD, tmp_path) == ["['find_hits'] True", "2 True 1"]
     for path in tmp_path.glob("find_hits-*"):
