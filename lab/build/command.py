@@ -56,13 +56,14 @@ def build_command(
         with _told():
             _page(games, web, pyodide or "pyodide")
         return
-    platforms = [PLATFORMS.get(name) for name in names or (platform_name(),)]
-    if None in platforms:
+    if not names and platform_name() not in PLATFORMS:
         raise Problem(f"carom builds for {', '.join(PLATFORMS)}; this machine is {platform_name()}")
+    platforms = [PLATFORMS[name] for name in names or (platform_name(),)]
     with _told():
+        for platform in platforms:
+            linker_for(platform)  # before anything compiles
         kernels = collect(games, "generic", everything=not games)
         for platform in platforms:
-            assert platform is not None
             if games:
                 path = (out or Path(games[0]).parent / "kernels") / file_name(platform.name)
             else:
