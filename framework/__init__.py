@@ -15,7 +15,7 @@ from .errors import (
     StepError,
     UnhandledPairError,
 )
-from .jit.library import use_kernels
+from .jit.libraries import use_kernels
 from .plugins.plugin import Convex, Plugin
 from .schedule.phases import ForceSystem, Phase, System
 from .schedule.plan import Plan

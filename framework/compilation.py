@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from .errors import LibraryError
-from .jit import library
+from .jit import libraries
 from .jit.kinds import FLOAT, INT, Kind, Signature
 from .jit.lazy import JIT, LazyIntrinsic, dispatchers
 from .jit.linkable import Linkable
@@ -98,7 +98,7 @@ def _dispatcher(function: Any, options: dict[str, Any], what: str, named: bool =
     except ModuleNotFoundError as error:
         if error.name not in ("numba", "llvmlite"):
             raise
-        raise library.missing(what) from error
+        raise libraries.missing(what) from error
 
 
 def _kept(kind: type[Compiled], function: Any, **options: Any) -> Any:
@@ -130,7 +130,7 @@ class Compiled(LazyIntrinsic, Linkable):
         return INT(*known) if words.get("return") == "int" and len(known) == len(arguments) else None
 
     def _make(self) -> Any:
-        found = self.library
+        found = self.holder
         if found is not None:
             return getattr(found.module, self.symbol)
         try:
@@ -138,7 +138,7 @@ class Compiled(LazyIntrinsic, Linkable):
         except LibraryError:
             if self.signature is not None:
                 raise
-            return library.CalledWithArrays(self.py_func)
+            return libraries.CalledWithArrays(self.py_func)
 
     @functools.cached_property
     def compiled(self) -> Any:
@@ -148,7 +148,7 @@ class Compiled(LazyIntrinsic, Linkable):
         return _dispatcher(self.py_func, self.targetoptions, f"kernel {self.py_func.__name__}")
 
     def link(self) -> None:
-        if self.library is None:
+        if self.holder is None:
             self.compiled.address_for(self.symbol, self.signature)
         self.ready = True
 

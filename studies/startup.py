@@ -12,7 +12,7 @@ import time
 
 from carom import scenes
 from carom.framework.jit.cache import CACHE_FOLDER_VARIABLE
-from carom.framework.jit.library import OFF
+from carom.framework.jit.libraries import OFF
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.reporting.text import TextTable, compact, span
 

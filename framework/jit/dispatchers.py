@@ -16,7 +16,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.types import unliteral
 
-from .cache import KernelCache
+from .cache import KernelCache, machine_code
 from .hash import deep_hash
 from .kinds import Kind, RecordKind, Signature, TupleKind
 from .log import in_background, log
@@ -138,7 +138,7 @@ class KeptDispatcher(CPUDispatcher):
         self.compile(self._asked(signature))
         made = self.overloads[numba_types(signature)[1]]
         linked[symbol] = self, signature, made
-        return made.library.get_pointer_to_function(made.fndesc.llvm_func_name)
+        return machine_code(made).get_pointer_to_function(made.fndesc.llvm_func_name)
 
     def _compile_for_args(self, *args: Any, **kws: Any) -> Any:
         """What numba calls for arguments of new types: looks at them, then compiles."""

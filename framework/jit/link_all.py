@@ -25,7 +25,7 @@ def link_all(functions: Iterable[Linkable]) -> None:
         return
     functions = [function for function in functions if not function.ready]
     for function in functions:
-        if function.library is not None:
+        if function.holder is not None:
             function.link()
     functions = [function for function in functions if not function.ready]
     if not functions:

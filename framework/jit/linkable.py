@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any
 
-from . import library
+from . import libraries
 from .kinds import Signature
 from .names import symbol_of
 
@@ -26,9 +26,9 @@ class Linkable:
         return "" if self.signature is None else symbol_of(self.py_func, self.signature)
 
     @property
-    def library(self) -> library.Library | None:
-        """That which has it."""
-        return library.holder(self.symbol, self.py_func)
+    def holder(self) -> libraries.Library | None:
+        """The library that has it."""
+        return libraries.holder(self.symbol, self.py_func)
 
     @property
     def compiled(self) -> Any:
@@ -38,7 +38,7 @@ class Linkable:
     @property
     def is_cached(self) -> bool:
         """Whether linking it compiles nothing."""
-        return self.ready or self.library is not None or self.compiled.is_kept(self.signature)
+        return self.ready or self.holder is not None or self.compiled.is_kept(self.signature)
 
     @property
     def dependency_count(self) -> int:

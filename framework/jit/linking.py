@@ -63,9 +63,9 @@ class Linked(Linkable):
         if not JIT:
             _plain.append(self.py_func)
             return len(_plain) - 1
-        library = self.library
-        if library is not None:
-            return library.addresses[self.symbol]
+        holder = self.holder
+        if holder is not None:
+            return holder.addresses[self.symbol]
         return self.compiled.address_for(self.symbol, self.signature)
 
 

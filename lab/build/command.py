@@ -11,12 +11,12 @@ import click
 
 import carom
 
-from ...framework.jit.library import NAME, file_name, platform_name
+from ...framework.jit.libraries import NAME, file_name, platform_name
 from ..cli.options import traceback_option
 from ..cli.usage_errors import Problem
+from .build_library import build_library
 from .errors import BuildError
 from .kernels import collect
-from .library import build_library
 from .linker import linker_for
 from .page import PLATFORM as WEB
 from .page import build_page, files_of

@@ -17,9 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from ...framework.compilation import log
+from ...framework.jit.cache import machine_code
 from ...framework.jit.kinds import BOOL, FLOAT, INT, NONE, ArrayKind, Kind, array_kind
 from ...framework.jit.lazy import dispatchers
-from ...framework.jit.library import OFF, short_hash
+from ...framework.jit.libraries import OFF, short_hash
 from ...framework.jit.link_all import link_all
 from ...framework.jit.linkable import Linkable
 from ...framework.jit.names import symbol_of
@@ -93,7 +94,7 @@ RESULTS = {"none": NONE, "int64": INT}
 def _built(
     symbol: str, function: Any, made: Any, arguments: tuple[str, ...] | None, result: str = INT.name
 ) -> BuiltKernel:
-    module = made.library._get_module_for_linking().as_bitcode()
+    module = machine_code(made)._get_module_for_linking().as_bitcode()
     compiled_as = made.fndesc.llvm_func_name
     return BuiltKernel(symbol, function.__name__, compiled_as, module, arguments, result, short_hash(function))
 
@@ -106,7 +107,7 @@ def _kind(given: Any) -> Kind | None:
 
 
 def _words(kind: Kind) -> tuple[str, ...]:
-    """The numbers that machine code gets for an argument, see library.flattened."""
+    """The numbers that machine code gets for an argument, see libraries.flattened."""
     if isinstance(kind, ArrayKind):
         return "address", "address", "int64", "int64", "address", *("int64",) * (2 * kind.dimensions)
     return (kind.name,)

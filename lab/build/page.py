@@ -19,11 +19,11 @@ import esper
 
 import carom
 
-from ...framework.jit.library import NAME
+from ...framework.jit.libraries import NAME
 from ..cli.loading import load
+from .build_library import build_library
 from .errors import BuildError
 from .kernels import BuiltKernel
-from .library import build_library
 from .platforms import PLATFORMS
 
 PLATFORM = PLATFORMS["wasm32"]

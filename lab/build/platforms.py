@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from ...framework.jit.library import platform_name
+from ...framework.jit.libraries import platform_name
 
 
 @dataclass(frozen=True)

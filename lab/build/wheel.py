@@ -17,9 +17,9 @@ from pathlib import Path
 
 import carom
 
-from ...framework.jit.library import NAME, platform_name
+from ...framework.jit.libraries import NAME, platform_name
+from .build_library import build_library
 from .kernels import collect
-from .library import build_library
 from .platforms import PLATFORMS, Platform
 
 ROOT = Path(carom.__file__).parents[2]

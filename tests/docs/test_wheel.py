@@ -16,12 +16,12 @@ from packaging.tags import cpython_tags
 from packaging.utils import parse_wheel_filename
 
 import carom
-from carom.framework.jit import library as library_module
+from carom.framework.jit import libraries as library_module
 from carom.framework.jit.lazy import JIT
-from carom.framework.jit.library import AVX2, NAME, libraries
+from carom.framework.jit.libraries import AVX2, NAME, libraries
+from carom.lab.build.build_library import build_library
 from carom.lab.build.errors import BuildError
 from carom.lab.build.kernels import collect
-from carom.lab.build.library import build_library
 from carom.lab.build.platforms import PLATFORMS, native
 from carom.lab.build.wheel import with_library
 from carom.lab.cli.warm_up import shipped_kernels

@@ -18,7 +18,7 @@ from helpers_processes import NO_COMPILER, run_carom, with_variables
 from carom.framework.jit.hash import PYTHON, writing_digest
 from carom.framework.jit.kinds import FLOAT
 from carom.framework.jit.lazy import JIT
-from carom.framework.jit.library import LAYOUT, Library, file_name, platform_name, short_hash
+from carom.framework.jit.libraries import LAYOUT, Library, file_name, platform_name, short_hash
 from carom.framework.jit.names import symbol_of
 
 pytestmark = [pytest.mark.slow, pytest.mark.early, pytest.mark.skipif(not JIT, reason="nothing is compiled")]

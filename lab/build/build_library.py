@@ -10,7 +10,7 @@ from pathlib import Path
 from carom import __version__
 
 from ...framework.jit.hash import PYTHON, writing_digest
-from ...framework.jit.library import AVX2, LAYOUT, NAME
+from ...framework.jit.libraries import AVX2, LAYOUT, NAME
 from .glue import Entry, glue
 from .kernels import BuiltKernel
 from .linker import link
