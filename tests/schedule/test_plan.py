@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+
 import esper
 import numpy as np
 import pytest
@@ -207,6 +209,7 @@ def test_who_only_looks_changes_nothing(how):
     for world in (one, other):
         world.add_plugin(capsule.plugin)
         run(world, 3)
+    gc.collect()  # worlds of other tests leave now, not meanwhile
     contexts = esper.current_world, set(esper.list_worlds())
     for _ in range(STEPS):
         before, forces = one.state_hash(), one.bodies.force.copy()
