@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-FLOORS = ("framework", "components", "systems", "plugins", "scenes", "lab")  # each imports from those before it
+# Each imports from those before it.
+FLOORS = ("framework", "components", "systems", "plugins", "drawing", "maps", "view", "scenes", "lab")
 
 
 def package_of(folder: Path) -> str:

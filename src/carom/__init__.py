@@ -2,8 +2,8 @@
 
 What a game needs has its name here: ``from carom import World, Physics, Transform, RigidBody, SphereCollider``. A name
 loads its module when it is first used, so ``import carom`` loads nothing else. The parts, with all they hold:
-:mod:`carom.framework`, :mod:`carom.components`, :mod:`carom.systems`, :mod:`carom.plugins`, :mod:`carom.scenes` and
-:mod:`carom.lab` (command line and measuring).
+:mod:`carom.framework`, :mod:`carom.components`, :mod:`carom.systems`, :mod:`carom.plugins`, :mod:`carom.drawing`,
+:mod:`carom.maps`, :mod:`carom.view`, :mod:`carom.scenes` and :mod:`carom.lab` (command line and measuring).
 """
 
 __version__ = "0.1.0"

@@ -1,0 +1,1 @@
+"""What a world looks like, as plain arrays; no drawing library is imported."""

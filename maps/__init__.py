@@ -1,0 +1,1 @@
+"""Maps of level editors, loaded into a world."""
