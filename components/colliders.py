@@ -9,6 +9,7 @@ import numpy as np
 
 from ..framework.data.columns import REQUIRED, Column, special_column
 from ..framework.data.component import Component
+from ..framework.outlines import box_outline
 from ..framework.typing import LayerField, Layers, Vector, VectorField
 from ..framework.vectors import item, replace, scale
 
@@ -145,6 +146,10 @@ class SphereCollider(Collider):
         return shape.radius
 
     @staticmethod
+    def outline(shape, dimensions):
+        return ((0.0,) * dimensions,), ()
+
+    @staticmethod
     def second_moments(shape, dimensions):
         square = shape.radius * shape.radius
         if dimensions == 2:
@@ -186,6 +191,10 @@ class AABBCollider(Collider):
             if item(direction, k) < 0.0:
                 corner = replace(corner, k, -item(corner, k))
         return corner
+
+    @staticmethod
+    def outline(shape, dimensions):
+        return box_outline(shape.half_extents, dimensions)
 
     @staticmethod
     def turned(shape, axes):

@@ -57,6 +57,10 @@ class CapsuleCollider(Collider):
         return shape.radius
 
     @staticmethod
+    def outline(shape, dimensions):
+        return [(0.0, end, 0.0)[:dimensions] for end in (-shape.half_height, shape.half_height)], ()
+
+    @staticmethod
     def second_moments(shape, dimensions):
         """Of the part between the two centres, and of two half discs or balls beyond them."""
         r, half = shape.radius, shape.half_height

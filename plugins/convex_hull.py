@@ -58,6 +58,13 @@ def around(ring: np.ndarray, normal: np.ndarray) -> np.ndarray:
     return np.argsort([atan2(y, x) for y, x in zip(aside.tolist(), along.tolist(), strict=True)])
 
 
+def outline_of(corners: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+    """(corners (n, 3), of each face the rows of its corners) of a hull that needs all of them."""
+    shape = corners - corners.mean(axis=0)
+    shape /= np.abs(shape).max()
+    return corners, [np.flatnonzero(on)[around(shape[on], normal)] for on, normal in faces_of(shape)]
+
+
 def cholesky(m: np.ndarray) -> np.ndarray:
     """Of a positive definite matrix (3, 3), the lower one. numpy asks LAPACK, whose bits are the processor's."""
     (xx, _, _), (xy, yy, _), (xz, yz, zz) = m.tolist()
@@ -162,6 +169,10 @@ class ConvexHullCollider(Collider):
     @staticmethod
     def support(shape, direction):
         return support_of(shape.hull, FIRST, shape, direction)
+
+    @staticmethod
+    def outline(shape, dimensions):
+        return outline_of(shape.hull[FIRST:])
 
     @staticmethod
     def second_moments(shape, dimensions):

@@ -113,6 +113,10 @@ class ConvexPolygonCollider(Collider):
         return shape.corner_radius
 
     @staticmethod
+    def outline(shape, dimensions):
+        return shape.vertices, ()
+
+    @staticmethod
     def second_moments(shape, dimensions):
         """Triangles from the centre to each edge, strips along the edges, and sectors around the corners."""
         r, count = shape.corner_radius, len(shape.vertices)

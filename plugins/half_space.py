@@ -9,6 +9,7 @@ import numpy as np
 
 from ..components import Collider
 from ..framework import Column, Convex, Plugin
+from ..framework.outlines import box_outline
 from ..framework.typing import VectorField
 from ..framework.vectors import add, add_scaled, divided, dot, length, negative, replace, scale, sub
 from .corners import in_world
@@ -17,6 +18,7 @@ __all__ = ["HalfSpaceCollider"]
 
 plugin = Plugin("half_space", version="1.0")
 
+FAR = 1e4  # m, how far it is drawn
 TILT = 1e-6  # radians; a face tilted by less lies flat on the plane and does not touch with one corner
 
 
@@ -53,6 +55,18 @@ class HalfSpaceCollider(Collider):
         if dimensions == 2:
             return math.inf, math.inf
         return math.inf, math.inf, math.inf
+
+    @staticmethod
+    def outline(shape, dimensions):
+        """A large box below the plane, along it."""
+        up = np.array(shape.normal) / np.linalg.norm(shape.normal)
+        axes = [np.array((up[1], -up[0])), up]
+        if dimensions == 3:
+            aside = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
+            aside /= np.linalg.norm(aside)
+            axes = [aside, up, np.cross(aside, up)]
+        corners, faces = box_outline(FAR, dimensions)
+        return (corners - FAR * np.eye(dimensions)[1]) @ np.array(axes), faces
 
 
 @plugin.kernel

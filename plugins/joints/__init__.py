@@ -124,6 +124,11 @@ class Joints(Plugin):
         found = self._holds if present is self._joints else holds(present.values())
         return self._columns(present, found, slice(0, self._record.count))
 
+    @property
+    def entities(self) -> np.ndarray:
+        """(n,) of all joints, ascending: the order of :meth:`columns` and :meth:`anchors`."""
+        return np.array(list(self._present()), np.int64)
+
     def anchors(self) -> tuple[np.ndarray, np.ndarray]:
         """(n, d) m, where the anchors of all joints are, on each a and on each b: to draw ropes and hinges."""
         return anchors(self._physics.table, self._present().values())

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ...components import Collider
 from ...framework import Plugin
 from ...framework.data.columns import special_column
+from ...framework.outlines import box_outline
 from ...framework.typing import VectorField
 from ...framework.vectors import add_scaled, dot, item, replace, scale
 
@@ -43,6 +44,10 @@ class BoxCollider(Collider):
             half = item(shape.half_extents, j)
             corner = add_scaled(corner, shape.axes[j], half if dot(shape.axes[j], direction) >= 0.0 else -half)
         return corner
+
+    @staticmethod
+    def outline(shape, dimensions):
+        return box_outline(shape.half_extents, dimensions)
 
     @staticmethod
     def second_moments(shape, dimensions):

@@ -79,6 +79,10 @@ class ChainSegmentCollider(Collider):
     def support(shape, direction):
         return shape.start if dot(shape.start, direction) >= dot(shape.end, direction) else shape.end
 
+    @staticmethod
+    def outline(shape, dimensions):
+        return (shape.start, shape.end), ()
+
 
 segment_support = plugin.kernel(ChainSegmentCollider.support)
 

@@ -77,6 +77,10 @@ class TerrainTriangleCollider(Collider):
             return shape.a
         return shape.b if two >= three else shape.c
 
+    @staticmethod
+    def outline(shape, dimensions):
+        return (shape.a, shape.b, shape.c), ((0, 1, 2),)
+
 
 triangle_support = plugin.kernel(TerrainTriangleCollider.support)
 

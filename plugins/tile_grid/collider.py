@@ -10,6 +10,7 @@ from ...components.colliders import Collider, ColliderFields
 from ...framework import Plugin, array_column, column
 from ...framework.data.arrays.column import ArrayColumn
 from ...framework.data.columns import Column
+from ...framework.outlines import runs_outline
 from ...framework.typing import ArrayField, Vector
 from .cells import array_of, change_of, leading_of, packed_of, shape_of, tiles_of, tiles_of_packed, wrong_with
 
@@ -79,6 +80,10 @@ class TileGridCollider(Collider):
     @classmethod
     def sample(cls, **common: Any) -> Self:
         return cls(((1, 0), (1, 1)), 0.5, **common)
+
+    @staticmethod
+    def outline(shape, dimensions):
+        return runs_outline(tiles_of_packed(shape.packed), shape.tile_size)
 
     @property
     def cells(self) -> np.ndarray:

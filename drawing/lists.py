@@ -1,0 +1,150 @@
+"""The drawing list: plain arrays, in metres, with a style and an entity for each thing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+from enum import IntEnum
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Styles = NDArray[np.int8]
+Entities = NDArray[np.int64]
+NO_STYLES: Any = np.zeros(0, np.int8)
+NO_ENTITIES: Any = np.zeros(0, np.int64)
+
+
+class Style(IntEnum):
+    """What a thing of the list is: of shapes what body they belong to, then what is drawn over them."""
+
+    STATIC = 0
+    KINEMATIC = 1
+    DYNAMIC = 2
+    ASLEEP = 3
+    SENSOR = 4
+    ONE_WAY = 5
+    JOINT = 6
+    CONTACT = 7
+    NORMAL = 8
+    VELOCITY = 9
+    BOX = 10
+
+
+@dataclass(frozen=True)
+class Things:
+    """n things with a ``style (n,)`` and the ``entity (n,)`` that they belong to, 0: none."""
+
+    def __len__(self) -> int:
+        return len(getattr(self, fields(self)[0].name))
+
+    def where(self, chosen: Any) -> Self:
+        """Those where ``chosen`` (n,) is true, or of these numbers."""
+        return replace(self, **{each.name: getattr(self, each.name)[chosen] for each in fields(self)})
+
+
+@dataclass(frozen=True)
+class Polygons(Things):
+    """Closed polygons of k corners each: in a plane convex pieces of shapes, counter-clockwise; in space faces, flat,
+    convex, counter-clockwise as seen from outside.
+
+    points
+        (n, k, d) m
+    centre
+        (n, d) m, of the whole shape that each is a piece or a face of
+    """
+
+    points: Floats
+    style: Styles
+    entity: Entities
+    centre: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+
+
+@dataclass(frozen=True)
+class Circles(Things):
+    """Circles; in space balls.
+
+    centre, radius
+        (n, d) m, (n,) m
+    angle
+        (n,) rad, to draw a mark; NaN without Spin. In space (n, 3, 3), the axes as columns
+    """
+
+    centre: Floats
+    radius: Floats
+    angle: Floats
+    style: Styles
+    entity: Entities
+
+
+@dataclass(frozen=True)
+class Capsules(Things):
+    """In space all points within ``radius`` (n,) m of the segments between ``ends`` (n, 2, 3) m; in a plane they are
+    polygons."""
+
+    ends: Floats
+    radius: Floats
+    style: Styles
+    entity: Entities
+
+
+@dataclass(frozen=True)
+class Lines(Things):
+    """Segments: ``points`` (n, 2, d) m."""
+
+    points: Floats
+    style: Styles
+    entity: Entities
+
+
+@dataclass(frozen=True)
+class Points(Things):
+    """Dots: ``points`` (n, d) m."""
+
+    points: Floats
+    style: Styles
+    entity: Entities
+
+
+def no_circles(dimensions: int) -> Circles:
+    angle = np.zeros((0, 3, 3) if dimensions == 3 else 0)
+    return Circles(np.zeros((0, dimensions)), np.zeros(0), angle, NO_STYLES, NO_ENTITIES)
+
+
+def no_capsules() -> Capsules:
+    return Capsules(np.zeros((0, 2, 3)), np.zeros(0), NO_STYLES, NO_ENTITIES)
+
+
+@dataclass(frozen=True)
+class DrawingList:
+    """A world as it is drawn: all arrays are its own, or never change.
+
+    polygons, circles, capsules
+        shapes of bodies that may move; polygons one group for each number of corners
+    lines
+        shapes that are lines, then what is drawn over all: joints, normals, velocities, boxes
+    points
+        anchors of joints and contacts
+    fixed, fixed_circles, fixed_capsules, fixed_lines
+        the same of static bodies: the same objects as long as nothing static changes
+    fixed_version
+        another number whenever they are others
+    """
+
+    dimensions: int
+    polygons: list[Polygons]
+    circles: Circles
+    capsules: Capsules
+    lines: list[Lines]
+    points: list[Points]
+    fixed: list[Polygons]
+    fixed_circles: Circles
+    fixed_capsules: Capsules
+    fixed_lines: list[Lines]
+    fixed_version: int
+
+    def __len__(self) -> int:
+        """How many polygons, circles, capsules and lines of shapes and over them there are."""
+        groups = (*self.polygons, *self.fixed, *self.lines, *self.fixed_lines)
+        return sum(map(len, (*groups, self.circles, self.fixed_circles, self.capsules, self.fixed_capsules)))

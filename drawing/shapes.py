@@ -1,0 +1,158 @@
+"""The colliders of some rows of a world's table: their outlines, and where these are in a frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..systems.shapes.rotation import axes_of
+from .library import Kind, Library, Rows
+from .lists import Capsules, Circles, Floats, Lines, Polygons, Style, no_capsules, no_circles
+from .outlines import fields_of
+
+PLAIN = -1  # neither a sensor nor one-way
+ALL = "offset", "sensor", "one_way"  # columns of every collider that tell where it is, and its style
+
+
+@dataclass
+class Part:
+    """The pieces of one kind: rings (n, k, d) of the colliders of these rows."""
+
+    kind: Kind
+    ring: Floats
+    radius: Floats
+    row: Rows
+    offset: Floats | None  # None: all are 0
+    turns: NDArray[np.bool_] | None  # whether a shape turns with its body; None: all do
+    special: NDArray[np.int8] | None  # its style, PLAIN: that of its body; None: all are
+
+
+@dataclass
+class Places:
+    """Where the rows from ``first`` on are, how they are turned, and what they are."""
+
+    first: int
+    position: Floats  # (m, d)
+    angle: Floats  # (m,), in space (m, 4)
+    axes: Floats | None  # (m, d, d); None: nothing is turned
+    style: NDArray[np.int8]
+    entity: Rows
+    spins: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, first: int, position: Floats, angle: Floats, style: Any, entity: Rows, spins: Any) -> Places:
+        d = position.shape[1]
+        turned = angle.any() if d == 2 else angle[:, 1:].any()
+        return cls(first, position, angle, matrices(angle) if turned else None, style, entity, spins)
+
+
+def matrices(angle: Floats) -> Floats:
+    """Rotation matrices of angles (m,) or quaternions (m, 4)."""
+    if angle.ndim == 2:
+        return axes_of(angle, 3)
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack((c, -s, s, c), axis=1).reshape(-1, 2, 2)
+
+
+def watched_of(world: Any, rows: slice) -> dict[str, Any]:
+    """The columns that the shapes of these rows, and their places along their bodies, depend on; views."""
+    table, found = world.physics.table, {"entity": world.physics.table.column("entity")[rows]}
+    for component, shape in world.registry.shapes.items():
+        mask = table.mask_names.get(component)
+        if mask:
+            keys = (mask, *(component.columns[name].key for name in (*shape.columns, *ALL)))
+            found |= {key: table.arrays[key][rows] for key in keys if key in table.arrays}
+            if hasattr(component, "turned"):
+                found[mask + " turned"] = table.column("rotation")[rows][table.arrays[mask][rows]]
+    return found
+
+
+def parts_of(world: Any, library: Library, rows: slice) -> list[Part]:
+    """What the bodies of these rows look like."""
+    table = world.physics.table
+    found: list[tuple[np.ndarray, ...]] = []
+    for component, shape in world.registry.shapes.items():
+        mask = table.mask_names.get(component)
+        row = np.flatnonzero(table.arrays[mask][rows]) + rows.start if mask else np.zeros(0, np.int64)
+        if not len(row):
+            continue
+        own = {name: table.values(component.columns[name].key, row) for name in shape.columns}
+        offset, sensor, one_way = (table.values(component.columns[name].key, row) for name in ALL)
+        outline = library.numbers_of(component, own, len(row))
+        if hasattr(component, "turned"):
+            _follow_turns(table, library, component, row, own, outline)
+        special = np.where(sensor, Style.SENSOR, np.where(one_way.any(axis=1), Style.ONE_WAY, PLAIN)).astype(np.int8)
+        found.append((row, outline, offset, np.full(len(row), component.rotates), special))
+    if not found:
+        return []
+    row, outline, offset, turns, special = (np.concatenate(columns) for columns in zip(*found, strict=True))
+    parts = []
+    for kind, pieces in sorted(library.pieces.items()):
+        shape, ring, radius = pieces.of(outline)
+        if len(shape):
+            rest = offset[shape], turns[shape], special[shape]
+            used = rest[0].any(), not rest[1].all(), (rest[2] != PLAIN).any()
+            rest = (one if some else None for one, some in zip(rest, used, strict=True))
+            parts.append(Part(kind, ring, radius, row[shape], *rest))
+    return parts
+
+
+def _follow_turns(table: Any, library: Library, component: Any, row: Rows, own: Any, outline: Rows) -> None:
+    """The outlines of those whose fields are others on a body that is turned."""
+    rotation = table.values("rotation", row)
+    turned = np.flatnonzero(rotation if rotation.ndim == 1 else rotation[:, 1:].any(axis=1))
+    for k, axes in zip(turned.tolist(), axes_of(rotation[turned], library.dimensions), strict=True):
+        values = component.turned(fields_of(component, own, k, library.dimensions), axes)
+        columns = {name: np.array(value)[None] for name, value in zip(own, values, strict=True)}
+        outline[k] = library.numbers_of(component, columns, 1)[0]
+
+
+def shapes_at(parts: list[Part], places: Places) -> tuple[list[Polygons], Circles, Capsules, list[Lines]]:
+    """The shapes where their bodies are."""
+    d = places.position.shape[1]
+    polygons, circles, capsules, lines = [], no_circles(d), no_capsules(), []
+    for part in parts:
+        row = part.row - places.first
+        style, entity, centre = places.style[row], places.entity[row], places.position[row]
+        if part.special is not None:
+            style = np.where(part.special == PLAIN, style, part.special)
+        axes, turned = None, part.ring
+        if places.axes is not None:
+            axes = places.axes[row]
+            turned = _turned(part.ring, axes)
+            if part.turns is not None:
+                turned = np.where(part.turns[:, None, None], turned, part.ring)
+        if part.offset is not None:
+            centre = centre + (part.offset if axes is None else _turned(part.offset[:, None], axes)[:, 0])
+        points = turned + centre[:, None]
+        if part.kind.corners == 1:
+            spins = places.spins[row]
+            angle = np.where(spins if d == 2 else spins[:, None, None], _angles(places, row), np.nan)
+            circles = Circles(points[:, 0], part.radius, angle, style, entity)
+        elif part.kind.round:
+            capsules = Capsules(points, part.radius, style, entity)
+        elif part.kind.corners == 2:
+            lines.append(Lines(points, style, entity))
+        else:
+            polygons.append(Polygons(points, style, entity, centre))
+    return polygons, circles, capsules, lines
+
+
+def _angles(places: Places, row: Rows) -> Floats:
+    if places.position.shape[1] == 2:
+        return places.angle[row]
+    return np.broadcast_to(np.eye(3), (len(row), 3, 3)) if places.axes is None else places.axes[row]
+
+
+def _turned(points: Floats, axes: Floats) -> Floats:
+    """Points (n, k, d) along these axes (n, d, d)."""
+    if points.shape[2] == 3:
+        return np.matmul(points, axes.transpose(0, 2, 1))
+    x, y = points[..., 0], points[..., 1]
+    turned = np.empty(points.shape)
+    turned[..., 0] = axes[:, None, 0, 0] * x + axes[:, None, 0, 1] * y
+    turned[..., 1] = axes[:, None, 1, 0] * x + axes[:, None, 1, 1] * y
+    return turned
