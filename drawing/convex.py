@@ -4,29 +4,30 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..framework.outlines import Outline
 from ..plugins.convex_hull import around
 from .lists import Floats
 
 FLAT = 1e-9  # of the size: points so near to a face lie in it
 
 
-def faces_around(points: Floats) -> tuple[Floats, float, tuple[np.ndarray, ...]]:
-    """``(corners (m, 3), 0.0, triangles)`` of the convex hull of points (n, 3), point by point (Barber, Dobkin and
-    Huhdanpaa, 1996, without its partition): each new one takes the place of the faces that it sees. Of points in a
-    plane both sides are faces; those on a line, or in one place, have none."""
+def faces_around(points: Floats) -> Outline:
+    """The convex hull of points (n, 3), as triangles: point by point (Barber, Dobkin and Huhdanpaa, 1996, without its
+    partition), each new one takes the place of the faces that it sees. Of points in a plane both sides are faces; those
+    on a line, or in one place, have none."""
     size = float(np.ptp(points, axis=0).max(initial=0.0))
     if not size > 0.0:
-        return points[:1], 0.0, ()
+        return Outline(points[:1], ())
     _, first = np.unique(np.round((points - points[0]) / (FLAT * size)), axis=0, return_index=True)
     points = points[np.sort(first)]
     faces = _first_faces(points, size)
     if faces is None:
         ends = np.argmin(points @ (points[-1] - points[0])), np.argmax(points @ (points[-1] - points[0]))
-        return points[list(ends)], 0.0, ()
+        return Outline(points[list(ends)], ())
     if len(faces) == 1:  # all in a plane
         normal = np.cross(*(points[faces[0, 1:]] - points[faces[0, 0]]))
         ring = around(points, normal)
-        return points, 0.0, (ring, ring[::-1])
+        return Outline(points, (ring, ring[::-1]))
     for k in range(len(points)):
         corners = points[faces]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -37,7 +38,7 @@ def faces_around(points: Floats) -> tuple[Floats, float, tuple[np.ndarray, ...]]
         edges = {(int(a), int(b)) for face in faces[sees] for a, b in zip(face, np.roll(face, -1), strict=True)}
         rim = sorted((a, b) for a, b in edges if (b, a) not in edges)
         faces = np.concatenate((faces[~sees], [(a, b, k) for a, b in rim]))
-    return points, 0.0, tuple(faces)
+    return Outline(points, tuple(faces))
 
 
 def _first_faces(points: Floats, size: float) -> np.ndarray | None:

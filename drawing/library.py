@@ -7,8 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..framework.outlines import Outline
+from ..framework.plugins.registry import Shape
 from .lists import Floats
-from .outlines import Outline, fields_of, outline_of
+from .outlines import fields_of, outline_of, pieces_of
 
 Rows = NDArray[np.int64]
 
@@ -52,30 +54,30 @@ class Pieces:
 
 
 class Library:
-    """``outlines``: of each number. ``pieces``: of each kind."""
+    """``outlines``: of each number, with its rounding. ``pieces``: of each kind."""
 
     def __init__(self, dimensions: int) -> None:
         self.dimensions = dimensions
-        self.outlines: list[Outline] = []
+        self.outlines: list[tuple[Outline, float]] = []
         self.pieces: dict[Kind, Pieces] = {}
         self._known: dict[Any, dict[bytes, int]] = {}
 
-    def numbers_of(self, component: Any, columns: dict[str, Any], count: int) -> Rows:
+    def numbers_of(self, shape: Shape, columns: dict[str, Any], count: int) -> Rows:
         """The numbers of the outlines of so many shapes with these fields, by name each (count, ...)."""
-        known = self._known.setdefault(component, {})
+        known = self._known.setdefault(shape, {})
         table = np.column_stack([np.zeros(count), *(np.reshape(array, (count, -1)) for array in columns.values())])
         keys = table.view(np.dtype((np.void, table.shape[1] * table.itemsize))).ravel().tolist()
         for row, key in enumerate(keys):
             if key not in known:
-                shape = fields_of(component, columns, row, self.dimensions)
-                known[key] = self._add(outline_of(component, shape, self.dimensions))
+                fields = fields_of(shape.component, columns, row, self.dimensions)
+                known[key] = self._add(*outline_of(shape, fields, self.dimensions))
         return np.array([known[key] for key in keys], np.int64)
 
-    def _add(self, outline: Outline) -> int:
-        for rings, radius in outline.pieces():
+    def _add(self, outline: Outline, rounding: float) -> int:
+        for rings, radius in pieces_of(outline, rounding):
             kind = Kind(rings.shape[1], rings.shape[1] == 1 or radius > 0.0)
             if kind not in self.pieces:
                 self.pieces[kind] = Pieces(self.dimensions, kind.corners)
             self.pieces[kind].add(len(self.outlines), rings, radius)
-        self.outlines.append(outline)
+        self.outlines.append((outline, rounding))
         return len(self.outlines) - 1

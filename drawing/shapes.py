@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..framework.plugins.registry import Shape
 from ..systems.shapes.rotation import axes_of
 from .library import Kind, Library, Rows
 from .lists import Capsules, Circles, Floats, Lines, Polygons, Style, no_capsules, no_circles
@@ -81,9 +82,9 @@ def parts_of(world: Any, library: Library, rows: slice) -> list[Part]:
             continue
         own = {name: table.values(component.columns[name].key, row) for name in shape.columns}
         offset, sensor, one_way = (table.values(component.columns[name].key, row) for name in ALL)
-        outline = library.numbers_of(component, own, len(row))
+        outline = library.numbers_of(shape, own, len(row))
         if hasattr(component, "turned"):
-            _follow_turns(table, library, component, row, own, outline)
+            _follow_turns(table, library, shape, row, own, outline)
         special = np.where(sensor, Style.SENSOR, np.where(one_way.any(axis=1), Style.ONE_WAY, PLAIN)).astype(np.int8)
         found.append((row, outline, offset, np.full(len(row), component.rotates), special))
     if not found:
@@ -100,14 +101,15 @@ def parts_of(world: Any, library: Library, rows: slice) -> list[Part]:
     return parts
 
 
-def _follow_turns(table: Any, library: Library, component: Any, row: Rows, own: Any, outline: Rows) -> None:
+def _follow_turns(table: Any, library: Library, shape: Shape, row: Rows, own: Any, outline: Rows) -> None:
     """The outlines of those whose fields are others on a body that is turned."""
+    component: Any = shape.component
     rotation = table.values("rotation", row)
     turned = np.flatnonzero(rotation if rotation.ndim == 1 else rotation[:, 1:].any(axis=1))
     for k, axes in zip(turned.tolist(), axes_of(rotation[turned], library.dimensions), strict=True):
         values = component.turned(fields_of(component, own, k, library.dimensions), axes)
         columns = {name: np.array(value)[None] for name, value in zip(own, values, strict=True)}
-        outline[k] = library.numbers_of(component, columns, 1)[0]
+        outline[k] = library.numbers_of(shape, columns, 1)[0]
 
 
 def shapes_at(parts: list[Part], places: Places) -> tuple[list[Polygons], Circles, Capsules, list[Lines]]:

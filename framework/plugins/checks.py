@@ -19,8 +19,9 @@ import numpy as np
 from ..data.component import Component
 from ..errors import PluginError
 from ..jit.records.schema import Column, Schema
+from ..outlines import SIGNS, Outline
 from ..schedule.stages import answers
-from .laws import Contacts, Law, Support, Trial, mixing_laws, pair_laws, plain, shape_laws, sweep_laws
+from .laws import Contacts, Law, Support, Trial, mixing_laws, outline_laws, pair_laws, plain, shape_laws, sweep_laws
 from .registry import Convex, Shape
 
 # Functions of a shape: their arguments, and what they return.
@@ -29,10 +30,12 @@ SHAPE_FUNCTIONS = {
     "support": (("shape", "direction"), "a point"),
     "rounding": (("shape",), "how far it reaches beyond its core"),
     "turned": (("shape", "axes"), ""),
+    "outline": (("shape", "dimensions"), "corners, faces"),
     "second_moments": (("shape", "dimensions"), "measure, centre, means of xx, xy, yy (in 3D xx, yy, zz, xy, xz, yz)"),
 }
 POSES = np.array(((1.0, 0.0, 0.0), (0.3, -0.2, 0.1), (0.0, 0.0, 0.0), (-2.0, 3.0, 1.0)))  # of b as seen from a
 STEPS = np.array(((0.1, 0.2, 0.0), (-0.3, 0.1, 0.2), (0.0, 0.5, -0.1), (0.04, -0.06, -0.02)))
+LOOK = np.array(((0.6, -0.3, 0.2), (-0.7, 0.1, -0.5), (0.2, 0.9, 0.4)))  # directions beside axes and corners
 VALUES = (0.25, 1.0, 0.0, 1e-9, 0.1, 0.3, 0.45, 0.6, 0.75, 0.9, 3.0, 1e9)  # for a mixing rule, each with each
 # What functions of pairs with Convex get besides, by how many of the two it is.
 HELPERS = {0: (), 1: ("support", "rounding"), 2: ("a_support", "b_support", "a_rounding", "b_rounding")}
@@ -60,7 +63,7 @@ class PlainFunction:
         results = []
         for row in zip(*columns, strict=False):
             given = tuple(tuple(value) if isinstance(value, np.ndarray) else value for value in row)
-            found = self._called(given)
+            found = self.called(*given)
             parts = found if len(self.form) > 1 else (found,)
             if not (isinstance(parts, tuple) and len(parts) == len(self.form) and all(map(_fits, parts, self.form))):
                 forms = ", ".join({bool: "True or False", float: "a number"}.get(kind) or f"a tuple of {kind} numbers"
@@ -75,7 +78,8 @@ class PlainFunction:
         """Which function, and the input."""
         return f"{self.where}: for {', '.join(f'{n} = {shown(v)}' for n, v in zip(self.names, given, strict=False))}"
 
-    def _called(self, given: tuple[Any, ...]) -> Any:
+    def called(self, *given: Any) -> Any:
+        """What it returns; PluginError if it raises."""
         try:
             with np.errstate(all="ignore"):
                 return self.function(*given)
@@ -129,6 +133,7 @@ def check_shape(plugin: Any, component: Any, cost: float) -> None:
         half, support = _extents(where, component, samples, dimensions)
         said = f"{where}: for {shown(samples[0])} in {dimensions}D"
         require(lambda row, said=said: said, shape_laws(half, support, look, other))
+        require(lambda row, said=said: said, laws_of_outline(where, component, samples[:1], dimensions))
 
 
 def _ships(thing: Any) -> bool:
@@ -136,9 +141,14 @@ def _ships(thing: Any) -> bool:
     return getattr(thing, "__module__", "").partition(".")[0] == "carom"
 
 
+def shape_function(component: Any, name: str) -> Any:
+    """The plain function behind a method, static or not; None if the class has none, or a field of that name."""
+    found = inspect.getattr_static(component, name, None)
+    return None if name in component.columns else getattr(found, "__func__", found)
+
+
 def _shape_function(where: str, component: Any, name: str, dimensions: int) -> PlainFunction | None:
-    function = inspect.getattr_static(component, name, None)
-    function = getattr(function, "__func__", function)
+    function = shape_function(component, name)
     if function is None and name == "bounds":
         raise PluginError(
             f"{where} has no bounds: write bounds(shape, dimensions) that returns the half extents of the box around "
@@ -160,6 +170,29 @@ def _extents(where: str, component: Any, samples: list[Any], dimensions: int) ->
         return support(samples, direction)[0], beyond  # type: ignore[misc]
 
     return bounds(samples, repeat(dimensions))[0], None if support is None else supported  # type: ignore[misc]
+
+
+def laws_of_outline(where: str, component: Any, samples: list[Any], dimensions: int) -> Iterator[Law]:
+    """Of n shapes that are not turned; none, if the class has no outline."""
+    function = _shape_function(where, component, "outline", dimensions)
+    if function is None:
+        return
+    outlines = []
+    ways = np.concatenate((np.eye(dimensions), -np.eye(dimensions), SIGNS[dimensions], LOOK[:, :dimensions]))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    for sample in samples:
+        found = function.called(sample, dimensions)
+        try:
+            outlines.append(Outline.of(found, dimensions))
+        except (ValueError, TypeError) as error:
+            raise PluginError(f"{function.at(sample, dimensions)} it returned {plain(found)!r}: {error}") from error
+    half, support = _extents(where, component, samples, dimensions)
+    rounding = _shape_function(where, component, "rounding", dimensions)
+    beyond, reach = np.zeros(len(samples)) if rounding is None else rounding(samples)[0], None
+    if support is not None:
+        points = (support(np.tile(way, (len(samples), 1)))[0] @ way for way in ways)
+        reach = np.stack(list(points), axis=1)
+    yield from outline_laws(outlines, half, beyond, reach, ways)
 
 
 # -- pairs ----------------------------------------------------------------------------------------

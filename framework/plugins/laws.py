@@ -13,9 +13,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..outlines import Outline
+
 UNIT = 1e-9  # how far from 1 a normal's length may be
 TOLERANCE, GENERIC = 1e-9, 2e-6
 PATH = 24  # samples along a sweep
+COARSE = 0.05  # of its size: so much smaller than the shape an outline may be, of what is round
 
 ENCLOSE = "make bounds enclose the whole shape (for turned shapes: use shape.axes), or correct the "
 APART = "apart, depth is minus the distance, or minus something smaller: fast bodies would pass through else"
@@ -24,6 +27,7 @@ PARTING = (
     "shape to the second"
 )
 POINT = "point counts from the centre of the first shape, and lies in the middle of the overlap"
+LOOKS = "draw the shape that bounds and support describe; the outline, as support, is that of the core without rounding"
 FIRST_TOUCH = "time, from 0 to 1, is the part of v after which they touch for the first time"
 EXCHANGED = "write the function so that a and b may change places: depth stays, normal turns round"
 # What support and rounding of a shape return in one direction per row: points (n, d), numbers (n,).
@@ -224,6 +228,71 @@ def shape_laws(half: np.ndarray, support: Support | None, look: np.ndarray, othe
     yield Law(there > here + slack, what, cure, (look, point, elsewhere))
     what, cure = "support({}) is {}, for a direction of another length {}", "the direction has any length, not only 1"
     yield Law(np.abs(far - here) > slack, what, cure, (look, point, long))
+
+
+def outline_laws(
+    outlines: Sequence[Outline], half: np.ndarray, beyond: np.ndarray, reach: np.ndarray | None, ways: np.ndarray
+) -> Iterator[Law]:
+    """Of the outlines of n shapes that are not turned, with their bounds (n, d) and roundings (n,); reach: (n, m) how
+    far their support functions reach in the directions (m, d), None without these."""
+    size = size_of(half)
+    far = np.array([np.abs(one.corners).max(axis=0) for one in outlines]) + beyond[:, None]
+    slack = TOLERANCE * (size + far.max(axis=1))
+    what = "the outline reaches {}, bounds are {}"
+    yield Law((far > half + slack[:, None]).any(axis=1), what, LOOKS, (far, half))
+    if reach is not None:
+        own = np.array([(one.corners @ ways.T).max(axis=0) for one in outlines])
+        error = own - reach
+        worst = np.argmax(np.where(error > slack[:, None], np.inf, np.abs(error)), axis=1)
+        own, reach, error = (np.take_along_axis(each, worst[:, None], 1)[:, 0] for each in (own, reach, error))
+        what = "in the direction {} the outline reaches {:.9g}, support {:.9g}"
+        wrong = (error > slack) | (-error > COARSE * (size + far.max(axis=1)))
+        yield Law(wrong, what, LOOKS, (ways[worst], own, reach))
+    turns = np.array([_least_turn(one) for one in outlines])
+    cure = "order the corners counter-clockwise, those of faces as seen from outside; only convex pieces are drawn"
+    yield Law(turns < -slack * size, "a polygon of the outline is not convex, or is clockwise", cure)
+    if ways.shape[1] == 3 and reach is not None:
+        inward = np.array([_least_height(one) for one in outlines])
+        yield Law(inward < -slack * size * size, "a face of the outline looks inward", cure)
+        cure = "each edge of a face is that of another, too, in the other direction"
+        yield Law(np.array([_is_open(one) for one in outlines]), "the faces of the outline leave a hole", cure)
+
+
+def _normals_of(outline: Outline) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Of each polygon in space its corners and twice its area along the normal."""
+    for face in outline.faces:
+        ring = outline.corners[face]
+        yield ring, np.cross(ring - ring[0], np.roll(ring, -1, axis=0) - ring[0]).sum(axis=0)
+
+
+def _least_turn(outline: Outline) -> float:
+    """The least product of an edge and the next, of all polygons; in space about the normal."""
+    flat = outline.corners.shape[1] == 2
+    found: list[tuple[np.ndarray, Any]]
+    if flat:
+        rings = [outline.corners[face] for face in outline.faces] or [outline.corners]
+        found = [(ring, None) for ring in rings if len(ring) > 2]
+    else:
+        found = [(ring, normal / (np.linalg.norm(normal) or 1.0)) for ring, normal in _normals_of(outline)]
+    least = 0.0
+    for ring, normal in found:
+        edges = np.roll(ring, -1, axis=0) - ring
+        after = np.roll(edges, -1, axis=0)
+        turns = edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0] if flat else np.cross(edges, after) @ normal
+        least = min(least, float(turns.min()))
+    return least
+
+
+def _least_height(outline: Outline) -> float:
+    """Of a solid in space: how far, times an area, its faces look away from its middle."""
+    middle = outline.corners.mean(axis=0)
+    return min((float((ring.mean(axis=0) - middle) @ normal) for ring, normal in _normals_of(outline)), default=0.0)
+
+
+def _is_open(outline: Outline) -> bool:
+    """Whether an edge is not that of two faces; a single face has but one side."""
+    edges = [edge for face in outline.faces for edge in zip(face.tolist(), np.roll(face, -1).tolist(), strict=True)]
+    return len(outline.faces) > 1 and (len(set(edges)) < len(edges) or any((b, a) not in set(edges) for a, b in edges))
 
 
 def mixing_laws(there: np.ndarray, back: np.ndarray) -> Iterator[Law]:

@@ -103,19 +103,23 @@ class Plugin:
         it meets every other convex shape; and ``rounding(shape)``, how far it reaches beyond the core that support is
         about; and ``second_moments(shape, dimensions)``, from which bodies that spin get their inertia: its area or
         volume, its centre, then the means over it of xx, xy, yy, in 3D of xx, yy, zz, xy, xz, yz, of a body that is not
-        rotated; and ``turned(shape, axes)``, a tuple of its fields as they are on a body with these axes. In place of
-        that ``rotates = True`` in the class gives the functions ``shape.axes``, the body's axes in the world;
+        rotated; and ``outline(shape, dimensions)``, what it looks like along its body's axes: ``(corners, faces)`` of a
+        :class:`carom.framework.outlines.Outline`, without which pictures ask its support; and ``turned(shape, axes)``,
+        a tuple of its fields as they are on a body with these axes. In place of that ``rotates = True`` in the class
+        gives the functions ``shape.axes``, the body's axes in the world;
         ``dimensions = (2,)`` makes it a shape of 2D worlds only.
         """
 
         def register(component: ShapeClass) -> ShapeClass:
             checks.check_shape(self, component, cost)
-            bounds, support, rounding, turned, moments = (_function(component, name) for name in checks.SHAPE_FUNCTIONS)
+            bounds, support, rounding, turned, outline, moments = (
+                checks.shape_function(component, name) for name in checks.SHAPE_FUNCTIONS
+            )
             shape = Shape(
                 component, float(cost), pasted(bounds), None if turned is None else inlined(turned), self.name,
                 None if support is None else checked_support(inlined(support)),
                 inlined(rounding or _no_rounding) if support is not None else None,
-                None if moments is None else pasted(moments),
+                None if moments is None else pasted(moments), outline,
             )  # fmt: skip
             self._register(self.shapes, component, shape)
             return component
@@ -410,12 +414,6 @@ class Plugin:
 
     def __repr__(self) -> str:
         return f"<plugin {self.name}>"
-
-
-def _function(component: type[Component], name: str) -> Any:
-    """The plain function behind a method, static or not; None if the class has none."""
-    found = inspect.getattr_static(component, name, None)
-    return getattr(found, "__func__", found)
 
 
 def _compiled(function: Any) -> Any:

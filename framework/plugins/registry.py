@@ -32,6 +32,8 @@ class Shape:
         reaches beyond its core
     second_moments
         compiled, or None; (shape, dimensions) -> measure, centre, means of products of coordinates
+    outline
+        plain Python, or None; (shape, dimensions) -> corners and faces, along the axes of its body
     """
 
     component: type[Component]
@@ -42,6 +44,7 @@ class Shape:
     support: Any | None = None
     rounding: Any | None = None
     second_moments: Any | None = None
+    outline: Any | None = None
 
     @property
     def rotates(self) -> bool:

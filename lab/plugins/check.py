@@ -15,7 +15,7 @@ import numpy as np
 from ...components import RigidBody, SphereCollider, Transform
 from ...framework import CaromError, Convex, Plugin, PluginError, Settings, World
 from ...framework.jit.lazy import is_of_compiler
-from ...framework.plugins.checks import HELPERS, PlainFunction
+from ...framework.plugins.checks import HELPERS, PlainFunction, laws_of_outline
 from ...framework.plugins.laws import Law, Trial, pair_laws, shape_laws, sweep_laws
 from ...framework.plugins.registry import Pair, Registry, Shape
 from ...plugins import Physics
@@ -213,6 +213,9 @@ def _check_shape(shape: Shape, checked: Checked) -> None:
             there = np.array([component.bounds(made.at(row), dimensions) for row in range(len(sizes[:PLAIN]))], float)
             alike: Any = np.isclose(there, made.half[:PLAIN], rtol=1e-9, atol=0, equal_nan=True).all(axis=1)
             yield Law(~alike, "compiled, bounds are {}, as plain Python {}", ALIKE, (made.half, there))
+            axes = {"axes": tuple(map(tuple, np.eye(dimensions)))} if shape.rotates else {}
+            upright = [made.at(row)._replace(**axes) for row in range(len(there))]
+            yield from laws_of_outline(checked.place, component, upright, dimensions)
 
         return laws(), made.shown
 

@@ -92,6 +92,11 @@ MISTAKES = {  # that four poses of samples do not show: what is said of them, an
          "            return 1.0, 1.0\n"),
         ("reach beyond the bounds (1.0, 1.0)", "make bounds enclose the whole shape", "radius=2.0"),
     ),
+    "outline of large ones": (
+        ("    def support", "    def outline(shape, dimensions):\n"
+         "        return [(0.0, shape.radius if 2.0 < shape.radius < 9.0 else 0.0)], ()\n    def support"),
+        ("the outline reaches", "draw the shape that bounds and support describe", "radius=2.0"),
+    ),
     "another result in Python": (
         (SPHERE, SPHERE + OVERFLOW),
         ("compiled it returns", "as plain Python", "no global that changes"),

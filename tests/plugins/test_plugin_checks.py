@@ -9,6 +9,7 @@ import pytest
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.components.colliders import Collider
 from carom.framework import Component, Convex, Plugin, PluginError, StepError, World, column
+from carom.framework.outlines import FACES, SIGNS
 from carom.framework.vectors import divided, dot, length, negative, scale
 from carom.plugins import Physics
 
@@ -49,6 +50,21 @@ ROUND = {"support": lambda shape, direction: scale(direction, 0.0), "rounding": 
 
 def shape(**members):
     return lambda plugin: registered(plugin, **members)
+
+
+QUAD = SIGNS[2] / 2
+
+
+def outline(function, dimensions=(2,)):
+    """Of a cube with half extents 0.5."""
+
+    def bounds(shape, dimensions):
+        return (0.5,) * dimensions
+
+    def support(shape, direction):
+        return tuple(math.copysign(0.5, x) for x in direction)
+
+    return shape(bounds=bounds, support=support, outline=function, dimensions=dimensions)
 
 
 def pair(function, **members):
@@ -147,6 +163,30 @@ MISTAKES = {
     "moments too few": (shape(second_moments=lambda shape, dimensions: (1.0, 0.0)), "measure, centre, means of xx"),
     "moments negative": (
         shape(second_moments=lambda shape, dimensions: (1.0, 0.0, 0.0, -1.0, 0.0, 1.0)), "squares not negative"
+    ),
+    "outline is corners alone": (outline(lambda shape, dimensions: [(0.0, 0.0)]), r"return two things: corners, and"),
+    "outline of 2D only": (outline(lambda shape, dimensions: (QUAD, ()), (2, 3)), "rows of 3 finite numbers"),
+    "outline without corners": (outline(lambda shape, dimensions: ([], ())), "at least one"),
+    "outline is NaN": (outline(lambda shape, dimensions: ([(math.nan, 0.0)], ())), "finite numbers"),
+    "outline with a face of two": (outline(lambda shape, dimensions: (QUAD, [(0, 1)])), "three or more different rows"),
+    "outline with a strange face": (outline(lambda shape, dimensions: (QUAD, [(0, 1, 4)])), "not among the 4"),
+    "outline in space without faces": (
+        outline(lambda shape, dimensions: (SIGNS[3], ()), dimensions=(3,)), "more than two corners need faces"
+    ),
+    "outline too large": (outline(lambda shape, dimensions: (1.1 * QUAD, ())), "outline reaches .*, bounds are"),
+    "outline too small": (outline(lambda shape, dimensions: (0.9 * QUAD, ())), "reaches 0.636[0-9]*, support 0.707"),
+    "outline with a corner cut off": (outline(lambda shape, dimensions: (QUAD[:3], ())), "the outline reaches"),
+    "outline beside the core": (
+        shape(**ROUND, outline=lambda shape, dimensions: ([(0.1,) * dimensions], ())), "outline reaches .*, bounds"
+    ),
+    "outline clockwise": (outline(lambda shape, dimensions: (QUAD[::-1], ())), "not convex, or is clockwise"),
+    "outline that crosses itself": (outline(lambda shape, dimensions: (QUAD[[0, 2, 1, 3]], ())), "not convex"),
+    "outline with a face inside out": (
+        outline(lambda shape, dimensions: (SIGNS[3] / 2, [FACES[3][0][::-1], *FACES[3][1:]]), dimensions=(3,)),
+        "a face of the outline looks inward",
+    ),
+    "outline with a hole": (
+        outline(lambda shape, dimensions: (SIGNS[3] / 2, FACES[3][1:]), dimensions=(3,)), "the outline leave a hole"
     ),
     "strange dimensions": (shape(dimensions=(4,)), r"dimensions must be \(2,\), \(3,\) or \(2, 3\)"),
     # -- what a pair's function is
