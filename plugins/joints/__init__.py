@@ -81,6 +81,7 @@ class Joints(Plugin):
         self._rows = JointRows(self._record, self._physics.dimensions, world.registry)
         self._joints: dict[int, Joint] = {}  # those that have rows, by entity, which ascend
         self._holds: list[Holds] | None = None  # what columns() measures, once they are asked for
+        self._anchors: np.ndarray | None = None  # (n, 2, d) along the axes of both bodies, the same of anchors()
         # Entities that came, went or changed, and joints of which a field was set, since the last step.
         self._touched: set[int] = set()
         self._set: set[int] = set()
@@ -111,7 +112,8 @@ class Joints(Plugin):
         joint = self._present().get(entity)
         if joint is None:
             raise KeyError(f"entity {entity!r} has no joint that a step has taken")
-        columns = self._columns({entity: joint}, holds([joint]), self._rows.span(entity))
+        present = {entity: joint}
+        columns = self._columns(present, holds([joint], self._held(present)), self._rows.span(entity))
         values = (columns[name][0] for name in JointState._fields)
         return JointState(*(value if value.ndim else float(value) for value in values))
 
@@ -119,9 +121,10 @@ class Joints(Plugin):
         """Of all joints what :meth:`state` has: ``entity (n,)``, ``impulse (n, d)``, ``torque (n,)``, in 3D (n, 3),
         ``value (n,)``, ``speed (n,)`` and ``load (n,)``."""
         present = self._present()
-        if present is self._joints and self._holds is None:
-            self._holds = holds(present.values())
-        found = self._holds if present is self._joints else holds(present.values())
+        if present is not self._joints:
+            found = holds(present.values(), self._held(present))
+        else:
+            found = self._holds = holds(present.values(), self._held(present)) if self._holds is None else self._holds
         return self._columns(present, found, slice(0, self._record.count))
 
     @property
@@ -131,7 +134,20 @@ class Joints(Plugin):
 
     def anchors(self) -> tuple[np.ndarray, np.ndarray]:
         """(n, d) m, where the anchors of all joints are, on each a and on each b: to draw ropes and hinges."""
-        return anchors(self._physics.table, self._present().values())
+        present = self._present()
+        if present is self._joints and self._anchors is not None:
+            at = self._anchors
+        else:
+            ends = [(joint.at_a, joint.at_b) for joint in present.values()]
+            at = np.array(ends).reshape(-1, 2, self._physics.dimensions)
+        self._anchors = at if present is self._joints else None
+        return anchors(self._physics.table, self._held(present), at)
+
+    def _held(self, joints: Any) -> np.ndarray:
+        """(n, 2) the bodies that these joints have hold of, until the next step also where a or b was set."""
+        record = self._record
+        first = np.searchsorted(record.joint[: record.count], list(joints))
+        return np.stack((record.entity_a[first], record.entity_b[first]), axis=1)
 
     def _present(self) -> dict[int, Joint]:
         """The joints that have rows, but for those that are gone since the last step."""
@@ -196,7 +212,7 @@ class Joints(Plugin):
         contents, record = self._contents, self._record
         for joint in self._joints.values():
             joint._taken = None
-        self._joints, self._holds, self._given_away, self._table_version = {}, None, {}, -1
+        self._joints, self._holds, self._anchors, self._given_away, self._table_version = {}, None, None, {}, -1
         self._touched.clear()
         self._set.clear()
         self._rows.clear()
@@ -283,7 +299,7 @@ class Joints(Plugin):
 
     def _take(self, entity: int, joint: Joint, fresh: bool = False) -> set[int]:
         """Rows for a joint that has hold of its bodies, since now if it is fresh; these, and those it has held."""
-        joint._taken = None
+        joint._taken = self._anchors = None
         rows = joint.rows(self._physics.dimensions)
         bodies, other = self._rows.put(joint, rows, fresh)
         joint._taken = self
@@ -317,7 +333,7 @@ class Joints(Plugin):
         for joint in joints:
             joint._taken = None
         self._given_away = {key: value for key, value in self._given_away.items() if key[0] not in entities}
-        self._holds = None
+        self._holds = self._anchors = None
         return {body for joint in joints for body in (joint.a, joint.b)}
 
     def _joint_of(self, entity: int) -> Joint | None:
@@ -334,6 +350,7 @@ class Joints(Plugin):
             joint.keep(changed=False)
         else:
             self._set.add(joint.entity)
+            self._anchors = None
         for name in names if self._given_away else ():
             if (joint.entity, name) in self._given_away:
                 array, _ = self._given_away[joint.entity, name]

@@ -395,12 +395,13 @@ class MousePull(Joint):
     def check(self) -> None:
         if self.a != WORLD:
             raise ValueError(f"MousePull.a must be None, as it pulls to a place of the world, got {self.a}")
+        self.keep(at_a=self.target)
 
     def attach(self, a: Place, b: Place) -> None:
         self.hold(a, b, self.grip)
+        self.keep(at_a=self.target)
 
     def rows(self, dimensions: int) -> list[Row]:
-        self.keep(at_a=self.target)
         most = math.inf if self.max_force is None else self.max_force
         return [Row(POINT, SPRING, most=most, frequency=self.frequency, damping_ratio=self.damping_ratio)]
 

@@ -110,24 +110,21 @@ MEASURES = {
 }  # fmt: skip
 
 
-def holds(joints: Collection[Joint]) -> list[Holds]:
-    """Of these joints as they are now."""
-    names, kinds = ("a", "b", "at_a", "at_b", "axis_a", "axis_b", "side_a", "side_b", "start"), {}
+def holds(joints: Collection[Joint], bodies: np.ndarray) -> list[Holds]:
+    """Of these joints as they are now, which have hold of these ``bodies`` (n, 2)."""
+    names, kinds = ("at_a", "at_b", "axis_a", "axis_b", "side_a", "side_b", "start"), {}
     for index, joint in enumerate(joints):
         function = MEASURES.get(type(joint))
         if function is not None:
-            kinds.setdefault(function, []).append((index, *(getattr(joint, name) for name in names)))
+            kinds.setdefault(function, []).append((index, *bodies[index], *(getattr(joint, name) for name in names)))
     return [Holds(function, *map(np.array, zip(*rows, strict=True))) for function, rows in kinds.items()]
 
 
-def anchors(table: Any, joints: Collection[Joint]) -> tuple[np.ndarray, np.ndarray]:
-    """(n, d) where the anchors of these joints are, on each a and on each b."""
-    ends = []
-    for body, at in (("a", "at_a"), ("b", "at_b")):
-        bodies = moving(table, np.array([getattr(joint, body) for joint in joints], np.int64))
-        local = np.array([getattr(joint, at) for joint in joints]).reshape(-1, table.dimensions)
-        ends.append(bodies.position + bodies.turned(local))
-    return ends[0], ends[1]
+def anchors(table: Any, bodies: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n, d) where points ``at`` (n, 2, d) along the axes of ``bodies`` (n, 2) are: those of a, and those of b."""
+    ends = (moving(table, bodies[:, k]) for k in (0, 1))
+    a, b = (body.position + body.turned(at[:, k]) for k, body in enumerate(ends))
+    return a, b
 
 
 def measure(table: Any, found: list[Holds], count: int, counted: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from joints.helpers_joints import G, at, chain, disc, joint_world, plank
@@ -97,6 +99,35 @@ def test_going_back_and_loading_show_joints_at_once(tmp_path):
     run(world, 5)
     run(loaded, 5)
     assert world.state_hash() == loaded.state_hash()
+
+
+def test_what_is_set_between_two_steps_is_told_alike_before_and_after_going_back():
+    """A joint that is to hold another body holds the old one until the next step; a target is the new one at once,
+    also where bodies sleep."""
+    world, joints = joint_world(sleeping=True)
+    one, other = plank(world, (1, 0), (1, 0.1)), plank(world, (5, 0), (1, 0.1))
+    hinge, pull = Hinge(None, one, anchor=(0, 0)), MousePull(other, grip=(5, 0), target=(5, 1))
+    entity = world.create_entity(hinge)
+    world.create_entity(pull)
+    run(world, 10)
+
+    def seen():
+        columns = joints.columns()
+        state = [np.ravel(part).tolist() for part in joints.state(entity)]
+        return [columns[name].tolist() for name in columns], state, [end.tolist() for end in joints.anchors()]
+
+    before = seen()
+    hinge.b = other
+    pull.target = 7.0, 2.0
+    after, snapshot = seen(), world.snapshot()
+    assert after[:2] == before[:2]
+    assert after[2][0] == [before[2][0][0], [7.0, 2.0]]
+    assert after[2][1] == before[2][1]
+    for again in (snapshot, pickle.loads(pickle.dumps(snapshot))):
+        world.step()
+        assert joints.of(one) == []
+        world.restore(again)
+        assert seen() == after
 
 
 @pytest.mark.parametrize("dimensions", [2, 3])
