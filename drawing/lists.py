@@ -144,6 +144,12 @@ class DrawingList:
     fixed_lines: list[Lines]
     fixed_version: int
 
+    def lines_of(self, style: Style) -> Lines:
+        """Those of what is drawn over the shapes that have this ``style``, such as ``Style.JOINT``: all that match."""
+        found = [each.where(each.style == style) for each in self.lines]
+        empty = Lines(np.zeros((0, 2, self.dimensions)), NO_STYLES, NO_ENTITIES)
+        return Lines(*(np.concatenate([getattr(one, each.name) for one in (empty, *found)]) for each in fields(Lines)))
+
     def __len__(self) -> int:
         """How many polygons, circles, capsules and lines of shapes and over them there are."""
         groups = (*self.polygons, *self.fixed, *self.lines, *self.fixed_lines)

@@ -33,7 +33,8 @@ def contact_marks(world: Any, lines: list[Lines], points: list[Points]) -> None:
     contacts = world.contacts
     at, entity = np.array(contacts.point), np.array(contacts.entity_a)
     half = _half_extents(world, slice(0, world.physics.table.stops[1]))
-    size = np.median(half[np.isfinite(half)]) if np.isfinite(half).any() else 1.0
+    half = half[np.isfinite(half) & (half > 0.0)]
+    size = np.median(half) if len(half) else 1.0
     points.append(_points(at, Style.CONTACT, entity))
     lines.append(_lines(np.stack((at, at + NORMAL * size * contacts.normal), axis=1), Style.NORMAL, entity))
 

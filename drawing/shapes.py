@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,16 @@ PLAIN = -1  # neither a sensor nor one-way
 ALL = "offset", "sensor", "one_way"  # columns of every collider that tell where it is, and its style
 
 
+class Colliders(NamedTuple):
+    """S colliders."""
+
+    row: Rows  # of the table
+    outline: Rows  # its number in the library
+    offset: Floats  # (S, d)
+    turns: NDArray[np.bool_]  # whether the shape turns with its body
+    special: NDArray[np.int8]  # its style, PLAIN: that of its body
+
+
 @dataclass
 class Part:
     """The pieces of one kind: rings (n, k, d) of the colliders of these rows."""
@@ -28,7 +39,7 @@ class Part:
     row: Rows
     offset: Floats | None  # None: all are 0
     turns: NDArray[np.bool_] | None  # whether a shape turns with its body; None: all do
-    special: NDArray[np.int8] | None  # its style, PLAIN: that of its body; None: all are
+    special: NDArray[np.int8] | None  # as of colliders; None: all are PLAIN
 
 
 @dataclass
@@ -71,32 +82,36 @@ def watched_of(world: Any, rows: slice) -> dict[str, Any]:
     return found
 
 
+def colliders_of(world: Any, library: Library, rows: slice, shapes: Iterable[Shape] | None = None) -> Colliders:
+    """Those of the bodies of these rows, of all shapes or of some, one shape after the other."""
+    table, d = world.physics.table, library.dimensions
+    none = np.zeros(0, np.int64)
+    found = [(none, none, np.zeros((0, d)), np.zeros(0, bool), np.zeros(0, np.int8))]
+    for shape in world.registry.shapes.values() if shapes is None else shapes:
+        component: Any = shape.component
+        mask = table.mask_names.get(component)
+        row = np.flatnonzero(table.arrays[mask][rows]) + rows.start if mask else none
+        if len(row):
+            own = {name: table.values(component.columns[name].key, row) for name in shape.columns}
+            offset, sensor, one_way = (table.values(component.columns[name].key, row) for name in ALL)
+            outline = library.numbers_of(shape, own, len(row))
+            if hasattr(component, "turned"):
+                _follow_turns(table, library, shape, row, own, outline)
+            special = np.where(sensor, Style.SENSOR, np.where(one_way.any(axis=1), Style.ONE_WAY, PLAIN))
+            found.append((row, outline, offset, np.full(len(row), component.rotates), special.astype(np.int8)))
+    return Colliders(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
+
+
 def parts_of(world: Any, library: Library, rows: slice) -> list[Part]:
     """What the bodies of these rows look like."""
-    table = world.physics.table
-    found: list[tuple[np.ndarray, ...]] = []
-    for component, shape in world.registry.shapes.items():
-        mask = table.mask_names.get(component)
-        row = np.flatnonzero(table.arrays[mask][rows]) + rows.start if mask else np.zeros(0, np.int64)
-        if not len(row):
-            continue
-        own = {name: table.values(component.columns[name].key, row) for name in shape.columns}
-        offset, sensor, one_way = (table.values(component.columns[name].key, row) for name in ALL)
-        outline = library.numbers_of(shape, own, len(row))
-        if hasattr(component, "turned"):
-            _follow_turns(table, library, shape, row, own, outline)
-        special = np.where(sensor, Style.SENSOR, np.where(one_way.any(axis=1), Style.ONE_WAY, PLAIN)).astype(np.int8)
-        found.append((row, outline, offset, np.full(len(row), component.rotates), special))
-    if not found:
-        return []
-    row, outline, offset, turns, special = (np.concatenate(columns) for columns in zip(*found, strict=True))
+    row, outline, offset, turns, special = colliders_of(world, library, rows)
     parts = []
     for kind, pieces in sorted(library.pieces.items()):
         shape, ring, radius = pieces.of(outline)
         if len(shape):
             rest = offset[shape], turns[shape], special[shape]
             used = rest[0].any(), not rest[1].all(), (rest[2] != PLAIN).any()
-            rest = (one if some else None for one, some in zip(rest, used, strict=True))
+            rest: Any = (column if some else None for column, some in zip(rest, used, strict=True))
             parts.append(Part(kind, ring, radius, row[shape], *rest))
     return parts
 

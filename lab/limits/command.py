@@ -14,7 +14,7 @@ from ...framework import Settings, World
 from ..cli.loading import Loaded, load, stdout_kept_clean
 from ..cli.options import NOT_NEGATIVE, json_option, traceback_option, world_options
 from ..cli.usage_errors import Problem
-from ..measure.body_shapes import apart, state_by_id
+from ..measure.bodies import apart, state_by_id
 from ..plugins.command import plugin_named
 from ..reporting.progress import Progress
 from ..reporting.text import jsonable, metres, number, values_text

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ...framework import World
-from .body_shapes import Floats, overlaps_of, sensor_entities, size_of, sizes_of, state_by_id, walls_around
+from .bodies import Floats, overlaps_of, sensor_entities, size_of, sizes_of, state_by_id, walls_around
 from .timing import now, timed
 
 # Failures of runs; STOPPED: ended by an error.

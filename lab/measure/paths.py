@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...components import Collider, SphereCollider
 from ...framework import World
-from .body_shapes import QUIET, Floats, dimensions_of
+from .bodies import QUIET, Floats, dimensions_of
 
 CANDIDATES = 12_000  # bodies that are recorded, to choose from
 

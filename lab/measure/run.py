@@ -17,7 +17,7 @@ from ...framework import World
 from ...framework.compilation import log
 from ...framework.schedule.profile_report import Stats, Totals
 from ...plugins.joints import Joints
-from .body_shapes import QUIET, SOLID, dimensions_of
+from .bodies import QUIET, dimensions_of
 from .observer import Observer
 from .paths import Recorder, Traces
 from .timing import timed
@@ -186,7 +186,7 @@ def _energy_changes(
     fell = (np.maximum.accumulate(energies) - energies).max() > noise
     own_forces = [force for force in world.force_systems if not hasattr(force, "potential_energy")]
     reasons = {
-        "restitution below 1": met and fell and (_restitutions(touched) < 1).any(),
+        "restitution below 1": met and fell and (_restitutions(world, touched) < 1).any(),
         "damping": np.any(dynamic.linear_damping),
         "forces": np.any(dynamic.constant_force) or np.any(dynamic.applied_force) or own_forces,
         "systems of the game": any(not type(one).__module__.startswith("carom.systems.") for one in world.systems),
@@ -215,10 +215,10 @@ def plain_settings(world: World) -> dict[str, Any]:
     return {k: v if isinstance(v, plain) else getattr(v, "name", None) or str(v) for k, v in values.items()}
 
 
-def _restitutions(bodies: Any) -> NDArray[np.float64]:
-    """Of all their solid colliders."""
+def _restitutions(world: World, bodies: Any) -> NDArray[np.float64]:
+    """Of all colliders of these bodies."""
     found = []
-    for collider in SOLID:
+    for collider in world.registry.shapes:
         has = np.asarray(bodies.has(collider), bool)
         if has.any():  # else there may be no such columns
             found.append(getattr(bodies, collider.prefix[:-1]).restitution[has])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,11 @@ from matplotlib.collections import EllipseCollection, LineCollection, PolyCollec
 from matplotlib.colors import to_rgba_array
 from numpy.typing import NDArray
 
-from ..measure.body_shapes import Floats, Shapes
-from ..measure.outlines import padded, rounded
+from ...drawing import Circles, Lines, Polygons
+from ...drawing.outlines import rounded
 from . import canvas
 from .canvas import Sheet
+from .figures import Figures, Floats
 from .projection import Projection
 
 MOST_ARROWS = 1500  # in 2D; more could not be distinguished
@@ -29,27 +31,29 @@ Painted = tuple[int, Floats, Any, Any]  # the row of a body, a polygon in the pl
 OUTLINED = 6.0  # points: smaller bodies have no outline
 
 
-def draw_walls(sheet: Sheet, walls: Shapes, projection: Projection) -> None:
+def draw_walls(sheet: Sheet, walls: Figures, projection: Projection) -> None:
     """Static geometry: filled in 2D; in 3D transparent, clipped by the view; sensors faint."""
     colours = np.where(walls.sensor[:, None], to_rgba_array(canvas.SENSOR, FAINT), to_rgba_array(canvas.WALL))
     if projection.flat:
         _draw_flat(sheet, walls, colours, canvas.WALL_EDGE, 0.6, zorder=1)
         return
-    draw_bodies(sheet, walls.where(walls.faceless), colours[walls.faceless], projection, zorder=1)
-    rings, owner, _ = _seen_rings(walls, projection)
-    within = np.all((rings >= projection.lower) & (rings <= projection.upper), axis=(1, 2))
-    parts = [ring if whole else projection.clipped(ring) for ring, whole in zip(rings, within, strict=True)]
-    lengths = np.array([len(part) for part in parts], int)
-    if lengths.any():
-        places = np.split(projection.plane(np.concatenate(parts))[0], np.cumsum(lengths)[:-1])
-        colours = colours[owner]
-        colours[:, 3] = GLASS
+    draw_bodies(sheet, replace(walls, polygons=[]), colours, projection, zorder=1)
+    places, fills = [], []
+    for group, seen, _ in _seen_faces(walls, projection):
+        rings, owner = group.points[seen], walls.rows(group)[seen]
+        within = np.all((rings >= projection.lower) & (rings <= projection.upper), axis=(1, 2))
+        parts = [ring if whole else projection.clipped(ring) for ring, whole in zip(rings, within, strict=True)]
+        lengths = np.array([len(part) for part in parts], int)
+        if lengths.any():
+            places += np.split(projection.plane(np.concatenate(parts))[0], np.cumsum(lengths)[:-1])
+            fills.append(colours[owner] * (1.0, 1.0, 1.0, 0.0) + (0.0, 0.0, 0.0, GLASS))
+    if places:
         style: dict[str, Any] = {"edgecolors": to_rgba_array(canvas.WALL_EDGE, 0.7), "linewidths": 0.6, "zorder": 1}
-        sheet.axes.add_collection(PolyCollection(places, facecolors=colours, **style))
+        sheet.axes.add_collection(PolyCollection(places, facecolors=np.concatenate(fills), **style))
 
 
-def draw_bodies(sheet: Sheet, bodies: Shapes, colours: Floats, projection: Projection, zorder: float = 3) -> None:
-    """Moving shapes in their ``colours`` (n, 4); in 3D far ones first and dimmed; sensors faint."""
+def draw_bodies(sheet: Sheet, bodies: Figures, colours: Floats, projection: Projection, zorder: float = 3) -> None:
+    """Moving shapes in the ``colours`` (n, 4) of their bodies; in 3D far ones first and dimmed; sensors faint."""
     colours = colours * np.where(bodies.sensor, FAINT, 1.0)[:, None] ** (0, 0, 0, 1)
     if not len(bodies.entity):
         return
@@ -61,12 +65,12 @@ def draw_bodies(sheet: Sheet, bodies: Shapes, colours: Floats, projection: Proje
 
 
 def _draw_solids(
-    sheet: Sheet, bodies: Shapes, colours: Floats, projection: Projection, outline: float, zorder: float
+    sheet: Sheet, bodies: Figures, colours: Floats, projection: Projection, outline: float, zorder: float
 ) -> None:
     """Faces, balls and capsules as polygons in one list, painted from far to near."""
     depth = projection.plane(bodies.centre)[2]
     shade = canvas.mixed(colours, canvas.BACKGROUND, 0.75 * (1 - depth))
-    painted = [*_seen_faces(bodies, shade, projection), *_seen_balls(sheet, bodies, shade, projection)]
+    painted = [*_painted_faces(bodies, shade, projection), *_painted_balls(sheet, bodies, shade, projection)]
     painted.sort(key=lambda one: depth[one[0]])
     style: dict[str, Any] = {"linewidths": 0.6 * outline, "zorder": zorder}
     if painted:
@@ -74,35 +78,34 @@ def _draw_solids(
         sheet.axes.add_collection(PolyCollection(polygons, facecolors=fill, edgecolors=edge, **style))
 
 
-def _seen_faces(bodies: Shapes, shade: Floats, projection: Projection) -> Iterator[Painted]:
+def _painted_faces(bodies: Figures, shade: Floats, projection: Projection) -> Iterator[Painted]:
     """Each face that looks at the camera."""
-    rings, owner, normals = _seen_rings(bodies, projection)
-    squares = normals**2
-    dark = FACE_SHADE[(normals[:, 1] > 0.0).astype(int)]
-    share = (squares * dark).sum(axis=1) / squares.sum(axis=1)
-    colours = canvas.mixed(shade[owner], canvas.BACKGROUND, share)
-    for k, ring, colour in zip(owner.tolist(), projection.plane(rings)[0], colours, strict=True):
-        yield k, ring, colour, canvas.BACKGROUND
+    for group, seen, normals in _seen_faces(bodies, projection):
+        squares, owner = normals**2, bodies.rows(group)[seen]
+        dark = FACE_SHADE[(normals[:, 1] > 0.0).astype(int)]
+        share = (squares * dark).sum(axis=1) / squares.sum(axis=1)
+        colours = canvas.mixed(shade[owner], canvas.BACKGROUND, share)
+        for k, ring, colour in zip(owner.tolist(), projection.plane(group.points[seen])[0], colours, strict=True):
+            yield k, ring, colour, canvas.BACKGROUND
 
 
-def _seen_balls(sheet: Sheet, bodies: Shapes, shade: Floats, projection: Projection) -> Iterator[Painted]:
+def _painted_balls(sheet: Sheet, bodies: Figures, shade: Floats, projection: Projection) -> Iterator[Painted]:
     """Balls and capsules: each with its spots, if it spins, and a highlight."""
-    places, magnification, _ = projection.plane(bodies.centre)
-    radii, spins = bodies.rounding * magnification, np.isfinite(bodies.axes).all(axis=(1, 2)) & bodies.round
     circle = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
     light, spots = (canvas.mixed(shade, *other) for other in (("#ffffff", 0.35), (canvas.PANEL, 0.6)))
-    for k in np.flatnonzero(bodies.faceless).tolist():
-        if bodies.round[k]:
-            outer, inner = places[k] + radii[k] * circle, places[k] + 0.35 * radii[k] * circle
-        else:
-            ends, _, _ = projection.plane(bodies.centre[k] + bodies.corners[k])
-            outer, inner = rounded(ends, radii[k], 20), rounded(ends, 0.35 * radii[k], 20)
-        yield k, outer, shade[k], canvas.BACKGROUND
-        if spins[k] and radii[k] * sheet.points > OUTLINED:
-            toward = projection.camera - bodies.centre[k]
-            for spot in _spots(bodies.axes[k], toward / np.linalg.norm(toward)):
-                yield k, projection.plane(bodies.centre[k] + bodies.rounding[k] * spot)[0], spots[k], spots[k]
-        yield k, inner + radii[k] * np.array((-0.3, 0.33)), light[k], light[k]
+    for group in (*bodies.circles, *bodies.capsules):
+        ball, owner = isinstance(group, Circles), bodies.rows(group)
+        ends = projection.plane(group.centre[:, None] if isinstance(group, Circles) else group.ends)[0]
+        middle = group.centre if isinstance(group, Circles) else group.ends.mean(axis=1)
+        radii = group.radius * projection.plane(middle)[1]
+        for i, (k, radius) in enumerate(zip(owner.tolist(), radii, strict=True)):
+            inner, outer = ((ends[i] + r * circle if ball else rounded(ends[i], r)) for r in (0.35 * radius, radius))
+            yield k, outer, shade[k], canvas.BACKGROUND
+            if isinstance(group, Circles) and np.isfinite(group.angle[i]).all() and radius * sheet.points > OUTLINED:
+                toward = projection.camera - group.centre[i]
+                for spot in _spots(group.angle[i], toward / np.linalg.norm(toward)):
+                    yield k, projection.plane(group.centre[i] + group.radius[i] * spot)[0], spots[k], spots[k]
+            yield k, inner + radius * np.array((-0.3, 0.33)), light[k], light[k]
 
 
 def _spots(axes: Floats, toward: Floats) -> Iterator[Floats]:
@@ -118,17 +121,12 @@ def _spots(axes: Floats, toward: Floats) -> Iterator[Floats]:
                 yield np.where(ahead[:, None] > 0.0, circle, level)
 
 
-def _seen_rings(shapes: Shapes, projection: Projection) -> tuple[Floats, NDArray[np.int64], Floats]:
-    """Of the faces that look at the camera the corners around them in the world, (f, k, 3), the rows of their shapes,
-    (f,), and vectors along their normals, (f, 3)."""
-    solids = zip(shapes.centre, shapes.corners, shapes.faces, strict=True)
-    found = [ring for centre, corners, faces in solids for ring in centre + corners[faces]]
-    most = max(map(len, found), default=3)
-    rings = padded(found, most).reshape(-1, most, 3)
-    owner = np.repeat(np.arange(len(shapes.faces)), [len(faces) for faces in shapes.faces])
-    normals = np.cross(rings, np.roll(rings, -1, axis=1)).sum(axis=1)
-    seen = ((projection.camera - rings[:, 0]) * normals).sum(axis=1) > 0.0
-    return rings[seen], owner[seen], normals[seen]
+def _seen_faces(shapes: Figures, projection: Projection) -> Iterator[tuple[Polygons, NDArray[np.bool_], Floats]]:
+    """Groups of faces, which of each look at the camera, and vectors along the normals of these, (f, 3)."""
+    for group in shapes.polygons:
+        normals = np.cross(group.points, np.roll(group.points, -1, axis=1)).sum(axis=1)
+        seen = ((projection.camera - group.points[:, 0]) * normals).sum(axis=1) > 0.0
+        yield group, seen, normals[seen]
 
 
 def draw_contacts(sheet: Sheet, points: Floats, normals: Floats, diameter: float, projection: Projection) -> bool:
@@ -145,15 +143,15 @@ def draw_contacts(sheet: Sheet, points: Floats, normals: Floats, diameter: float
     return True
 
 
-def draw_joints(sheet: Sheet, ends: Floats, projection: Projection) -> None:
-    """A line between both anchors (n, 2, d) of each joint, with a dot at either."""
-    places, _, _ = projection.plane(ends)
+def draw_joints(sheet: Sheet, lines: Lines, projection: Projection) -> None:
+    """A line between both anchors of each joint, with a dot at either."""
+    places, _, _ = projection.plane(lines.points)
     _lines(sheet, list(places), colors=canvas.MUTED, linewidths=1.2, zorder=3.5)
     dots = places.reshape(-1, 2)
     sheet.axes.plot(dots[:, 0], dots[:, 1], "o", color=canvas.MUTED, ms=2.0, mew=0, zorder=3.5)
 
 
-def draw_arrows(sheet: Sheet, bodies: Shapes, velocity: Floats, projection: Projection, top_speed: float) -> float:
+def draw_arrows(sheet: Sheet, bodies: Figures, projection: Projection, top_speed: float) -> float:
     """Velocity arrows of the visible bodies; returns how many seconds an arrow stands for (0: none)."""
     start, _, depth = projection.plane(bodies.centre)
     x, y = sheet.axes.get_xlim(), sheet.axes.get_ylim()
@@ -168,7 +166,7 @@ def draw_arrows(sheet: Sheet, bodies: Shapes, velocity: Floats, projection: Proj
     extent = max(x[1] - x[0], y[1] - y[0])
     wanted = float(np.clip(1.6 * bodies.typical_diameter, 0.018 * extent, 0.07 * extent))
     seconds = _round_number(wanted / top_speed)
-    end, _, _ = projection.plane(bodies.centre[chosen] + seconds * velocity[chosen])
+    end, _, _ = projection.plane(bodies.centre[chosen] + seconds * bodies.velocity[chosen])
     way = end - start[chosen]
     sheet.axes.quiver(
         start[chosen, 0], start[chosen, 1], way[:, 0], way[:, 1], angles="xy", scale_units="xy", scale=1,
@@ -197,29 +195,28 @@ def draw_paths(sheet: Sheet, positions: Floats, colours: Floats, projection: Pro
     _lines(sheet, list(segments[drawn]), colors=rgba[drawn], linewidths=width[drawn], capstyle="butt", zorder=2.5)
 
 
-def _draw_flat(sheet: Sheet, shapes: Shapes, colours: Floats, edge: str, outline: float, zorder: float) -> None:
-    discs, boxes = shapes.where(shapes.round), shapes.where(~shapes.round)
+def _draw_flat(sheet: Sheet, shapes: Figures, colours: Floats, edge: str, outline: float, zorder: float) -> None:
     style: dict[str, Any] = {"edgecolors": edge, "linewidths": outline, "zorder": zorder}
-    if len(discs.entity):
-        _ellipses(sheet, discs.centre, 2 * discs.half[:, 0], facecolors=colours[shapes.round], **style)
-        _draw_hands(sheet, discs, colours[shapes.round, 3], zorder)
-    if len(boxes.entity):
-        around = zip(boxes.centre, boxes.corners, boxes.rounding, boxes.faces, strict=True)
-        pieces = [centre + (corners[faces] if len(faces) else rounded(corners, rounding)[None])
-                  for centre, corners, rounding, faces in around]  # fmt: skip
-        fill = np.repeat(colours[~shapes.round], [len(some) for some in pieces], axis=0)
-        polygons = [piece for some in pieces for piece in some]
+    for discs in shapes.circles:
+        own = colours[shapes.rows(discs)]
+        _ellipses(sheet, discs.centre, 2 * discs.radius, facecolors=own, **style)
+        _draw_hands(sheet, discs, own[:, 3], zorder)
+    groups = [*shapes.polygons, *shapes.lines]
+    if groups:
+        polygons = [polygon for group in groups for polygon in group.points]
+        fill = np.concatenate([colours[shapes.rows(group)] for group in groups])
         sheet.axes.add_collection(PolyCollection(polygons, facecolors=fill, **style))
 
 
-def _draw_hands(sheet: Sheet, discs: Shapes, opacity: Floats, zorder: float) -> None:
+def _draw_hands(sheet: Sheet, discs: Circles, opacity: Floats, zorder: float) -> None:
     """A line from the centre to the rim of each that spins, to see how far it has turned."""
-    spins = np.isfinite(discs.axes).all(axis=(1, 2)) & (2 * discs.rounding * sheet.points > OUTLINED)
+    spins = np.isfinite(discs.angle) & (2 * discs.radius * sheet.points > OUTLINED)
     if spins.any():
         some = discs.where(spins)
-        colours = to_rgba_array(np.full(len(some.entity), canvas.PANEL), opacity[spins])
-        widths = np.clip(0.14 * some.rounding * sheet.points, 0.8, 3.0)
-        hands = list(np.stack([some.centre, some.centre + some.rounding[:, None] * some.axes[:, :, 0]], axis=1))
+        colours = to_rgba_array(np.full(len(some), canvas.PANEL), opacity[spins])
+        widths = np.clip(0.14 * some.radius * sheet.points, 0.8, 3.0)
+        ways = some.radius[:, None] * np.stack([np.cos(some.angle), np.sin(some.angle)], axis=1)
+        hands = list(np.stack([some.centre, some.centre + ways], axis=1))
         _lines(sheet, hands, colors=colours, linewidths=widths, capstyle="butt", zorder=zorder)
 
 

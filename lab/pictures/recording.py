@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from ...drawing import Drawing
 from ...framework import World
-from ..measure.body_shapes import QUIET, Floats, Shapes, shapes_of
+from ..measure.bodies import QUIET
 from ..measure.run import Run
 from . import canvas
 from .canvas import Sheet
 from .marks import draw_bodies, draw_joints, draw_walls
 from .projection import Projection
-from .run_pictures import DRAWABLE, Still, find_view, joints_of
+from .run_pictures import Still, find_view
 
 KINDS = (".gif", ".webp")
 RATE = 20  # frames per simulated second
@@ -25,33 +26,34 @@ DPI = 50
 
 
 class Recording:
-    """Keeps the shapes and joints of every ``every``-th step of ``world``; :meth:`save` draws them."""
+    """Keeps what is drawn of every ``every``-th step of ``world``; :meth:`save` draws them."""
 
     def __init__(self, world: World, steps: int) -> None:
         dt = world.settings.dt
-        self.world = world
+        self.drawing = Drawing(world)
         self.every = max(1, round(1 / (RATE * dt)), -(-steps // MOST_FRAMES))
         self.milliseconds = 1000 * self.every * dt
-        self.frames: list[tuple[Shapes, Floats]] = []
+        self.frames: list[Still] = []
         self.after_step(0)
 
     def after_step(self, done: int) -> None:
         if done % self.every == 0:
-            self.frames.append((shapes_of(self.world), joints_of(self.world)))
+            self.frames.append(Still.of(self.drawing))
 
     @QUIET
     def save(self, run: Run, file: Path, view: Any, drawn: Callable[[int], None]) -> Path:
         """Write ``file``; ``drawn`` is called with the number of frames done."""
-        ends = find_view(Still.of(run), run.traces) if view is None else view
+        ends = find_view(Still.of(self.drawing), run.traces) if view is None else view
         projection = Projection.of(*(np.asarray(end, float) for end in ends))
-        norm = canvas.speed_norm(np.concatenate([shapes.speed[~shapes.static] for shapes, _ in self.frames]))
+        speeds = [still.shapes.speed[~still.shapes.static] for still in self.frames]
+        norm = canvas.speed_norm(np.concatenate(speeds))
         images = []
-        for shapes, joints in self.frames:
+        for still in self.frames:
             sheet = Sheet.new(run.report.scene, "", projection.frame(), numbered=False)
-            bodies = shapes.where(~shapes.static & (np.abs(shapes.centre) < DRAWABLE).all(axis=1))
-            draw_walls(sheet, shapes.where(shapes.static), projection)
+            bodies = still.shapes.where(still.moving)
+            draw_walls(sheet, still.shapes.where(still.shapes.static), projection)
             draw_bodies(sheet, bodies, canvas.SPEED(norm(bodies.speed)), projection)
-            draw_joints(sheet, joints, projection)
+            draw_joints(sheet, still.joints, projection)
             images.append(Image.fromarray(sheet.pixels(DPI)))
             drawn(len(images))
         file.parent.mkdir(parents=True, exist_ok=True)

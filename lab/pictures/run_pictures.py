@@ -10,15 +10,15 @@ import numpy as np
 from matplotlib.colors import to_rgba_array
 
 from ...components.part_of import PartOf
-from ...framework import World
-from ...plugins.joints import Joints
+from ...drawing import Drawing, Lines, Style
 from ...systems.shapes.rotation import axes_of
-from ..measure.body_shapes import QUIET, Floats, Shapes, dimensions_of, shapes_of
+from ..measure.bodies import QUIET, Floats
 from ..measure.paths import Traces
 from ..measure.run import Run
 from ..reporting.text import counted
 from . import canvas
 from .canvas import Sheet
+from .figures import Figures
 from .marks import draw_arrows, draw_bodies, draw_contacts, draw_joints, draw_paths, draw_walls
 from .projection import Projection
 
@@ -31,38 +31,23 @@ HUGE = 5.0  # times the extent of everything smaller: such static bodies are cli
 
 @dataclass(frozen=True)
 class Still:
-    """What is drawn, as arrays: all colliders, their velocities (n, d), contact points, normals (m, d), and both ends
-    of the joints (k, 2, d)."""
+    """What is drawn of a moment."""
 
-    shapes: Shapes
-    velocity: Floats
-    points: Floats
-    normals: Floats
-    joints: Floats
+    shapes: Figures
+    joints: Lines
+    contacts: Lines  # from each point along its normal
 
     @classmethod
-    def of(cls, run: Run) -> Still:
-        """The final state of ``run``."""
-        world, d = run.world, run.report.dimensions
-        shapes = shapes_of(world)
-        ids = np.asarray(world.bodies.entity)
-        order = np.argsort(ids, kind="stable")
-        row = order[np.minimum(np.searchsorted(ids, shapes.entity, sorter=order), max(len(ids) - 1, 0))]
-        velocity = np.asarray(world.bodies.linear_velocity)[row] if len(ids) else np.zeros((0, d))
-        contacts = world.contacts
-        points, normals = (np.array(c, float).reshape(-1, d) for c in (contacts.point, contacts.normal))
-        return cls(shapes, velocity, points, normals, joints_of(world))
+    def of(cls, drawing: Drawing) -> Still:
+        """The present state of the world."""
+        shown = drawing.update(contacts=True, interpolated=False)
+        lines = (shown.lines_of(style) for style in (Style.JOINT, Style.NORMAL))
+        return cls(Figures.of(drawing.world, shown), *lines)
 
     @property
     def moving(self) -> np.ndarray:
-        """True for shapes that can be drawn as bodies."""
+        """True for bodies that can be drawn as such."""
         return ~self.shapes.static & (np.abs(self.shapes.centre) < DRAWABLE).all(axis=1)
-
-
-def joints_of(world: World) -> Floats:
-    """Both ends of the joints, (k, 2, d)."""
-    ends = [np.stack(one.anchors(), axis=1) for one in world.plugins if isinstance(one, Joints)]
-    return np.concatenate([np.zeros((0, 2, dimensions_of(world))), *ends])
 
 
 @QUIET
@@ -71,7 +56,7 @@ def draw_run(run: Run, out: Path, view: Any = None) -> list[Path]:
 
     An ``out`` that ends in .png is a file for the paths alone.
     """
-    still = Still.of(run)
+    still = Still.of(Drawing(run.world))
     ends = find_view(still, run.traces) if view is None else view
     projection = Projection.of(*(np.asarray(end, float) for end in ends))
     frame = projection.frame()
@@ -99,17 +84,19 @@ def find_view(still: Still, traces: Traces) -> tuple[Floats, Floats]:
     if traces.positions.size:
         points = traces.positions.reshape(-1, d)
         paths = points[np.isfinite(points).all(axis=1)].astype(float)
-        size = moving.half.max(axis=0) if len(moving.entity) else np.zeros(d)
+        size = (moving.upper - moving.lower).max(axis=0) / 2 if len(moving.entity) else np.zeros(d)
         lows.append(paths - size)
         highs.append(paths + size)
     low, high = np.concatenate(lows), np.concatenate(highs)
     if not len(low):
-        smallest = shapes.where(np.argsort(shapes.half.max(axis=1), kind="stable")[:1])
-        low, high = (smallest.lower, smallest.upper) if len(shapes.entity) else (np.zeros((1, d)), np.ones((1, d)))
+        smallest = np.argsort(shapes.extent, kind="stable")[:1]
+        low, high = shapes.lower[smallest], shapes.upper[smallest]
+    if not len(low):
+        low, high = np.zeros((1, d)), np.ones((1, d))
     lower, upper = low.min(axis=0), high.max(axis=0)
     fixed = shapes.where(shapes.static & (np.abs(shapes.centre) < DRAWABLE).all(axis=1))
-    for k in np.argsort(fixed.half.max(axis=1), kind="stable"):  # smallest first
-        if 2 * fixed.half[k].max() <= HUGE * float((upper - lower).max()):
+    for k in np.argsort(fixed.extent, kind="stable"):  # smallest first
+        if fixed.extent[k] <= HUGE * float((upper - lower).max()):
             lower, upper = np.minimum(lower, fixed.lower[k]), np.maximum(upper, fixed.upper[k])
     room = 0.12 * max(float((upper - lower).max()), 1e-9)
     near_low, near_high = lower - 2 * room, upper + 2 * room
@@ -123,20 +110,22 @@ def find_view(still: Still, traces: Traces) -> tuple[Floats, Floats]:
 def draw_final(run: Run, still: Still, projection: Projection, frame: canvas.View) -> Sheet:
     """All shapes to scale, coloured by speed, with velocities and contacts."""
     report, shapes = run.report, still.shapes
-    bodies, velocity = shapes.where(still.moving), still.velocity[still.moving]
+    bodies = shapes.where(still.moving)
     norm = canvas.speed_norm(bodies.speed)
     kinds = [f"{report.bodies[kind]:,} {kind}" for kind in ("dynamic", "kinematic") if report.bodies[kind]]
     subtitle = (
         f"{' and '.join(kinds) or 'no moving'} bodies after {report.simulated_seconds:.4g} s "
-        f"({counted(report.steps, 'step')})   ·   {counted(len(still.points), 'contact')}   ·   "
+        f"({counted(report.steps, 'step')})   ·   {counted(len(still.contacts), 'contact')}   ·   "
         f"{report.settings['integrator']}"
     )
     sheet = Sheet.new(report.scene, subtitle, frame, numbered=projection.flat)
     draw_walls(sheet, shapes.where(shapes.static), projection)
     draw_bodies(sheet, bodies, canvas.SPEED(norm(bodies.speed)), projection)
     draw_joints(sheet, still.joints, projection)
-    drawn = draw_contacts(sheet, still.points, still.normals, bodies.typical_diameter, projection)
-    seconds = draw_arrows(sheet, bodies, velocity, projection, float(norm.vmax or 1.0))
+    points, ends = still.contacts.points[:, 0], still.contacts.points[:, 1]
+    normals = (ends - points) / np.linalg.norm(ends - points, axis=1, keepdims=True)
+    drawn = draw_contacts(sheet, points, normals, bodies.typical_diameter, projection)
+    seconds = draw_arrows(sheet, bodies, projection, float(norm.vmax or 1.0))
     legend = [(r"$\rightarrow$", canvas.TEXT, f"the way in {seconds:.2g} s")] if seconds else []
     sheet.legend([*legend, *[("o", canvas.CONTACT, "contact")] * drawn])
     sheet.speed_scale(norm)
@@ -178,7 +167,7 @@ def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.Vi
     return sheet
 
 
-def _draw_ghosts(sheet: Sheet, traces: Traces, followed: Shapes, colours: Floats, projection: Projection) -> None:
+def _draw_ghosts(sheet: Sheet, traces: Traces, followed: Figures, colours: Floats, projection: Projection) -> None:
     """The shapes at equal time intervals along the path."""
     positions = traces.positions
     when = np.unique(np.linspace(0, len(positions) - 1, GHOSTS).round().astype(int))[:-1]

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...framework import Contact, Phase, System, World
 from ...framework.typing import Integers
-from ..measure.body_shapes import Floats, overlaps_of, sizes_of
+from ..measure.bodies import Floats, overlaps_of, sizes_of
 
 
 class Conserved:

@@ -10,7 +10,7 @@ import numpy as np
 from ...components import AABBCollider, RigidBody, SphereCollider, Transform
 from ...framework import Settings, World
 from ...plugins import Physics
-from ..measure.body_shapes import Floats
+from ..measure.bodies import Floats
 
 FLOOR_HALF = (1e3, 0.5, 1e3)
 

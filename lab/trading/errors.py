@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..cli.usage_errors import Problem, did_you_mean
-from ..measure.body_shapes import apart
+from ..measure.bodies import apart
 from ..measure.observer import BLEW_UP, NOT_FINITE, TUNNELLED, RunResult, mean_of
 from ..reporting.text import metres
 from .grid import STILL, Facts

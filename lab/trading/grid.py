@@ -21,7 +21,7 @@ from ..cli.loading import stdout_kept_clean
 from ..cli.usage_errors import Problem
 from ..inputs import forget_asked, times_asked
 from ..jobs import Jobs
-from ..measure.body_shapes import QUIET, apart, size_of, sizes_of
+from ..measure.bodies import QUIET, apart, size_of, sizes_of
 from ..measure.observer import ESCAPED, STOPPED, Observer, RunResult, step_lengths
 from ..measure.timing import faults_in_results, timed
 from .subject import Subject

@@ -14,6 +14,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from PIL import Image
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.drawing import Drawing
 from carom.framework import Settings, World
 from carom.lab.measure.run import FEW_BODIES, FEW_STEPS, run
 from carom.lab.pictures.projection import Projection
@@ -195,7 +196,7 @@ def colours_of(sheet):
 def final_sheet(world, steps, lower, upper):
     done = run(world, steps)
     projection = Projection.of(np.asarray(lower, float), np.asarray(upper, float))
-    return draw_final(done, Still.of(done), projection, projection.frame()), projection
+    return draw_final(done, Still.of(Drawing(world)), projection, projection.frame()), projection
 
 
 def final_picture(world, steps, lower, upper):
@@ -271,7 +272,7 @@ def test_the_repeated_shapes_of_a_path_are_turned_as_they_were():
         world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(1, 0)), Spin(-1.0), SphereCollider(1.0))
         done = run(world, 180)
         projection = Projection.of(np.array((-2.0, -2.0)), np.array((6.0, 2.0)))
-        sheet = draw_traces(done, Still.of(done), projection, projection.frame())
+        sheet = draw_traces(done, Still.of(Drawing(world)), projection, projection.frame())
     hands = [
         line for part in sheet.axes.collections if isinstance(part, LineCollection) for line in part.get_segments()
     ]

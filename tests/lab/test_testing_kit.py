@@ -13,7 +13,7 @@ from worlds import both_dimensions
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Phase, System
 from carom.lab import testing as kit
-from carom.lab.measure.body_shapes import overlaps_of
+from carom.lab.measure.bodies import overlaps_of
 from carom.plugins.half_space import HalfSpaceCollider
 from carom.plugins.half_space import plugin as half_space
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from carom.framework import World
-from carom.lab.measure.body_shapes import Floats, state_by_id
+from carom.lab.measure.bodies import Floats, state_by_id
 from carom.lab.measure.observer import RunResult
 from carom.lab.testing.predict import bounce_times, collide, free_flight, impact_time, orbit_speed, spring
 
