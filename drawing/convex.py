@@ -28,17 +28,26 @@ def faces_around(points: Floats) -> Outline:
         normal = np.cross(*(points[faces[0, 1:]] - points[faces[0, 0]]))
         ring = around(points, normal)
         return Outline(points, (ring, ring[::-1]))
+    normals, heights = _planes(points, faces)
     for k in range(len(points)):
-        corners = points[faces]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        sees = ((points[k] - corners[:, 0]) * normals).sum(axis=1) > FLAT * size
+        sees = normals @ points[k] > heights + FLAT * size
         if not sees.any():
             continue
-        edges = {(int(a), int(b)) for face in faces[sees] for a, b in zip(face, np.roll(face, -1), strict=True)}
-        rim = sorted((a, b) for a, b in edges if (b, a) not in edges)
-        faces = np.concatenate((faces[~sees], [(a, b, k) for a, b in rim]))
+        rings = faces[sees]
+        edges = set(zip(rings.ravel().tolist(), np.roll(rings, -1, axis=1).ravel().tolist(), strict=True))
+        fresh = np.array(sorted((a, b, k) for a, b in edges if (b, a) not in edges))
+        planes = _planes(points, fresh)
+        faces = np.concatenate((faces[~sees], fresh))
+        normals, heights = np.concatenate((normals[~sees], planes[0])), np.concatenate((heights[~sees], planes[1]))
     return Outline(points, tuple(faces))
+
+
+def _planes(points: Floats, faces: np.ndarray) -> tuple[Floats, Floats]:
+    """The unit normals of triangles, (f, 3), and how far along these they lie, (f,)."""
+    a, b, c = points[faces].transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+    return normals, (a * normals).sum(axis=1)
 
 
 def _first_faces(points: Floats, size: float) -> np.ndarray | None:

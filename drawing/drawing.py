@@ -12,7 +12,7 @@ from ..framework import World
 from .library import Library
 from .lists import DrawingList, Floats, Style
 from .overlays import box_lines, contact_marks, joint_marks, velocity_lines
-from .shapes import Places, parts_of, shapes_at, watched_of
+from .shapes import Places, arrays_of, parts_of, shapes_at, watched_of
 
 KNOWN, SPARE = 1000, 4  # outlines that are kept for all that, and for each body: if more are known, all are made again
 
@@ -34,6 +34,7 @@ class Drawing:
         self._moving_seen: dict[str, np.ndarray] = {}
         self._fixed: Any = None
         self._fixed_seen: dict[str, np.ndarray] = {}
+        self._arrays_seen: dict[str, np.ndarray] = {}
         self._fixed_version = 0
         self._statics: Any = None
 
@@ -84,8 +85,9 @@ class Drawing:
                 self._library = Library(table.dimensions)
             self._moving = parts_of(world, self._library, rows)
             self._moving_seen = {key: column.copy() for key, column in now.items()}
-        statics = version, table.static_version, self._physics.state.statics_version
-        if statics != self._statics:
+        statics, arrays = (version, table.static_version, self._physics.state.statics_version), arrays_of(world, still)
+        if statics != self._statics or not _same(arrays, self._arrays_seen):
+            self._arrays_seen = {key: column.copy() for key, column in arrays.items()}
             now = watched_of(world, still) | {name: table.column(name)[still] for name in ("position", "rotation")}
             if self._fixed is None or not _same(now, self._fixed_seen):
                 self._fixed = shapes_at(parts_of(world, self._library, still), self._places(still, False))
@@ -112,9 +114,12 @@ class Drawing:
         return style
 
 
-def _same(one: dict[str, Floats], other: dict[str, Floats]) -> bool:
+def _same(now: dict[str, Floats], before: dict[str, Floats]) -> bool:
     """Whether these columns have the same bits."""
-    return one.keys() == other.keys() and all(
-        column.shape == other[key].shape and bool((column.view(np.uint8) == other[key].view(np.uint8)).all())
-        for key, column in one.items()
-    )
+    return now.keys() == before.keys() and all(_bits_same(now[key], before[key]) for key in now)
+
+
+def _bits_same(one: Floats, other: Floats) -> bool:
+    if one.shape != other.shape:
+        return False
+    return bool((np.ascontiguousarray(one).view(np.uint8) == other.view(np.uint8)).all())

@@ -60,6 +60,12 @@ class Polygons(Things):
     entity: Entities
     centre: Floats = field(default_factory=lambda: np.zeros((0, 2)))
 
+    def triangles(self) -> Floats:
+        """(n (k - 2), 3, d) m: triangles in place of them, k - 2 for each, one after the other."""
+        fan = np.arange(1, self.points.shape[1] - 1)
+        corners = np.stack((np.zeros_like(fan), fan, fan + 1), axis=1)
+        return self.points[:, corners].reshape(-1, 3, self.points.shape[2])
+
 
 @dataclass(frozen=True)
 class Circles(Things):

@@ -82,6 +82,15 @@ def watched_of(world: Any, rows: slice) -> dict[str, Any]:
     return found
 
 
+def arrays_of(world: Any, rows: slice) -> dict[str, Any]:
+    """Those of these columns that change with no version: a map has other cells."""
+    table = world.physics.table
+    return {
+        column.key: table.column(column.key)[rows]
+        for component in world.registry.shapes if component in table.mask_names for column in component._pooled
+    }  # fmt: skip
+
+
 def colliders_of(world: Any, library: Library, rows: slice, shapes: Iterable[Shape] | None = None) -> Colliders:
     """Those of the bodies of these rows, of all shapes or of some, one shape after the other."""
     table, d = world.physics.table, library.dimensions
