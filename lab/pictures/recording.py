@@ -49,12 +49,7 @@ class Recording:
         norm = canvas.speed_norm(np.concatenate(speeds))
         images = []
         for still in self.frames:
-            sheet = Sheet.new(run.report.scene, "", projection.frame(), numbered=False)
-            bodies = still.shapes.where(still.moving)
-            draw_walls(sheet, still.shapes.where(still.shapes.static), projection)
-            draw_bodies(sheet, bodies, canvas.SPEED(norm(bodies.speed)), projection)
-            draw_joints(sheet, still.joints, projection)
-            images.append(Image.fromarray(sheet.pixels(DPI)))
+            images.append(Image.fromarray(draw_frame(run.report.scene, still, projection, norm).pixels(DPI)))
             drawn(len(images))
         file.parent.mkdir(parents=True, exist_ok=True)
         if file.suffix.lower() == ".gif":
@@ -65,3 +60,13 @@ class Recording:
         packing: dict[str, Any] = {"quality": 45, "kmin": 200, "kmax": 400}  # of WebP: still parts are kept once
         first.save(file, save_all=True, append_images=others, duration=round(self.milliseconds), loop=0, **packing)
         return file
+
+
+def draw_frame(title: str, still: Still, projection: Projection, norm: Any) -> Sheet:
+    """All shapes to scale, coloured by speed."""
+    sheet = Sheet.new(title, "", projection.frame(), numbered=False)
+    bodies = still.shapes.where(still.moving)
+    draw_walls(sheet, still.shapes.where(still.shapes.static), projection)
+    draw_bodies(sheet, bodies, canvas.SPEED(norm(bodies.speed)), projection)
+    draw_joints(sheet, still.joints, projection)
+    return sheet

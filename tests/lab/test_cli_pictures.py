@@ -9,16 +9,19 @@ import helpers_cli
 import numpy as np
 import pytest
 from helpers_cli import refusal, report_of
+from helpers_drawing import Gem, users
 from helpers_processes import run_python
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import EllipseCollection, LineCollection, PolyCollection
 from PIL import Image
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.drawing import Drawing
+from carom.drawing import Drawing, Style
 from carom.framework import Settings, World
 from carom.lab.measure.run import FEW_BODIES, FEW_STEPS, run
+from carom.lab.pictures import canvas
 from carom.lab.pictures.projection import Projection
-from carom.lab.pictures.run_pictures import GHOSTS, Still, draw_final, draw_traces
+from carom.lab.pictures.recording import Recording, draw_frame
+from carom.lab.pictures.run_pictures import GHOSTS, Still, draw_final, draw_traces, find_view
 from carom.plugins import Physics, capsule, convex_hull, convex_polygon, half_space, tile_grid
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_hull import ConvexHullCollider
@@ -177,6 +180,63 @@ def test_longer_runs_and_larger_worlds_are_not_followed_step_by_step(bodies, ste
     world.close()
     assert traces.impacts is None
     np.testing.assert_array_equal(traces.corners, traces.positions)
+
+
+# -- one list for all ----------------------------------------------------------------------------------------------
+
+
+def marks_of(sheet):
+    """What matplotlib has of a sheet: polygons by their corners, ellipses by centre and width, lines; sorted."""
+    polygons, circles, lines = [], [], []
+    for one in sheet.axes.collections:
+        if isinstance(one, PolyCollection):
+            polygons += [path.vertices[:-1].ravel().tolist() for path in one.get_paths()]
+        elif isinstance(one, EllipseCollection):
+            circles += np.column_stack((one.get_offsets(), one.get_widths())).tolist()
+        elif isinstance(one, LineCollection):
+            lines += [line.ravel().tolist() for line in one.get_segments()]
+    return sorted(polygons), sorted(circles), sorted(lines)
+
+
+def test_pictures_and_recordings_draw_what_the_drawing_list_holds():
+    """Every polygon and circle of the list to the bit, and a joint, in the picture of the final state and in the last
+    frame of a recording."""
+    pentagon = ConvexPolygonCollider.regular(5, 0.5)
+    shapes = SphereCollider(0.5), BoxCollider((0.5, 0.2)), CapsuleCollider(0.2, 0.4), pentagon
+    plugins = Joints(), capsule.plugin, convex_polygon.plugin
+    with World(Physics(dimensions=2, gravity=(0.0, -10.0)), Rotation(), *plugins) as world:
+        for k in range(12):
+            body = () if k > 8 else (RigidBody(linear_velocity=(1.0, k)), Spin(0.3 * k))
+            world.create_entity(Transform((2.0 * k, 0.0), 0.4 * k), *body, shapes[k % 4].copy())
+        world.create_entity(Distance(1, 2))
+        drawing = Drawing(world)
+        done = run(world, 5)
+        recording, still = Recording(world, 1), Still.of(drawing)
+        shown = drawing.update(interpolated=False)
+        projection = Projection.of(*find_view(still, done.traces))
+        sheets = [
+            draw_final(done, still, projection, projection.frame()),
+            draw_frame("", recording.frames[-1], projection, canvas.speed_norm(np.ones(1))),
+        ]
+        groups = (*shown.polygons, *shown.fixed)
+        polygons = sorted(points.ravel().tolist() for group in groups for points in group.points)
+        discs = shown.circles, shown.fixed_circles
+        circles = sorted(row for each in discs for row in np.column_stack((each.centre, 2 * each.radius)).tolist())
+        (joint,) = shown.lines_of(Style.JOINT).points
+        assert (len(polygons), len(circles)) == (9, 3)
+        for sheet in sheets:
+            found = marks_of(sheet)
+            assert found[:2] == (polygons, circles)
+            assert joint.ravel().tolist() in found[2]
+
+
+def test_the_shape_of_a_user_is_drawn():
+    """A diamond that says nothing of what it looks like, from a plugin of a game."""
+    with World(Physics(dimensions=2, gravity=(0.0, 0.0)), users) as world:
+        world.create_entity(Transform((0, 0)), RigidBody(), Gem(1.0))
+        colour_at = final_picture(world, 0, (-2, -2), (2, 2))
+    for place, seen in (((0.0, 0.9), True), ((0.45, 0.45), True), ((0.55, 0.55), False), ((-0.9, 0.2), False)):
+        assert (np.abs(colour_at(place) - colour_at((-1.9, -1.9))).max() > 50) == seen, place
 
 
 # -- what turns ----------------------------------------------------------------------------------------------------
