@@ -1,1 +1,27 @@
-"""A window on a world: it is shown, stopped, taken apart, and recorded."""
+"""A window on a world: it is shown, stopped, taken apart, and recorded.
+
+>>> from carom.view import Camera, Sprites, View
+>>> View(world).run()
+
+``Camera`` needs numpy alone; the others load pygame-ce when they are first used.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .camera import Camera as Camera
+    from .sprites import Sprites as Sprites
+
+_MODULES = {"Camera": "camera", "Sprites": "sprites"}
+__all__ = ["Camera", "Sprites"]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _MODULES:
+        raise AttributeError(f"module 'carom.view' has no attribute {name!r}")
+    import importlib
+
+    value = globals()[name] = getattr(importlib.import_module(f".{_MODULES[name]}", __name__), name)
+    return value
