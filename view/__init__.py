@@ -12,10 +12,16 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .camera import Camera as Camera
+    from .packages import MissingPackageError as MissingPackageError
     from .sprites import Sprites as Sprites
+    from .window import DisplayError as DisplayError
+    from .window import View as View
 
-_MODULES = {"Camera": "camera", "Sprites": "sprites"}
-__all__ = ["Camera", "Sprites"]
+_MODULES = {
+    "Camera": "camera", "DisplayError": "window", "MissingPackageError": "packages", "Sprites": "sprites",
+    "View": "window",
+}  # fmt: skip
+__all__ = ["Camera", "DisplayError", "MissingPackageError", "Sprites", "View"]
 
 
 def __getattr__(name: str) -> object:

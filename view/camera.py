@@ -143,3 +143,18 @@ def _pair(value: Any, name: str) -> Floats:
     if pair.shape != (2,) or not np.isfinite(pair).all():
         raise ValueError(f"Camera.{name} must be two finite numbers, got {value!r}")
     return pair
+
+
+FAR = 1e4  # m: half-spaces have no end, and decide nothing
+
+
+def corners_of(shown: Any, positions: Floats) -> tuple[Floats, Floats] | None:
+    """The lower and the upper corner (d,) m of a drawing list and of bodies (n, d) m; None where there is nothing."""
+    some = [positions]
+    for group in (*shown.polygons, *shown.fixed, *shown.lines, *shown.fixed_lines):
+        some.append(group.points.reshape(-1, positions.shape[1]))
+    for circles in (shown.circles, shown.fixed_circles):
+        some += [circles.centre - circles.radius[:, None], circles.centre + circles.radius[:, None]]
+    points = np.concatenate(some)
+    points = points[(np.abs(points) < FAR).all(axis=1)]
+    return (points.min(axis=0), points.max(axis=0)) if len(points) else None

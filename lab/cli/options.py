@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import math
 import os
 from collections.abc import Callable, Mapping
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import click
 
 from ...framework import Settings
+from ...view.entered import value_of
 from .usage_errors import Problem, one_line
 
 Option = Callable[[Any], Any]
@@ -26,19 +25,6 @@ def together(*options: Option) -> Option:
 
 
 # -- types of values --------------------------------------------------------------------------------------
-
-
-VALUES = {"true": True, "false": False, "none": None}
-
-
-def value_of(text: str) -> Any:
-    """A number, of which 1/120 is an exact one, or true, false or none; else the word itself."""
-    text = text.strip()
-    for kind in (int, float, Fraction):
-        with contextlib.suppress(ValueError, ZeroDivisionError):
-            number = kind(text)
-            return float(number) if kind is Fraction else number
-    return VALUES.get(text.lower(), text)
 
 
 class Real(click.FloatRange):
