@@ -23,7 +23,6 @@ from .packages import package
 TINY = 3.0  # pixels: up to this size a shape is a square
 EDGED = 7.0  # pixels: from this size on a shape has an edge
 ROUND = 10  # corners: an outline of so many is round, and may lose some
-CORNER = 6.0  # pixels of the outline for each corner that is kept
 LARGEST_DISC = 64.0  # pixels of radius, of discs that are kept as pictures
 MOST_DISCS = 4096
 FAR = 8000.0  # pixels: shapes that reach beyond are cut
@@ -234,7 +233,6 @@ def _by_detail(extent: Any, kept: Any, corners: int) -> list[tuple[int, Any]]:
     """Every how many-th corner is drawn, and of which shapes: round ones of few pixels do with fewer."""
     if corners < ROUND:
         return [(1, np.flatnonzero(kept))]
-    enough = np.clip(3.0 * extent / CORNER, 6.0, corners)  # a little less than the circumference
-    step = np.maximum(corners // enough, 1.0)
-    step = 2 ** np.floor(np.log2(step)).astype(np.int64)  # few kinds
+    enough = 2.0 + 1.8 * np.sqrt(extent)  # then an arc is half a pixel off
+    step = np.clip(np.rint(corners / enough), 1, corners // 6).astype(np.int64)
     return [(int(one), np.flatnonzero(kept & (step == one))) for one in np.unique(step[kept])]

@@ -142,10 +142,14 @@ class View:
         os.environ.setdefault("SDL_FRAMEBUFFER_ACCELERATION", "0")  # else a frame is drawn by OpenGL, also in software
         try:
             pygame.display.init()  # not pygame.init(): that opens the sound card, too
+            driver = pygame.display.get_driver()
+            if driver == "offscreen" and os.environ.get("SDL_VIDEODRIVER") != driver:  # SDL's last resort
+                pygame.display.quit()
+                raise pygame.error("no screen was found")
             screen = pygame.display.set_mode(size, pygame.RESIZABLE)
         except pygame.error as error:
             raise DisplayError(
-                f"no display for a window ({error}); carom run SCENE --record FILE draws without one"
+                f"no display for a window: {error}; carom run SCENE --record FILE draws without one"
             ) from error
         pygame.display.set_caption(title)
         pygame.key.set_repeat(300, 40)
@@ -175,14 +179,19 @@ class View:
 
     # -- frames -----------------------------------------------------------------------------------
 
-    def run(self) -> None:
-        """Advance and show the world until the window is closed. What a step raises is shown, and time stands."""
-        for seconds in self:
+    def run(self, seconds: float = math.inf) -> None:
+        """Advance and show the world until the window is closed, or until so many ``seconds`` are simulated.
+
+        What a step raises is shown, and time stands.
+        """
+        for passed in self:
             try:
-                self.world.advance(seconds)
+                self.world.advance(passed)
             except (StepError, FaultError) as error:
                 self.paused = True
                 self.say(str(error), seconds=math.inf)
+            if self.world.time >= seconds:
+                self.close()
 
     def __iter__(self) -> Iterator[float]:
         try:

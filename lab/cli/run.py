@@ -12,16 +12,16 @@ import click
 import numpy as np
 from rich.console import Console
 
-from ...framework import Settings
+from ...framework import CaromError, Settings, World
 from ...framework.schedule.profile_report import Stats
 from ..measure.run import Drift, RunReport, run
 from ..plugins.command import plugin_named
 from ..reporting.output import drawing_if_there, drawing_module
 from ..reporting.progress import Progress
 from ..reporting.text import NOTHING, TextTable, counted, jsonable, number, values_text
-from .loading import load, stdout_kept_clean
+from .loading import Loaded, load, stdout_kept_clean
 from .options import NOT_NEGATIVE, Corners, View, json_option, traceback_option, world_options, writable_folder
-from .usage_errors import Problem
+from .usage_errors import Problem, one_line
 
 DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
 
@@ -36,8 +36,9 @@ DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
     help="The folder where pictures go, or a file for that of the paths: NAME.png.",
 )  # fmt: skip
 @click.option(
-    "--record", type=click.Path(path_type=Path), metavar="FILE", help="A picture that moves: NAME.gif or NAME.webp."
+    "--record", type=click.Path(path_type=Path), metavar="FILE", help="A film: NAME.gif, NAME.webp or NAME.mp4."
 )
+@click.option("--window", is_flag=True, help="Show it in a window instead, with tools that F1 lists there.")
 @click.option("--view", type=View(), metavar="X0,Y0,X1,Y1", help="What the pictures show: two corners.")
 @json_option
 @click.option("--no-pictures", is_flag=True, help="Draw nothing.")
@@ -45,15 +46,23 @@ DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
 @traceback_option
 def run_command(
     target: str, steps: int | None, seconds: float | None, settings: Settings | None, changes: dict[str, Any],
-    seed: int, plugins: tuple[str, ...], out: Path, record: Path | None, view: Corners | None, as_json: bool,
-    no_pictures: bool, profile: bool,
+    seed: int, plugins: tuple[str, ...], out: Path, record: Path | None, window: bool, view: Corners | None,
+    as_json: bool, no_pictures: bool, profile: bool,
 ) -> None:  # fmt: skip
     """Run a scene of the library, or a file that defines build(settings, seed=0), and show what happened."""
     if steps is not None and seconds is not None:
         raise Problem("--steps and --seconds exclude each other")
+    for name, given in (("--json", as_json), ("--profile", profile)):
+        if window and given:
+            raise Problem(f"--window and {name} exclude each other")
     added = [plugin_named(name) for name in plugins]
     loaded = load(target)
     view = view or loaded.view
+    if window:
+        world = loaded.build(settings, changes, seed, added)
+        _check_view(view, world, loaded)
+        _show(world, loaded, view, record, steps * world.settings.dt if steps is not None else seconds)
+        return
     # What is missing, or cannot be written, is told before a long run.
     pictures = None if no_pictures else drawing_if_there("pictures.run_pictures", "no pictures,")
     if pictures is not None:
@@ -65,8 +74,7 @@ def run_command(
         writable_folder(record.parent, record, "--record")
 
     world = loaded.build(settings, changes, seed, added)
-    if view is not None and len(view[0]) != world.dimensions:
-        raise Problem(f"{loaded.name}: view has {len(view[0])} dimensions, the world {world.dimensions}")
+    _check_view(view, world, loaded)
     if steps is None:
         steps = round((loaded.seconds or DEFAULT_SECONDS if seconds is None else seconds) / world.settings.dt)
     film = None if films is None else films.Recording(world, steps)
@@ -96,6 +104,34 @@ def run_command(
         click.echo(json.dumps(jsonable(report), indent=2, allow_nan=False))
         return
     print_report(report, finished.profile)
+
+
+def _check_view(view: Corners | None, world: World, loaded: Loaded) -> None:
+    if view is not None and len(view[0]) != world.dimensions:
+        raise Problem(f"{loaded.name}: view has {len(view[0])} dimensions, the world {world.dimensions}")
+
+
+def _show(world: World, loaded: Loaded, view: Corners | None, record: Path | None, seconds: float | None) -> None:
+    """In a window, until it is closed or so many seconds are simulated."""
+    try:
+        from ...view import Camera, View
+
+        camera = None
+        if view is not None and world.dimensions == 2:
+            camera = Camera()
+            camera.fit(*view)
+        with loaded.attribute_errors(), stdout_kept_clean():
+            View(world, camera=camera, title=f"carom: {loaded.name}", record=record).run(
+                math.inf if seconds is None else seconds
+            )
+    except CaromError as error:
+        raise Problem(one_line(error)) from error
+    milliseconds = world.stats().total
+    click.echo(f"{loaded.name}: {counted(world.step_count, 'step')}, {milliseconds:.3g} ms each")
+    for line in fault_lines(world.faults):
+        click.echo(f"! {line}")
+    if record is not None:
+        click.echo(f"film: {record}")
 
 
 # -- what happened, in tables ----------------------------------------------------------------------------
