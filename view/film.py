@@ -56,7 +56,8 @@ class Film:
 
     def add(self, surface: Any, seconds: float) -> None:
         """Show a pygame.Surface; ``seconds`` have passed since the last one, as many frames are added."""
-        self._due += min(seconds, LONGEST_FRAME) * self.rate
+        if self._size is not None:
+            self._due += min(seconds, LONGEST_FRAME) * self.rate
         count = int(self._due + 1e-6)
         self._due -= count
         if not count:

@@ -197,7 +197,7 @@ class View:
         try:
             while self.open and not self.world.closed:
                 self._make_ready()
-                seconds = self._begin()
+                seconds = self._begin() if self.open else 0.0
                 if not self.open:
                     break
                 yield seconds
@@ -238,6 +238,8 @@ class View:
                     elif event.type == self._pygame.VIDEORESIZE:
                         self._resize()
                 self._draw_progress(work)
+            if not self.open:
+                self._pygame.display.quit()  # before the kernel that compiles now has come to its end
         finally:
             work.stop()
         self._prepared_for = self.world.settings
@@ -309,7 +311,7 @@ class View:
         y = int(keys[pygame.K_DOWN]) - int(keys[pygame.K_UP])
         if x or y:
             self.following = False
-            self.camera.pan((x * PANNED * seconds, y * PANNED * seconds))
+            self.camera.pan((-x * PANNED * seconds, -y * PANNED * seconds))
 
     # -- events -----------------------------------------------------------------------------------
 
@@ -386,7 +388,7 @@ class View:
                 self.camera.zoom(ZOOM**event.y, self._at)
         elif event.type == pygame.MOUSEMOTION and event.buttons[2] and not self._panel.has(event.pos):
             self.following = False
-            self.camera.pan([-moved for moved in event.rel])
+            self.camera.pan(event.rel)
         elif event.type == pygame.MOUSEBUTTONDOWN and self._panel.has(event.pos):
             if event.button in (1, 3):
                 self._panel.click(event.pos, event.button)

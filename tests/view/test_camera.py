@@ -22,7 +22,9 @@ def test_pixels_lead_back_to_metres(y_up):
         up = camera.to_screen(points + np.array((0, 1 / scale))) - camera.to_screen(points)
         assert np.abs(up - (0, 1 if y_up else -1)).max() < 2 * rounding * scale
         low, high = camera.visible
-        assert sorted([*camera.to_screen(low), *camera.to_screen(high)]) == pytest.approx(sorted((0, 0, *camera.size)))
+        assert sorted([*camera.to_screen(low), *camera.to_screen(high)]) == pytest.approx(
+            sorted((0, 0, *camera.size)), abs=1e-6
+        )
 
 
 def test_zooming_keeps_what_is_under_the_mouse_and_fitting_shows_all():

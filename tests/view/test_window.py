@@ -1,0 +1,443 @@
+"""A window's keys and mouse, its overlays, and what may happen to a world below it."""
+
+import threading
+import time
+
+import numpy as np
+import pygame
+import pytest
+from helpers_view import Player
+
+from carom import (
+    AABBCollider,
+    CaromError,
+    Hinge,
+    Joints,
+    NoPhysicsError,
+    Physics,
+    RigidBody,
+    Rotation,
+    Settings,
+    SphereCollider,
+    Spin,
+    System,
+    Transform,
+    World,
+)
+from carom.framework.compilation import log
+from carom.view import DisplayError, Sprites, View
+from carom.view.packages import MissingPackageError, package
+
+
+def floor_and_ball(*plugins, settings=None):
+    """A ball on a floor, another that flies by; their ids."""
+    world = World(Physics(2, gravity=(0.0, -10.0)), *plugins, settings=settings)
+    world.create_entity(Transform((0.0, -0.5)), AABBCollider((8.0, 0.5), friction=0.5))
+    ball = world.create_entity(Transform((3.0, 0.5)), RigidBody(), SphereCollider(0.5, friction=0.5))
+    world.create_entity(Transform((-3.0, 4.0)), RigidBody(linear_velocity=(0.5, 0.0)), SphereCollider(0.3))
+    return world, ball
+
+
+@pytest.fixture
+def player():
+    world, ball = floor_and_ball()
+    made = Player(world)
+    made.world, made.ball = world, ball
+    yield made
+    made.view.close()
+    world.close()
+
+
+def brightness(view):
+    """(x, y, 3), without the line of text that counts frames."""
+    pixels = pygame.surfarray.array3d(view.screen).astype(int)
+    pixels[:, :22] = 0
+    return pixels
+
+
+# -- time ----------------------------------------------------------------------------------------
+
+
+def test_a_loop_gets_the_seconds_of_a_frame_and_none_while_time_stands(player):
+    view, world = player.view, player.world
+    assert player.frame() == pytest.approx(1 / 60)
+    player.frame(3)
+    steps = world.step_count
+    assert steps == 4
+    assert player.key(pygame.K_SPACE) == 0.0
+    assert view.paused
+    player.frame(3)
+    assert world.step_count == steps
+    player.key(pygame.K_PERIOD)
+    player.key(pygame.K_PERIOD)
+    assert world.step_count == steps + 2
+    player.key(pygame.K_SPACE)
+    player.key(pygame.K_MINUS)
+    assert player.key(pygame.K_MINUS) == pytest.approx(1 / 240)
+    player.key(pygame.K_0)
+    assert player.key(pygame.K_PLUS) == pytest.approx(1 / 30)
+    for _ in range(20):
+        player.key(pygame.K_PLUS)
+    assert view.speed == 8.0
+
+
+def test_back_in_time_and_forth(player):
+    world = player.world
+    player.frame(2)
+    hashes = {}
+    for _ in range(40):
+        player.frame()
+        hashes[world.step_count] = world.state_hash()
+    player.view._rewind._cost = 0.0
+    now = world.step_count
+    player.key(pygame.K_BACKSPACE)
+    player.key(pygame.K_BACKSPACE)
+    assert player.view.paused
+    assert 0 < world.step_count < now
+    assert world.state_hash() == hashes[world.step_count]
+    for _ in range(3):
+        player.key(pygame.K_BACKSPACE, mod=pygame.KMOD_SHIFT)
+    assert world.step_count == now
+    assert "present" in player.view.message
+
+
+def test_what_a_step_raises_is_shown_and_time_stands():
+    class Fails(System):
+        def process(self, dt):
+            if self.world.step_count == 3:
+                raise RuntimeError("three is too many")
+
+    world, _ = floor_and_ball()
+    world.add_system(Fails())
+    view = View(world, (320, 200), real_time=False)
+    seen = []
+
+    def look(_):
+        seen.append((view.message, view.paused))
+        if len(seen) > 8:
+            view.close()
+
+    view.above = look
+    view.run()
+    assert world.step_count == 3
+    assert "three is too many" in seen[-1][0]
+    assert seen[-1][1]
+    world.close()
+
+
+def test_run_ends_after_so_many_seconds():
+    world, _ = floor_and_ball()
+    View(world, (64, 64), real_time=False).run(0.25)
+    assert world.step_count == 15
+    assert not pygame.display.get_init()
+    world.close()
+
+
+# -- camera --------------------------------------------------------------------------------------
+
+
+def test_zoom_pan_follow_and_all_in_the_picture(player):
+    view = player.view
+    player.frame()
+    corners = view.camera.to_screen(np.array([(-8, -1), (8, 4.3)]))
+    assert ((corners >= 0) & (corners <= (640, 480))).all()
+    player.mouse(pygame.MOUSEMOTION, (100, 50), buttons=(0, 0, 0), rel=(0, 0))
+    under, scale = view.mouse, view.camera.scale
+    pygame.event.post(pygame.event.Event(pygame.MOUSEWHEEL, y=2, x=0))
+    player.frame()
+    assert view.camera.scale == pytest.approx(1.44 * scale)
+    assert view.mouse == pytest.approx(under)
+    player.mouse(pygame.MOUSEMOTION, (130, 40), buttons=(0, 0, 1), rel=(30, -10))
+    assert view.mouse == pytest.approx(under)  # what was taken is still under it
+    view.picked = player.ball
+    player.key("f")
+    player.frame(90)
+    assert view.camera.middle == pytest.approx(
+        player.world.component_for_entity(player.ball, Transform).position, abs=0.01
+    )
+    player.key(pygame.K_HOME)
+    assert not view.following
+    assert view.camera.scale == pytest.approx(scale, rel=0.1)
+
+
+# -- the hand ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("joints", [True, False])
+def test_a_body_is_picked_dragged_and_let_go(joints):
+    world, ball = floor_and_ball(*([Joints()] if joints else []))
+    player = Player(world)
+    player.frame()
+    player.press((3.2, 0.6))
+    assert player.view.picked == ball
+    for k in range(1, 31):
+        player.move((3.2, 0.6 + 0.1 * k))
+    player.frame(60)
+    body, transform = world.component_for_entity(ball, RigidBody), world.component_for_entity(ball, Transform)
+    assert transform.position == pytest.approx((3.2, 3.6), abs=0.3)
+    count = len(world.get_entities())
+    player.release((3.2, 3.6))
+    player.frame(12)
+    assert len(world.get_entities()) == count - joints
+    assert body.linear_velocity[1] < -1.5  # it falls
+    player.press((-7.0, 3.0))
+    assert player.view.picked is None
+    player.view.close()
+    world.close()
+
+
+def test_while_time_stands_a_body_is_put_where_the_mouse_is(player):
+    player.frame()
+    player.key(pygame.K_SPACE)
+    player.press((0.0, -0.5))
+    player.move((1.0, -0.25))
+    floor = player.world.component_for_entity(player.view.picked, Transform)
+    assert floor.position == pytest.approx((1.0, -0.25), abs=0.05)  # by whole pixels
+    player.release((1.0, -0.25))
+    player.key(pygame.K_SPACE)
+    player.press((1.0, -0.5))
+    player.move((2.0, 0.0))
+    assert floor.position == pytest.approx((1.0, -0.25), abs=0.05)  # static
+
+
+def test_the_body_in_the_hand_may_go(player):
+    player.frame()
+    player.press((3.0, 0.5))
+    player.world.delete_entity(player.ball, immediate=True)
+    player.key("f")
+    player.frame(3)
+    assert player.view.picked is None
+    player.release((3.0, 0.5))
+
+
+def test_a_pull_is_not_brought_back_by_going_back_in_time():
+    world, _ = floor_and_ball(Joints())
+    player = Player(world)
+    player.frame()
+    count = len(world.get_entities())
+    player.press((3.0, 0.5))
+    for _ in range(30):
+        player.view._rewind._cost = 0.0
+        player.frame()
+    assert len(world.get_entities()) == count + 1
+    player.key(pygame.K_BACKSPACE)
+    player.key(pygame.K_SPACE)
+    player.frame(2)
+    assert world.step_count > 8  # a snapshot with the pull in it
+    assert len(world.get_entities()) == count
+    player.view.close()
+    world.close()
+
+
+# -- what is shown -------------------------------------------------------------------------------
+
+
+def test_each_key_shows_something_and_takes_it_away():
+    world = World(
+        Physics(2, gravity=(0.0, -10.0)), Rotation(), Joints(), settings=Settings(sleeping=True, on_fault="ignore")
+    )
+    world.create_entity(Transform((0.0, -0.5)), AABBCollider((3.0, 0.5)))
+    for x in (-1.0, 1.0):
+        world.create_entity(Transform((x, 0.5)), RigidBody(), AABBCollider((0.5, 0.5)))
+    bar = world.create_entity(Transform((0.0, 2.0)), RigidBody(), SphereCollider(0.3), Spin(angular_velocity=1.0))
+    world.create_entity(Hinge(None, bar, anchor=(0.5, 2.0)))
+    player = Player(world, controls=False)
+    player.frame(90)
+    player.view.paused = True
+    player.frame()
+    plain = brightness(player.view)
+    player.key("c")
+    assert (brightness(player.view) == plain).all()  # keys are the game's
+    player.key(pygame.K_F10)
+    player.key("j")
+    player.frame()
+    plain = brightness(player.view)
+    for key in ("c", "v", "j", "z", "b", "n", "t", "o", pygame.K_F1, pygame.K_TAB):
+        player.key(key)
+        player.frame()
+        changed = (brightness(player.view) != plain).any(axis=2).sum()
+        assert changed > 10, key
+        player.key(key)
+        player.frame()
+        assert (brightness(player.view) == plain).all(), key
+    player.view.close()
+    world.close()
+
+
+def test_sprites_and_painting_of_ones_own(player):
+    view, sprites = player.view, Sprites(player.world)
+    surface = pygame.Surface((10, 10))
+    surface.fill((255, 0, 0))
+    sprites.add(player.ball, surface, metres=1.0)
+    view.sprites.append(sprites)
+    view.below = lambda view: view.screen.fill((0, 0, 200))
+    view.above = lambda view: view.screen.fill((0, 250, 0), (600, 400, 9, 9))
+    player.frame(2)
+    pixels = brightness(view)
+    assert tuple(pixels[605, 405]) == (0, 250, 0)
+    assert tuple(pixels[500, 100]) == (0, 0, 200)
+    x, y = view.camera.to_screen((3.0, 0.5)).astype(int)
+    assert tuple(pixels[x, y]) == (255, 0, 0)
+
+
+def test_stacks_of_one_colour_have_edges(player):
+    world = player.world
+    for y in (0.5, 1.5, 2.5):
+        world.create_entity(Transform((-5.0, y)), RigidBody(), AABBCollider((0.5, 0.5)))
+    player.frame(2)
+    view = player.view
+    x, top = view.camera.to_screen((-5.0, 2.9)).astype(int)
+    bottom = view.camera.to_screen((-5.0, 0.1)).astype(int)[1]
+    column = brightness(view)[x, top:bottom].sum(axis=1)
+    dark = column < 0.6 * column.max()
+    assert (np.diff(dark.astype(int)) == 1).sum() == 2  # between three boxes
+
+
+# -- windows that go, worlds that go ---------------------------------------------------------------
+
+
+def test_a_window_may_have_any_size(player):
+    for size in ((1, 1), (2000, 1), (300, 300)):
+        pygame.display.set_mode(size, pygame.RESIZABLE)
+        pygame.event.post(pygame.event.Event(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1]))
+        player.key(pygame.K_TAB)
+        player.key(pygame.K_F1)
+        player.frame()
+        assert player.view.camera.size == size
+
+
+@pytest.mark.parametrize("how", ["event", "escape", "in a step", "pygame"])
+def test_a_window_is_closed(player, how):
+    view, world = player.view, player.world
+    player.frame()
+    if how == "event":
+        pygame.event.post(pygame.event.Event(pygame.QUIT))
+    elif how == "escape":
+        pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_ESCAPE, unicode="", mod=0))
+    elif how == "pygame":
+        pygame.display.quit()
+    else:
+
+        class Closes(System):
+            def process(self, dt):
+                view.close()
+
+        world.add_system(Closes())
+        player.frame()
+    with pytest.raises(StopIteration):
+        player.frame(3)
+    assert not view.open
+    assert not pygame.display.get_init()
+    assert list(view) == []
+    world.step()  # goes on without
+
+
+def test_a_world_that_is_closed_ends_the_loop():
+    world, _ = floor_and_ball()
+    frames = 0
+    for _ in View(world, (100, 100), real_time=False):
+        frames += 1
+        if frames == 3:
+            world.close()
+    assert frames == 3
+
+
+def test_a_world_that_is_restored_below_the_view_is_shown_as_it_is(player):
+    start = player.world.snapshot()
+    player.frame(30)
+    player.press((3.0, 0.5))
+    player.world.restore(start)
+    player.frame(30)
+    assert player.world.step_count == 30
+    player.key(pygame.K_BACKSPACE)
+    player.frame()
+
+
+def test_only_worlds_that_can_be_seen_have_a_window():
+    world = World()
+    with pytest.raises(NoPhysicsError, match="no physics in world"):
+        View(world)
+    world.close()
+    world, _ = floor_and_ball()
+    with pytest.raises(ValueError, match="rate must be"):
+        View(world, rate=0.0)
+    world.close()
+
+
+def test_without_a_screen_there_is_one_line(monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "no-such-driver")
+    world, _ = floor_and_ball()
+    with pytest.raises(DisplayError, match=r"no display for a window: .*--record FILE draws without one"):
+        View(world)
+    world.close()
+
+
+def test_a_missing_package_is_one_line(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "pyglet", None)
+    with pytest.raises(MissingPackageError, match=r"this needs pyglet: pip install 'carom\[view-pyglet\]'"):
+        package("pyglet", "this")
+
+
+def test_the_sound_card_is_never_opened(player):
+    player.frame(2)
+    assert pygame.display.get_init()
+    assert pygame.mixer.get_init() is None
+
+
+# -- compiling -------------------------------------------------------------------------------------
+
+
+class Compiles:
+    """Stands in for world.prepare(), with kernels that take a while."""
+
+    def __init__(self, count=5, seconds=0.1):
+        self.count, self.seconds, self.done, self.threads = count, seconds, 0, set()
+
+    def __call__(self):
+        self.threads.add(threading.current_thread())
+        for k in range(self.count):
+            log.left = self.count - k
+            for listener in log.listeners:
+                listener(f"module.kernel_{k}")
+            time.sleep(self.seconds)
+            self.done += 1
+        log.left = 0
+
+
+def test_while_kernels_compile_the_window_says_so(monkeypatch):
+    world, _ = floor_and_ball()
+    work, texts = Compiles(), []
+    monkeypatch.setattr(world, "prepare", work, raising=False)
+    monkeypatch.setattr(View, "_draw_progress", lambda view, work: texts.append(work.text))
+    player = Player(world)
+    player.frame()
+    assert work.done == 5
+    assert threading.main_thread() not in work.threads
+    assert any(text.startswith("compiling 5 kernels, ") and "kernel_" in text for text in texts)
+    player.view.close()
+    world.close()
+
+
+def test_a_window_that_is_closed_then_waits_for_one_kernel_only(monkeypatch):
+    world, _ = floor_and_ball()
+    work = Compiles(20)
+    monkeypatch.setattr(world, "prepare", work, raising=False)
+    player = Player(world)
+    pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_ESCAPE, unicode="", mod=0))
+    with pytest.raises(StopIteration):
+        player.frame()
+    assert work.done <= 2
+    assert not log.listeners
+    world.close()
+
+
+def test_what_fails_to_compile_is_raised(monkeypatch):
+    def fails():
+        raise CaromError("no compiler")
+
+    world, _ = floor_and_ball()
+    monkeypatch.setattr(world, "prepare", fails, raising=False)
+    with pytest.raises(CaromError, match="no compiler"):
+        Player(world).frame()
+    assert not pygame.display.get_init()
+    world.close()
