@@ -63,11 +63,11 @@ class Hand:
         if entity is None or transform is None:
             return
         body = self.world.try_component(entity, RigidBody)
-        dynamic = body is not None and body.kind == "dynamic"
-        if not dynamic and not paused:
+        pulled = not paused and body is not None and body.kind == "dynamic"
+        if not pulled and not paused:
             return
         self.holding, self._grip = True, np.asarray(place) - transform.position
-        if dynamic and not paused and any(isinstance(plugin, Joints) for plugin in self.world.plugins):
+        if pulled and body is not None and any(isinstance(plugin, Joints) for plugin in self.world.plugins):
             self._pull = self.world.create_entity(
                 MousePull(entity, grip=place, target=place, max_force=PULL * float(body.mass))
             )

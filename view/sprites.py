@@ -91,7 +91,7 @@ class Sprites:
         if shift.shape != (2,) or not (np.isfinite(shift).all() and math.isfinite(z)):
             raise ValueError(f"Sprites.add: offset must be two finite numbers and z one, got {offset!r}, {z!r}")
         look = self._look_of(surface, float(metres), bool(flip))
-        for one in [int(entity)] if np.ndim(entity) == 0 else np.asarray(entity).tolist():
+        for one in np.atleast_1d(entity).tolist():
             place = self._place.setdefault(one, self._count)
             if place == self._count:
                 self._grow()
@@ -163,7 +163,7 @@ class Sprites:
         steps = np.clip(2 * np.pi * radii, 16, MOST_ANGLES).astype(np.int64)  # the corner is half a pixel off
         turns = np.rint(angles[chosen] * steps / (2 * np.pi)).astype(np.int64) % steps
         keys, which = np.unique(looks * MOST_ANGLES + turns, return_inverse=True)
-        made = [self._picture(*divmod(key, MOST_ANGLES), camera.scale) for key in keys.tolist()]
+        made = [self._picture(key // MOST_ANGLES, key % MOST_ANGLES, camera.scale) for key in keys.tolist()]
         halves = np.array([picture.get_size() for picture in made], float).reshape(-1, 2)[which] / 2
         corners = np.rint(pixels - halves).astype(np.int64).tolist()
         surface.fblits([(made[k], corner) for k, corner in zip(which.tolist(), corners, strict=True)])
