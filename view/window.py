@@ -17,15 +17,15 @@ from ..framework.typing import Vector
 from .camera import Camera, corners_of
 from .colours import ACCENT, BACKGROUND, DIM, ERROR
 from .film import Film
-from .hand import Hand
 from .packages import package
 from .painter import Painter
-from .panel import Panel
-from .preparation import Preparation
-from .rewind import Rewind
 from .sprites import Sprites
-from .stages import Stages
-from .texts import HELP, Texts
+from .tools.hand import Hand
+from .tools.panel import Panel
+from .tools.preparation import Preparation
+from .tools.rewind import Rewind
+from .tools.stages import Stages
+from .tools.texts import HELP, Texts
 
 LONGEST = 0.1  # s: a frame that took longer counts as that
 SLOWEST, FASTEST = 1 / 64, 8.0  # speed

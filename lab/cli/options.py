@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from ...framework import Settings
-from ...view.entered import value_of
+from ...view.tools.entered import value_of
 from .usage_errors import Problem, one_line
 
 Option = Callable[[Any], Any]

@@ -3,7 +3,7 @@
 import pytest
 
 from carom import scenes
-from carom.view.rewind import Rewind
+from carom.view.tools.rewind import Rewind
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..components import RigidBody, Transform
-from ..framework import World
-from ..plugins.joints import Joints, MousePull
+from ...components import RigidBody, Transform
+from ...framework import World
+from ...plugins.joints import Joints, MousePull
 
 NEAR = 6.0  # pixels: what is so near is picked where nothing is under the mouse
 PULL = 1000.0  # N per kg: the most that a pull exerts

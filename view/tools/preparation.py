@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import threading
 
-from ..framework import World
-from ..framework.compilation import log
+from ...framework import World
+from ...framework.compilation import log
 
 
 class Stopped(Exception):  # noqa: N818 - no error: the window was closed

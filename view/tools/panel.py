@@ -7,9 +7,9 @@ import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from ..framework import CaromError, Component, Settings, World
-from ..framework.settings import AUTOMATIC, COLLISION_MODES, FAULT_MODES, GEOMETRY_MODES, MIXING_RULES
-from .colours import ACCENT, DIM, ERROR, FIELD, PANEL, TEXT
+from ...framework import CaromError, Component, Settings, World
+from ...framework.settings import AUTOMATIC, COLLISION_MODES, FAULT_MODES, GEOMETRY_MODES, MIXING_RULES
+from ..colours import ACCENT, DIM, ERROR, FIELD, PANEL, TEXT
 from .entered import text_of, values_of
 
 WIDTH, ROW, LABEL = 350, 19, 168  # pixels

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from typing import Any
 
-from .colours import TEXT
+from ..colours import TEXT
 
 MOST = 2048  # pictures
 SIZE = 18

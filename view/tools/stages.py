@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 
-from ..framework import World
-from ..framework.schedule.profile_report import Totals
+from ...framework import World
+from ...framework.schedule.profile_report import Totals
 
 EVERY = 0.5  # s
 LEAST = 0.02  # of a step: stages below it are not listed

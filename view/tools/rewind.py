@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..framework import Snapshot, World
+from ...framework import Snapshot, World
 
 EVERY = 0.1  # s simulated between two snapshots, where time and memory allow
 SPAN = 10.0  # s simulated that the ring shall hold at least
