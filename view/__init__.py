@@ -3,7 +3,7 @@
 >>> from carom.view import Camera, Sprites, View
 >>> View(world).run()
 
-``Camera`` needs numpy alone; the others load pygame-ce when they are first used.
+Cameras need numpy alone; the others load pygame-ce when they are first used.
 """
 
 from __future__ import annotations
@@ -13,15 +13,16 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .camera import Camera as Camera
     from .packages import MissingPackageError as MissingPackageError
+    from .space.orbit import OrbitCamera as OrbitCamera
     from .sprites import Sprites as Sprites
     from .window import DisplayError as DisplayError
     from .window import View as View
 
 _MODULES = {
-    "Camera": "camera", "DisplayError": "window", "MissingPackageError": "packages", "Sprites": "sprites",
-    "View": "window",
+    "Camera": "camera", "DisplayError": "window", "MissingPackageError": "packages", "OrbitCamera": "space.orbit",
+    "Sprites": "sprites", "View": "window",
 }  # fmt: skip
-__all__ = ["Camera", "DisplayError", "MissingPackageError", "Sprites", "View"]
+__all__ = ["Camera", "DisplayError", "MissingPackageError", "OrbitCamera", "Sprites", "View"]
 
 
 def __getattr__(name: str) -> object:

@@ -51,8 +51,7 @@ class Camera:
 
     @size.setter
     def size(self, size: Vector) -> None:
-        width, height = _pair(size, "size")
-        self._size = max(1, round(float(width))), max(1, round(float(height)))
+        self._size = pixels_of(size, "Camera.size")
 
     @property
     def middle(self) -> Floats:
@@ -61,7 +60,7 @@ class Camera:
 
     @middle.setter
     def middle(self, middle: Vector) -> None:
-        self._middle = _pair(middle, "middle")
+        self._middle = place_of(middle, "Camera.middle")
 
     @property
     def scale(self) -> float:
@@ -84,8 +83,8 @@ class Camera:
         """Pixels (..., 2) of ``points`` (..., 2) m, as ``bodies.interpolated_position``."""
         return (np.asarray(points, float) - self._middle) * self._factors + (self._size[0] / 2, self._size[1] / 2)
 
-    def to_world(self, pixels: Any) -> Floats:
-        """Places (..., 2) m of ``pixels`` (..., 2)."""
+    def to_world(self, pixels: Any, at: Any = None) -> Floats:
+        """Places (..., 2) m of ``pixels`` (..., 2); ``at``, how far away, has a meaning in 3D alone."""
         middle = self._size[0] / 2, self._size[1] / 2
         return (np.asarray(pixels, float) - middle) / self._factors + self._middle
 
@@ -99,7 +98,7 @@ class Camera:
 
     def fit(self, lower: Vector, upper: Vector) -> None:
         """Show all between two corners (2,) m, with a margin. ValueError if they are no places."""
-        low, high = _pair(lower, "fit: lower"), _pair(upper, "fit: upper")
+        low, high = place_of(lower, "Camera.fit: lower"), place_of(upper, "Camera.fit: upper")
         self.middle = (low + high) / 2
         self.scale = MARGIN * float(np.min(np.array(self._size) / np.maximum(high - low, 1e-3)))
 
@@ -122,7 +121,7 @@ class Camera:
         half_life
             s in which half of the way is made, at any frame rate
         """
-        goal = _pair(point, "follow: point")
+        goal = place_of(point, "Camera.follow: point")
         if self.bounds is not None:
             low, high = (np.asarray(end, float) for end in self.bounds)
             half = np.minimum(np.array(self._size) / (2 * self._scale), (high - low) / 2)  # a level that is too small
@@ -134,15 +133,22 @@ class Camera:
         return f"Camera({self._size}, middle={self._middle.tolist()}, scale={self._scale:g}, y_up={self.y_up})"
 
 
-def _pair(value: Any, name: str) -> Floats:
-    """(2,), a copy; ValueError for anything else."""
+def place_of(value: Any, name: str, dimensions: int = 2) -> Floats:
+    """(d,), a copy; ValueError for anything else."""
     try:
-        pair = np.array(value, float)
+        place = np.array(value, float)
     except (TypeError, ValueError):
-        pair = np.empty(0)
-    if pair.shape != (2,) or not np.isfinite(pair).all():
-        raise ValueError(f"Camera.{name} must be two finite numbers, got {value!r}")
-    return pair
+        place = np.empty(0)
+    if place.shape != (dimensions,) or not np.isfinite(place).all():
+        count = {2: "two", 3: "three"}[dimensions]
+        raise ValueError(f"{name} must be {count} finite numbers, got {value!r}")
+    return place
+
+
+def pixels_of(size: Any, name: str) -> tuple[int, int]:
+    """(width, height), at least 1; ValueError for what is no two numbers."""
+    width, height = place_of(size, name)
+    return max(1, round(float(width))), max(1, round(float(height)))
 
 
 FAR = 1e4  # m: half-spaces have no end, and decide nothing

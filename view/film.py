@@ -13,9 +13,9 @@ import numpy as np
 from ..drawing import Drawing
 from ..framework import CaromError, World
 from ..framework.typing import Vector
-from .camera import Camera, corners_of
+from .camera import corners_of
+from .choice import camera_of, painter_of
 from .packages import package
-from .painter import Painter
 
 RATES = {".mp4": 30, ".gif": 20, ".webp": 20}  # frames per second
 KINDS = tuple(RATES)
@@ -125,7 +125,7 @@ class Film:
 
 
 class Recording:
-    """A film of a world in 2D that no window shows; :meth:`after_step` paints what is due.
+    """A film of a world that no window shows; :meth:`after_step` paints what is due.
 
     view
         (lower corner, upper corner), m, of what is shown; None: all there is
@@ -133,8 +133,8 @@ class Recording:
 
     def __init__(self, world: World, path: Path, view: tuple[Vector, Vector] | None = None) -> None:
         self.film = Film(path)
-        self._world, self._drawing, self._painter = world, Drawing(world), Painter()
-        self._camera = Camera(SIZES[self.film.kind])
+        self._world, self._drawing, self._painter = world, Drawing(world), painter_of(world)
+        self._camera: Any = camera_of(world, SIZES[self.film.kind])
         view = view or corners_of(self._drawing.update(), np.asarray(world.bodies.position))
         if view is not None:
             self._camera.fit(*view)

@@ -15,10 +15,11 @@ from ..drawing import Drawing
 from ..framework import CaromError, FaultError, NoPhysicsError, StepError, World
 from ..framework.typing import Vector
 from .camera import Camera, corners_of
+from .choice import camera_of, painter_of
 from .colours import ACCENT, BACKGROUND, DIM, ERROR
 from .film import Film
 from .packages import package
-from .painter import Painter
+from .space.orbit import OrbitCamera
 from .sprites import Sprites
 from .tools.hand import Hand
 from .tools.panel import Panel
@@ -41,7 +42,7 @@ class DisplayError(CaromError):
 
 
 class View:
-    """A window on a world in 2D, until it is closed::
+    """A window on a world, until it is closed::
 
         View(world).run()
 
@@ -57,7 +58,7 @@ class View:
     sprites
         :class:`Sprites` to draw; several as a list
     camera
-        a :class:`Camera` of one's own; None: one that shows everything at first
+        a :class:`Camera`, in 3D an :class:`OrbitCamera`, of one's own; None: one that shows everything at first
     title
         of the window
     controls
@@ -80,7 +81,7 @@ class View:
         False: each frame is 1 / rate seconds, however long it takes, and nothing waits; for tests and films
 
     DisplayError without a display, MissingPackageError without pygame-ce. ``view.screen`` is the pygame.Surface,
-    ``view.events`` this frame's pygame events, ``view.keys`` what is held, ``view.mouse`` the place, (2,) m, under the
+    ``view.events`` this frame's pygame events, ``view.keys`` what is held, ``view.mouse`` the place, (d,) m, under the
     mouse; ``paused``, ``speed`` and ``picked`` can be set.
     """
 
@@ -90,7 +91,7 @@ class View:
         size: Vector = (1280, 720),
         *,
         sprites: Any = None,
-        camera: Camera | None = None,
+        camera: Camera | OrbitCamera | None = None,
         title: str = "carom",
         controls: bool = True,
         outlines: bool = True,
@@ -104,15 +105,13 @@ class View:
     ) -> None:
         if world.physics is None:
             raise NoPhysicsError(f"View: no physics in world {world.name!r}, so there is nothing to see")
-        if world.dimensions != 2:
-            raise CaromError(f"View shows worlds in 2D, {world!r} has {world.dimensions} dimensions")
         if not (rate > 0 and math.isfinite(rate)):
             raise ValueError(f"View: rate must be a finite number above 0, got {rate!r}")
         self._pygame = pygame = package("pygame", "carom.view.View")
         self.world, self.title, self.controls, self.rate = world, title, controls, float(rate)
         self.below, self.above, self.real_time = below, above, real_time
         self.sprites: list[Sprites] = [sprites] if isinstance(sprites, Sprites) else list(sprites or ())
-        self.camera = camera or Camera(size)
+        self.camera: Any = camera or camera_of(world)
         self.camera.size = size
         self._film = None if record is None else Film(Path(record))
         self.screen = self._opened(self.camera.size, title)
@@ -125,7 +124,7 @@ class View:
         self.message, self._message_ends = "", 0.0
         self._help = False
         self._texts = Texts(pygame)
-        self._painter = Painter()
+        self._painter = painter_of(world)
         self._panel = Panel(pygame, self._texts.write)
         self._drawing, self._hand, self._stages = Drawing(world), Hand(world), Stages(world)
         self._rewind = Rewind(world, rewind_megabytes) if rewind_megabytes else None
@@ -174,8 +173,8 @@ class View:
 
     @property
     def mouse(self) -> Any:
-        """The place, (2,) m, under the mouse."""
-        return self.camera.to_world(self._at)
+        """The place, (d,) m, under the mouse; in 3D as far away as what is held, or as the middle of the picture."""
+        return self.camera.to_world(self._at, self._hand.at if self._hand.holding else None)
 
     # -- frames -----------------------------------------------------------------------------------
 
@@ -386,16 +385,19 @@ class View:
                 self._panel.scroll(3 * event.y)
             else:
                 self.camera.zoom(ZOOM**event.y, self._at)
-        elif event.type == pygame.MOUSEMOTION and event.buttons[2] and not self._panel.has(event.pos):
-            self.following = False
-            self.camera.pan(event.rel)
+        elif event.type == pygame.MOUSEMOTION and (event.buttons[1] or event.buttons[2]):
+            if event.buttons[2] and self.world.dimensions == 3:
+                self.camera.turn(event.rel)
+            else:
+                self.following = False
+                self.camera.pan(event.rel)
         elif event.type == pygame.MOUSEBUTTONDOWN and self._panel.has(event.pos):
             if event.button in (1, 3):
                 self._panel.click(event.pos, event.button)
         elif event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
-            place = self.camera.to_world(event.pos)
-            self._hand.pick(place, self.camera.scale)
-            self._hand.take(place, self.paused)
+            place = self._hand.pick(self.camera, event.pos)
+            if place is not None:
+                self._hand.take(place, self.paused)
         elif event.type == pygame.MOUSEBUTTONUP and event.button == 1:
             self._hand.release()
 
@@ -469,8 +471,8 @@ class View:
         self._pygame.draw.circle(self.screen, ACCENT, pixels.tolist(), 9, 2)
         if self.controls:
             kinds = ", ".join(type(one).__name__ for one in self.world.components_for_entity(picked))
-            text = f"entity {picked}: {kinds}; at ({place[0]:.3f}, {place[1]:.3f}) m, {np.hypot(*velocity):.3f} m/s"
-            self._texts.write(self.screen, text, (8, 6 if not self.controls else 26), ACCENT)
+            at, speed = ", ".join(f"{x:.3f}" for x in place.tolist()), float(np.linalg.norm(velocity))
+            self._texts.write(self.screen, f"entity {picked}: {kinds}; at ({at}) m, {speed:.3f} m/s", (8, 26), ACCENT)
 
     def _draw_names(self) -> None:
         bodies = self.world.bodies

@@ -114,11 +114,12 @@ def _check_view(view: Corners | None, world: World, loaded: Loaded) -> None:
 def _show(world: World, loaded: Loaded, view: Corners | None, record: Path | None, seconds: float | None) -> None:
     """In a window, until it is closed or so many seconds are simulated."""
     try:
-        from ...view import Camera, View
+        from ...view import View
+        from ...view.choice import camera_of
 
         camera = None
-        if view is not None and world.dimensions == 2:
-            camera = Camera()
+        if view is not None:
+            camera = camera_of(world)
             camera.fit(*view)
         with loaded.attribute_errors(), stdout_kept_clean():
             View(world, camera=camera, title=f"carom: {loaded.name}", record=record).run(

@@ -21,10 +21,11 @@ class Hand:
     def __init__(self, world: World) -> None:
         self.world = world
         self.holding = False
+        self.at: Any = None  # (d,) m, where it was taken: so far away it is dragged
         self._picked: int | None = None
         self._pull: int | None = None  # the entity of the MousePull
         self._pulls: set[int] = set()  # all there have been: a restore may bring one back
-        self._grip = np.zeros(2)  # m, from the body to where it was taken
+        self._grip = np.zeros(world.dimensions or 2)  # m, from the body to where it was taken
 
     @property
     def picked(self) -> int | None:
@@ -38,17 +39,27 @@ class Hand:
         self.release()
         self._picked = entity
 
-    def pick(self, place: Any, scale: float) -> int | None:
-        """Pick what is at a place (2,) m, seen with ``scale`` pixels per m."""
-        world = self.world
-        found = world.query_point(place, one_way=True) or world.query_sphere(place, NEAR / scale, one_way=True)
+    def pick(self, camera: Any, pixels: Any) -> Any:
+        """Pick what is under a pixel (2,); the place, (d,) m, where it is touched, None if nothing is there."""
+        self.picked, place = (self._in_plane if self.world.dimensions == 2 else self._in_space)(camera, pixels)
+        return None if self.picked is None else place
+
+    def _in_plane(self, camera: Any, pixels: Any) -> tuple[int | None, Any]:
+        world, place = self.world, camera.to_world(pixels)
+        near = NEAR / camera.scale
+        found = world.query_point(place, one_way=True) or world.query_sphere(place, near, one_way=True)
         bodies = world.bodies
         if not found and len(bodies):  # what has no collider
             away = np.linalg.norm(bodies.position - place, axis=1)
             nearest = int(np.argmin(np.where(np.isfinite(away), away, np.inf)))
-            found = [int(bodies.entity[nearest])] if away[nearest] * scale < 2 * NEAR else []
-        self.picked = min(found, key=self._order) if found else None
-        return self.picked
+            found = [int(bodies.entity[nearest])] if away[nearest] < 2 * near else []
+        return (min(found, key=self._order) if found else None), place
+
+    def _in_space(self, camera: Any, pixels: Any) -> tuple[int | None, Any]:
+        """The first on the ray that moves, before walls that may be glass."""
+        hits = self.world.ray_cast(*camera.ray(pixels))
+        hit = min(hits, key=lambda hit: (*self._order(hit.entity)[:2], hit.distance), default=None)
+        return (None, None) if hit is None else (hit.entity, hit.point)
 
     def _order(self, entity: int) -> tuple[bool, int, int]:
         """Solid ones first, then those that move; of equal ones the last."""
@@ -57,7 +68,7 @@ class Hand:
         return bool(colliders) and all(c.sensor for c in colliders), kind, -entity
 
     def take(self, place: Any, paused: bool) -> None:
-        """Hold the picked body at a place (2,) m, if it can be moved."""
+        """Hold the picked body at a place (d,) m, if it can be moved."""
         entity = self.picked
         transform = None if entity is None else self.world.try_component(entity, Transform)
         if entity is None or transform is None:
@@ -66,7 +77,7 @@ class Hand:
         pulled = not paused and body is not None and body.kind == "dynamic"
         if not pulled and not paused:
             return
-        self.holding, self._grip = True, np.asarray(place) - transform.position
+        self.holding, self._grip, self.at = True, np.asarray(place) - transform.position, place
         if pulled and body is not None and any(isinstance(plugin, Joints) for plugin in self.world.plugins):
             self._pull = self.world.create_entity(
                 MousePull(entity, grip=place, target=place, max_force=PULL * float(body.mass))
@@ -74,7 +85,7 @@ class Hand:
             self._pulls.add(self._pull)
 
     def drag(self, place: Any, paused: bool) -> None:
-        """Bring what is held nearer to a place (2,) m; once in a frame. While time stands it is there at once."""
+        """Bring what is held nearer to a place (d,) m; once in a frame. While time stands it is there at once."""
         entity = self.picked
         if not self.holding or entity is None:
             self.release()

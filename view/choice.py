@@ -1,0 +1,31 @@
+"""What shows a world, by its dimensions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..framework import World
+from ..framework.typing import Vector
+from .camera import Camera
+from .space.orbit import OrbitCamera
+
+
+def camera_of(world: World, size: Vector = (1280, 720)) -> Camera | OrbitCamera:
+    """A camera for its worlds; in 3D gravity tells what is down."""
+    if world.dimensions == 2:
+        return Camera(size)
+    down = np.asarray(world.gravity)
+    return OrbitCamera(size, up=-down if np.any(down) else (0.0, 1.0, 0.0))
+
+
+def painter_of(world: World) -> Any:
+    """What paints drawing lists of such a world onto surfaces."""
+    if world.dimensions == 2:
+        from .painter import Painter
+
+        return Painter()
+    from .space.painter import SpacePainter
+
+    return SpacePainter()
