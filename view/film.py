@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -92,18 +92,18 @@ class Film:
             self._kept = self._kept[::2]
             self._every *= 2
 
-    def close(self, written: Callable[[int], None] | None = None) -> None:
-        """Write what is kept; ``written`` is called with the number of frames. CaromError if the disk refuses it."""
+    def close(self) -> None:
+        """Write what is kept; CaromError if the disk refuses it."""
         try:
             if self._writer is not None:
                 self._writer.close()
             elif self._kept:
-                self._save(written or (lambda done: None))
+                self._save()
         except OSError as error:
             raise CaromError(f"film {self.path}: {error.strerror or error}") from error
         self._writer, self._kept = None, []
 
-    def _save(self, written: Callable[[int], None]) -> None:
+    def _save(self) -> None:
         image: Any = self._pillow
         palette = None
         if self.kind == ".gif":  # one palette for all, and no dithering: else still parts flicker
@@ -113,9 +113,8 @@ class Film:
             palette = sample.quantize(COLOURS, dither=image.Dither.NONE)
 
         def images() -> Iterator[Any]:
-            for done, pixels in enumerate(self._kept, 1):
+            for pixels in self._kept:
                 made = image.frombytes("RGB", self._size, zlib.decompress(pixels))
-                written(done)
                 yield made if palette is None else made.quantize(palette=palette, dither=image.Dither.NONE)
 
         frames = images()
@@ -134,11 +133,11 @@ class Recording:
     def __init__(self, world: World, path: Path, view: tuple[Vector, Vector] | None = None) -> None:
         self.film = Film(path)
         self._world, self._drawing, self._painter = world, Drawing(world), painter_of(world)
-        self._camera: Any = camera_of(world, SIZES[self.film.kind])
+        self.camera: Any = camera_of(world, SIZES[self.film.kind])
         view = view or corners_of(self._drawing.update(), np.asarray(world.bodies.position))
         if view is not None:
-            self._camera.fit(*view)
-        self._surface = package("pygame", "a film").Surface(self._camera.size)
+            self.camera.fit(*view)
+        self.surface = package("pygame", "a film").Surface(self.camera.size)
         self._shown = 0
         self._show(0.0)
 
@@ -149,6 +148,10 @@ class Recording:
             self._show((done - self._shown) * dt)
             self._shown = done
 
+    def close(self) -> None:
+        """Write the film."""
+        self.film.close()
+
     def _show(self, seconds: float) -> None:
-        self._painter.paint(self._surface, self._drawing.update(interpolated=False), self._camera)
-        self.film.add(self._surface, seconds)
+        self._painter.paint(self.surface, self._drawing.update(interpolated=False), self.camera)
+        self.film.add(self.surface, seconds)

@@ -16,7 +16,7 @@ from ...framework import CaromError, Settings, World
 from ...framework.schedule.profile_report import Stats
 from ..measure.run import Drift, RunReport, run
 from ..plugins.command import plugin_named
-from ..reporting.output import drawing_if_there, drawing_module
+from ..reporting.output import drawing_if_there
 from ..reporting.progress import Progress
 from ..reporting.text import NOTHING, TextTable, counted, jsonable, number, values_text
 from .loading import Loaded, load, stdout_kept_clean
@@ -67,17 +67,12 @@ def run_command(
     pictures = None if no_pictures else drawing_if_there("pictures.run_pictures", "no pictures,")
     if pictures is not None:
         writable_folder(out.parent if pictures.is_file(out) else out, out)
-    films = None if record is None else drawing_module("pictures.recording", "--record:")
-    if films is not None and record is not None:
-        if record.suffix.lower() not in films.KINDS:
-            raise Problem(f"--record takes a name that ends in {' or '.join(films.KINDS)}, not {record}")
-        writable_folder(record.parent, record, "--record")
 
     world = loaded.build(settings, changes, seed, added)
     _check_view(view, world, loaded)
     if steps is None:
         steps = round((loaded.seconds or DEFAULT_SECONDS if seconds is None else seconds) / world.settings.dt)
-    film = None if films is None else films.Recording(world, steps)
+    film = None if record is None else _film_of(world, record, view)
 
     def after_step(done: int) -> None:
         bar.advance(1)
@@ -96,8 +91,10 @@ def run_command(
             if pictures is not None:
                 report.pictures += map(str, pictures.draw_run(finished, out, view))
             if film is not None:
-                bar.begin(len(film.frames))
-                report.pictures.append(str(film.save(finished, record, view, lambda _: bar.advance(1))))
+                film.close()
+                report.pictures.append(str(record))
+        except CaromError as error:
+            raise Problem(one_line(error)) from error
         except OSError as error:
             raise Problem(f"{error.filename or out}: {error.strerror or error}") from error
     if as_json:
@@ -109,6 +106,16 @@ def run_command(
 def _check_view(view: Corners | None, world: World, loaded: Loaded) -> None:
     if view is not None and len(view[0]) != world.dimensions:
         raise Problem(f"{loaded.name}: view has {len(view[0])} dimensions, the world {world.dimensions}")
+
+
+def _film_of(world: World, file: Path, view: Corners | None) -> Any:
+    """What records it; Problem if it cannot be written, or a package is missing."""
+    from ...view.film import Recording
+
+    try:
+        return Recording(world, file, view)
+    except CaromError as error:
+        raise Problem(f"--record: {one_line(error)}") from error
 
 
 def _show(world: World, loaded: Loaded, view: Corners | None, record: Path | None, seconds: float | None) -> None:

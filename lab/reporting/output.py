@@ -45,19 +45,11 @@ def show_tables(tables: list[TextTable], remarks: list[str]) -> None:
         console.print(remark, style="dim", highlight=False)
 
 
-def drawing_module(name: str, what: str) -> Any:
-    """A module of the lab that draws; Problem, with the name of the extra, if matplotlib is missing."""
+def drawing_if_there(name: str, what: str) -> Any:
+    """A module of the lab that draws; if matplotlib is missing None, and a note on stderr with the name of the extra."""
     try:
         return importlib.import_module(f"..{name}", __package__)
-    except ImportError as error:
+    except ImportError:
         reason = "matplotlib is missing; it comes with the extra: pip install 'carom[plot]'"
-        raise Problem(f"{what} {reason}") from error
-
-
-def drawing_if_there(name: str, what: str) -> Any:
-    """That module; a note on stderr, and None, if matplotlib is missing."""
-    try:
-        return drawing_module(name, what)
-    except Problem as problem:
-        click.echo(f"carom: {problem.message}", err=True)
+        click.echo(f"carom: {what} {reason}", err=True)
         return None

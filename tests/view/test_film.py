@@ -51,7 +51,7 @@ def test_an_mp4_has_as_many_seconds_as_the_world(world, tmp_path):
     for step in range(1, 61):
         world.step()
         film.after_step(step)
-    film.film.close()
+    film.close()
     ffmpeg = package("imageio_ffmpeg", "a test")
     count, seconds = ffmpeg.count_frames_and_secs(str(tmp_path / "film.mp4"))
     assert (count, seconds) == (31, pytest.approx(31 / 30, abs=0.01))
