@@ -7,7 +7,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 PYTEST := $(BIN)/pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 unexport PYTHONDONTWRITEBYTECODE  # or every worker would compile all tests and carom anew in each run
 
-.PHONY: run install test test-slow test-all test-long test-numba coverage kernels wheel wheels bench figures typecheck lint clean
+.PHONY: run install test test-slow test-all test-long test-numba coverage kernels wheel wheels docs bench figures typecheck lint clean
 
 run: .venv/plot  # a scene, with pictures in out/
 	$(BIN)/carom run $(SCENE) --out out $(ARGS)
@@ -31,9 +31,11 @@ wheel: .venv/build  # for this platform and every Python, with compiled kernels,
 	$(BIN)/python -m carom.lab.build.wheel dist
 wheels: .venv/build  # for all platforms
 	$(BIN)/python -m carom.lab.build.wheel dist linux-x86_64 linux-aarch64 macos-arm64 win-amd64 wasm32
+docs: .venv/docs  # the site, into build/docs/site
+	$(BIN)/python -m studies.site $(ARGS)
 bench: .venv/bench  # carom against pymunk and Box2D; ARGS="--quick", see docs/benchmarks.md
 	$(BIN)/python -m studies bench $(ARGS)
-typecheck: .venv/test .venv/dev
+typecheck: .venv/test .venv/dev .venv/docs
 	$(BIN)/pyright
 lint: .venv/dev
 	$(BIN)/ruff check
@@ -42,8 +44,8 @@ clean:
 
 .venv/checks: pyproject.toml | .venv/bin/python
 	@echo "installing carom, and all that its checks need, into .venv"
-	$(PIP) install --quiet --no-compile -e ".[test,dev,build]"
-	touch .venv/test .venv/dev .venv/build $@
+	$(PIP) install --quiet --no-compile -e ".[test,dev,build,docs]"
+	touch .venv/test .venv/dev .venv/build .venv/docs $@
 .venv/%: pyproject.toml | .venv/bin/python  # the extras of pyproject.toml
 	@echo "installing carom with its extra $* into .venv"
 	$(PIP) install --quiet --no-compile -e ".[$*]"

@@ -21,7 +21,7 @@ from . import accuracy, characters, features, joints, scaling, settings, startup
 from .bench import timing as bench
 from .features import LADDER, SPINS
 from .limits import search as limits
-from .page import between_marks, into_option, show
+from .page import between_marks, into_option, show, with_a_palette
 from .runner import Axis, Result, run
 from .stages import stages_command
 
@@ -107,6 +107,7 @@ def _command(name: str, study: Study) -> click.Command:
             result = run(axes, repeats or (1 if quick else study.repeats), bar)
         show(*study.report(result), into, mark)
         for path in study.draw(result, out) if out is not None and study.draw is not None else ():
+            with_a_palette(path)
             click.echo(f"chart: {path}", err=True)
 
     return command if study.draw is None else out_option("Draw charts into this folder.")(command)
