@@ -143,6 +143,19 @@ def test_it_is_a_game_in_so_many_lines(page, lines):
     assert lines / 2 < sum(lines_of_code(block.text) for block in game) <= lines
 
 
+def test_every_recipe_says_what_comes_out():
+    """Each section of the cookbook is code of its own that ends with what has to hold."""
+    recipes = []
+    for page in (ROOT / "docs" / "recipes.md", *(ROOT / "docs" / "recipes").glob("*.md")):
+        sections = re.split(r"^## ", page.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+        recipes += [(name_of(page), text.partition("\n")[0], split(text, name_of(page))[0]) for text in sections]
+    assert len(recipes) >= 30
+    silent = [f"{page}: {name}" for page, name, blocks in recipes if not any("assert " in b.text for b in blocks)]
+    assert silent == []
+    longest = max(lines_of_code(block.text) for _, _, blocks in recipes for block in blocks)
+    assert longest <= 40
+
+
 def test_the_game_of_the_readme_prints_what_the_page_says(namespace, capsys):
     page = ROOT / "README.md"
     run(python_blocks(page), page, namespace)
