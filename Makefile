@@ -31,7 +31,7 @@ wheel: .venv/build  # for this platform and every Python, with compiled kernels,
 	$(BIN)/python -m carom.lab.build.wheel dist
 wheels: .venv/build  # for all platforms
 	$(BIN)/python -m carom.lab.build.wheel dist linux-x86_64 linux-aarch64 macos-arm64 win-amd64 wasm32
-docs: .venv/docs  # the site, into build/docs/site
+docs: .venv/docs  # the site, into build/docs/site; ARGS="--live FOLDER" with scenes that run, needs Pyodide and `make install`
 	$(BIN)/python -m studies.site $(ARGS)
 bench: .venv/bench  # carom against pymunk and Box2D; ARGS="--quick", see docs/benchmarks.md
 	$(BIN)/python -m studies bench $(ARGS)

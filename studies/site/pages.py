@@ -7,6 +7,7 @@ import json
 import os
 import re
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -83,7 +84,8 @@ def with_folder(page: str) -> str | dict[str, list[str]]:
     return {title: [page, *(each.relative_to(ROOT).as_posix() for each in sorted(folder.glob("*.md")))]}
 
 
-def write_settings(into: Path) -> None:
-    """mkdocs.yml of the repository with the navigation; JSON is YAML."""
-    settings = {"INHERIT": os.path.relpath(ROOT / "mkdocs.yml", into), "nav": navigation()}
+def write_settings(into: Path, scripts: Sequence[str]) -> None:
+    """mkdocs.yml of the repository with the navigation and these scripts; JSON is YAML."""
+    inherited = os.path.relpath(ROOT / "mkdocs.yml", into)
+    settings = {"INHERIT": inherited, "extra_javascript": scripts, "nav": navigation()}
     (into / "mkdocs.yml").write_text(json.dumps(settings, indent=1), encoding="utf-8")

@@ -13,6 +13,7 @@ from helpers_folders import ROOT
 
 import carom
 from studies.site import check, pages
+from studies.site.live import SCENES, add_buttons
 
 DOCS = sorted(ROOT.glob("docs/**/*.md"))
 API = sorted((ROOT / "docs" / "api").glob("*.md"))
@@ -90,6 +91,13 @@ def test_links_to_code_become_links_to_pages_of_it():
         "[e](https://a.b/c)"
     )
     assert code == {Path("examples/rollback.py"), Path("scenes")}
+
+
+def test_each_live_scene_has_a_picture_that_its_page_shows(tmp_path):
+    pages.copy_pages(tmp_path)
+    add_buttons(tmp_path)  # ValueError for a page without the picture
+    for page, (_, scene) in SCENES.items():
+        assert f'data-live="{scene}"' in (tmp_path / page).read_text(encoding="utf-8")
 
 
 @pytest.fixture
