@@ -7,7 +7,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 PYTEST := $(BIN)/pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 unexport PYTHONDONTWRITEBYTECODE  # or every worker would compile all tests and carom anew in each run
 
-.PHONY: run install test test-slow test-all test-long test-numba coverage kernels wheel wheels docs bench figures typecheck lint clean
+.PHONY: run install test test-slow test-all test-long test-numba coverage kernels wheel wheels release docs bench figures typecheck lint clean
 
 run: .venv/plot  # a scene, with pictures in out/
 	$(BIN)/carom run $(SCENE) --out out $(ARGS)
@@ -31,6 +31,8 @@ wheel: .venv/build  # for this platform and every Python, with compiled kernels,
 	$(BIN)/python -m carom.lab.build.wheel dist
 wheels: .venv/build  # for all platforms
 	$(BIN)/python -m carom.lab.build.wheel dist linux-x86_64 linux-aarch64 macos-arm64 win-amd64 wasm32
+release: .venv/build  # make release VERSION=0.2.0 DRY=1; see docs/releases.md
+	$(BIN)/python -m studies.release $(VERSION) $(if $(DRY),--dry-run) $(ARGS)
 docs: .venv/docs  # the site, into build/docs/site; ARGS="--live FOLDER" with scenes that run, needs Pyodide and `make install`
 	$(BIN)/python -m studies.site $(ARGS)
 bench: .venv/bench  # carom against pymunk and Box2D; ARGS="--quick", see docs/benchmarks.md

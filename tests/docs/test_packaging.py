@@ -102,6 +102,14 @@ def test_importing_physics_imports_no_drawing_and_no_command_line():
     assert not [m for m in modules if m in unwanted or m.startswith(tuple(f"{name}." for name in unwanted))]
 
 
+def test_importing_the_window_and_the_maps_loads_no_package_of_an_extra():
+    """Extras are loaded when they are used, so the rooms can be imported, and read about, without them."""
+    rooms = "carom.drawing", "carom.maps", "carom.view", "carom.lab"
+    extras = ("pygame", "moderngl", "pyglet", "pytiled_parser", "matplotlib", "PIL", "imageio_ffmpeg", "mapbox_earcut")
+    code = f"import sys, {', '.join(rooms)}; print([name for name in {extras} if name in sys.modules])"
+    assert run_elsewhere(code, ROOT, ROOT / "src").strip() == "[]"
+
+
 @pytest.fixture(scope="module")
 def source_copy(tmp_path_factory) -> Path:
     """The sources, so that building leaves nothing behind in the checkout, with what must be in no package: the
