@@ -14,6 +14,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[2]
 START = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")  # beside docs/
 LINK = re.compile(r"\]\(([^()#:\s]+)(#[^()\s]*)?\)")
+UNSEARCHED = "---\nsearch: { exclude: true }\n---\n\n"  # of pages that are code
 MARKED = re.compile(r"^( *```python) .*$", re.MULTILINE)  # what only the tests of docs/ read
 
 
@@ -51,7 +52,7 @@ def write_code(path: Path, into: Path) -> None:
         page = into / f"{path}.md"
         page.parent.mkdir(parents=True, exist_ok=True)
         kind = "python" if path.suffix == ".py" else "text"
-        page.write_text(f"# {path.name}\n\n````{kind}\n{text}````\n", encoding="utf-8")
+        page.write_text(f"{UNSEARCHED}# {path.name}\n\n````{kind}\n{text}````\n", encoding="utf-8")
         return
     files = [file.relative_to(ROOT) for file in sorted((ROOT / path).rglob("*.py")) if file.stat().st_size]
     lines = [f"# {path.as_posix()}/", "", "| file | |", "|---|---|"]
