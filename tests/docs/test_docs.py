@@ -153,7 +153,7 @@ def test_every_recipe_says_what_comes_out():
     silent = [f"{page}: {name}" for page, name, blocks in recipes if not any("assert " in b.text for b in blocks)]
     assert silent == []
     longest = max(lines_of_code(block.text) for _, _, blocks in recipes for block in blocks)
-    assert longest <= 40
+    assert longest <= 30
 
 
 def test_the_game_of_the_readme_prints_what_the_page_says(namespace, capsys):
