@@ -1,0 +1,219 @@
+"""Tile layers: cells of tile grids, one-way runs, polygons, entities of single tiles, and what there is to draw."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..components import AABBCollider
+from ..plugins.tile_grid import TileGridCollider
+from .bodies import Bodies
+from .errors import Findings, RefusedError
+from .fields import ONE_WAY, Fields
+from .level import LevelLayer, Tiles
+from .model import DIAGONAL, MapData, MapLayer, MapObject, Tile
+from .plan import Chain, Planned, transform
+from .shapes import Shape, collider_of, is_convex, tile_shapes
+
+SAME = 1e-9  # of a tile
+
+
+@dataclass
+class Meaning:
+    """What a tile is in a tile layer, however it is flipped: decoration if it is not solid and has no entity."""
+
+    tile: Tile
+    fields: Fields
+    solid: bool
+    is_entity: bool
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """The same for tiles of one material."""
+        return tuple(sorted((name, _hashable(value)) for name, value in self.fields.material.items()))
+
+
+class TileLayers:
+    """Makes plans of tile layers; ``metres``: the side of a tile."""
+
+    def __init__(self, data: MapData, metres: float, bodies: Bodies, findings: Findings) -> None:
+        self.data, self.metres, self.scale = data, metres, metres / data.tile
+        self.bodies, self.sorter, self.findings = bodies, bodies.sorter, findings
+
+    def planned(self, layer: MapLayer, base: Fields, out: LevelLayer) -> list[Planned]:
+        assert layer.cells is not None
+        out.tiles = self.pictures(layer)
+        if base.is_solid is False:
+            return []
+        meanings = self._meanings(layer, base)
+        if not meanings:
+            return []
+        if tuple(layer.parallax) != (1.0, 1.0):
+            raise RefusedError(f"solid tiles in a layer with parallax {layer.parallax}: class Decoration makes it pictures")
+        if base.prefabs:
+            raise RefusedError("a prefab as the class of a tile layer; give it to its tiles")
+        place = f"layer {layer.name!r}"
+        lower = np.array((layer.offset[0], -layer.offset[1])) * self.scale
+        made: list[Planned] = []
+        grids: dict[tuple[Any, ...], tuple[np.ndarray, Fields]] = {}
+        runs: dict[tuple[Any, ...], tuple[np.ndarray, Fields]] = {}
+        for gid, meaning in meanings.items():
+            with self.findings.at(meaning.tile.where):
+                here = layer.cells == gid
+                if meaning.is_entity:
+                    made += self._entities(here, meaning, layer, out)
+                elif meaning.tile.shapes:
+                    full, others = self._shaped(here, meaning, layer, out, lower, place)
+                    _add(grids, meaning, full)
+                    made += others
+                else:
+                    _add(runs if ONE_WAY in meaning.fields.marks else grids, meaning, here)
+        for cells, fields in grids.values():
+            if cells.any():
+                for faces in TileGridCollider.floors_and_walls(cells, self.metres, lower=(0, 0), **fields.material):
+                    body = [transform(lower), faces, *self._components(base)]
+                    made.append(Planned(place, out, list(base.kinds), bodies=[body]))
+        for cells, fields in runs.values():
+            made += self._one_way(cells, fields, base, out, lower, place)
+        return made
+
+    def _meanings(self, layer: MapLayer, base: Fields) -> dict[int, Meaning]:
+        """Of the tiles that are more than pictures, by their numbers."""
+        found = {}
+        for gid in np.unique(layer.cells).tolist():
+            tile = self.data.tiles.get(gid)
+            if tile is None:
+                continue
+            with self.findings.at(tile.where):
+                fields = self.sorter.sort(tile.kinds, tile.properties)
+                fields.material = {**base.material, **fields.material}
+                is_entity = bool(fields.of or fields.prefabs)
+                solid = fields.is_solid
+                if solid is None:
+                    solid = bool(base.is_solid or tile.shapes)
+                if solid or is_entity:
+                    found[gid] = Meaning(tile, fields, solid, is_entity)
+        return found
+
+    def _components(self, fields: Fields) -> list[Any]:
+        if fields.references:
+            raise RefusedError("properties of a tile layer cannot refer to objects")
+        return [kind(**values) for kind, values in fields.of.items()]
+
+    # -- bodies ----------------------------------------------------------------------------------------
+
+    def _entities(self, here: np.ndarray, meaning: Meaning, layer: MapLayer, out: LevelLayer) -> list[Planned]:
+        """An entity for each cell with a tile that has a class of its own, and its picture a sprite."""
+        assert layer.flips is not None
+        assert out.tiles is not None
+        tile, made = meaning.tile, []
+        base = Fields(material=dict(meaning.fields.material))
+        for row, column in np.argwhere(here).tolist():
+            flips = int(layer.flips[row, column])
+            size = tile.size[::-1] if flips & DIAGONAL else tile.size
+            corner = np.array((column, row + 1.0)) * self.data.tile + tile.offset
+            thing = MapObject(None, "", "", "tile", corner, size, tile=tile, flips=flips, origin=(0.0, 1.0))
+            place = f"layer {layer.name!r}, row {row}, column {column}"
+            planned = self.bodies.planned(place, thing, layer, base, out, None)
+            made += [planned] if planned is not None else []
+        cells = out.tiles.cell
+        out.tiles = Tiles(*(each[~here[cells[:, 0], cells[:, 1]]] for each in out.tiles))
+        return made
+
+    def _shaped(
+        self, here: np.ndarray, meaning: Meaning, layer: MapLayer, out: LevelLayer, lower: np.ndarray, place: str
+    ) -> tuple[np.ndarray, list[Planned]]:
+        """(the cells that are full, plans of the others): tiles with shapes of the collision editor."""
+        made, full = [], np.zeros(here.shape, bool)
+        assert layer.flips is not None
+        for flips in np.unique(layer.flips[here]).tolist():
+            cells = here & (layer.flips == flips)
+            shapes = self.shapes(meaning.tile, flips)
+            if len(shapes) == 1 and self._fills(shapes[0]):
+                full |= cells
+                continue
+            material = dict(meaning.fields.material)
+            if ONE_WAY in meaning.fields.marks:
+                material.setdefault("one_way", (0.0, 1.0))
+            for row, column in np.argwhere(cells).tolist():
+                corner = lower + self.corner(row, column)
+                planned = Planned(f"{place}, {meaning.tile.where}", out, [])
+                for shape in shapes:
+                    if shape.kind == "line":
+                        planned.chains.append(Chain(corner + shape.points, False, 0.0, material))
+                    elif shape.kind == "polygon" and not is_convex(shape.points):
+                        planned.chains.append(Chain(corner + shape.points[::-1], True, 0.0, material))
+                    else:
+                        collider, centre, angle = collider_of(shape, material, False)
+                        planned.bodies.append([transform(corner + centre, angle), collider])
+                made.append(planned)
+        return full, made
+
+    def shapes(self, tile: Tile, flips: int) -> list[Shape]:
+        """Of a tile as it lies in a cell, from the cell's lower left corner, m."""
+        width, height = tile.size[::-1] if flips & DIAGONAL else tile.size
+        aside = np.array((tile.offset[0], -tile.offset[1])) * self.scale
+        found = tile_shapes(tile.shapes, tile.size, flips, (width * self.scale, height * self.scale))
+        return [shape.moved(lambda points: points + aside) for shape in found]
+
+    def _fills(self, shape: Shape) -> bool:
+        """Whether it is the whole cell."""
+        whole = self.metres * np.array(((0, 0), (1, 0), (1, 1), (0, 1)))
+        if len(shape.points) != 4 or shape.kind not in ("box", "polygon"):
+            return False
+        return all(np.abs(shape.points - corner).max(axis=1).min() <= SAME * self.metres for corner in whole)
+
+    def corner(self, row: int, column: int) -> np.ndarray:
+        """(2,) m, the lower left one of a cell."""
+        return self.metres * np.array((column, self.data.rows - 1 - row), float)
+
+    def _one_way(
+        self, cells: np.ndarray, fields: Fields, base: Fields, out: LevelLayer, lower: np.ndarray, place: str
+    ) -> list[Planned]:
+        """A line for each run of one-way cells, on their upper side."""
+        made = []
+        for row in np.flatnonzero(cells.any(axis=1)).tolist():
+            ends = np.flatnonzero(np.diff(np.concatenate(((0,), cells[row].astype(np.int8), (0,)))))
+            for first, last in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True):
+                half = 0.5 * self.metres * (last - first)
+                middle = lower + self.corner(row, first) + (half, self.metres)
+                collider = AABBCollider((half, 0.0), **{"one_way": (0.0, 1.0), **fields.material})
+                body = [transform(middle), collider, *self._components(base)]
+                made.append(Planned(place, out, list(base.kinds), bodies=[body]))
+        return made
+
+    # -- pictures --------------------------------------------------------------------------------------
+
+    def pictures(self, layer: MapLayer) -> Tiles:
+        """What a tile layer shows: tiles stand on the lower side of their cells."""
+        if layer.painted is not None:
+            place, picture, flips = layer.painted
+            sizes = np.array([each.size for each in self.data.pictures], float).reshape(-1, 2)[picture]
+            places = np.stack((place[:, 0], self.data.rows * self.data.tile - place[:, 1] - sizes[:, 1]), axis=1)
+            places += np.array((layer.offset[0], -layer.offset[1]))
+            return Tiles(places * self.scale, picture, flips, np.full((len(picture), 2), -1))
+        assert layer.cells is not None
+        assert layer.flips is not None
+        rows, columns = np.nonzero(layer.cells)
+        gids = layer.cells[rows, columns]
+        known, which = np.unique(gids, return_inverse=True)
+        tiles = [self.data.tiles.get(gid) for gid in known.tolist()]
+        picture = np.array([-1 if tile is None else tile.picture for tile in tiles], np.int64)
+        aside = np.array([(0.0, 0.0) if tile is None else tile.offset for tile in tiles], float).reshape(-1, 2)
+        place = np.stack((columns, self.data.rows - 1 - rows), axis=1) * self.data.tile
+        place = place + (aside[which] + layer.offset) * (1.0, -1.0)
+        seen = picture[which] >= 0
+        return Tiles((place * self.scale)[seen], picture[which][seen], layer.flips[rows, columns][seen],
+                     np.stack((rows, columns), axis=1)[seen])  # fmt: skip
+
+
+def _add(found: dict[tuple[Any, ...], tuple[np.ndarray, Fields]], meaning: Meaning, cells: np.ndarray) -> None:
+    if meaning.key not in found:
+        found[meaning.key] = np.zeros(cells.shape, bool), meaning.fields
+    found[meaning.key][0][cells] = True
+
+
+def _hashable(value: Any) -> Any:
+    return tuple(value) if isinstance(value, (list, tuple, np.ndarray)) else value
