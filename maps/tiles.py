@@ -51,7 +51,7 @@ class TileLayers:
         if not meanings:
             return []
         if tuple(layer.parallax) != (1.0, 1.0):
-            raise RefusedError(f"solid tiles in a layer with parallax {layer.parallax}: class Decoration makes it pictures")
+            raise RefusedError(f"solid tiles with parallax {layer.parallax}: class Decoration makes the layer pictures")
         if base.prefabs:
             raise RefusedError("a prefab as the class of a tile layer; give it to its tiles")
         place = f"layer {layer.name!r}"
