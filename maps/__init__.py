@@ -7,6 +7,6 @@
 
 from .errors import Finding, MapError
 from .level import Level
-from .loading import check, load
+from .loading import check, levels_of, load, look_at, world_of
 
-__all__ = ["Finding", "Level", "MapError", "check", "load"]
+__all__ = ["Finding", "Level", "MapError", "check", "levels_of", "load", "look_at", "world_of"]

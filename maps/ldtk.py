@@ -32,10 +32,16 @@ def read_ldtk(
     return Reader(path, node, findings, is_class).level(_level_of(path, node, level))
 
 
+def level_names(node: Node) -> list[str]:
+    return [word(each, "identifier") for each in _levels(node)]
+
+
+def _levels(node: Node) -> list[Node]:
+    return nodes(node, "levels") + [each for world in nodes(node, "worlds") for each in nodes(world, "levels")]
+
+
 def _level_of(path: Path, node: Node, name: str | None) -> Node:
-    worlds = nodes(node, "worlds")
-    levels = nodes(node, "levels") + [each for one in worlds for each in nodes(one, "levels")]
-    names = [word(each, "identifier") for each in levels]
+    levels, names = _levels(node), level_names(node)
     if name is None and len(levels) != 1:
         choice = f"choose one, level=..., of {', '.join(names)}" if names else "there is nothing to load"
         raise RefusedError(f"the project has {len(levels)} levels: {choice}")

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 
 from ..components import Collider, Prefab
-from ..framework import CaromError, Component, World
+from ..framework import CaromError, Component, Plugin, Settings, World
+from ..framework.plugins.discovery import find
+from ..plugins import Physics
 from ..systems.shapes.geometry_levels import in_order
 from .bodies import Bodies
 from .errors import Finding, Findings, MapError, RefusedError
 from .fields import Sorter, Vocabulary
-from .ldtk import is_ldtk, read_ldtk
+from .ldtk import is_ldtk, level_names, read_ldtk
 from .level import Level, LevelLayer
 from .model import MapData, MapLayer
 from .plan import Maker, Planned
@@ -70,13 +72,54 @@ def check(
 ) -> list[Finding]:
     """All that is wrong with a map, [] if nothing is; arguments as of :func:`load`, ``lenient``: classes that are not
     given are taken for the game's, and not looked at; images that are missing are findings too."""
+    names = {"components": components, "prefabs": prefabs, "layers": layers, "materials": materials}
+    return look_at(path, level=level, world=world, lenient=lenient, **names)[0]
+
+
+def look_at(
+    path: str | Path, *, level: str | None = None, world: World | None = None, lenient: bool = False, **names: Any
+) -> tuple[list[Finding], set[str]]:
+    """(what :func:`check` finds, the classes that a lenient check has not looked at)."""
+    given = {"components": (), "prefabs": None, "layers": None, "materials": None, **names}
     try:
-        plan = Plan.of(path, world, components, prefabs, layers, materials, level, 1.0, lenient)
+        plan = Plan.of(path, world, *given.values(), level, 1.0, lenient)
     except MapError as error:
-        return error.findings
+        return error.findings, set()
     for each in missing_images(plan.level):
         plan.findings.add(f"image {each} is missing; what it shows is drawn as boxes")
-    return plan.findings.found
+    return plan.findings.found, plan.known.unknown
+
+
+def world_of(
+    path: str | Path, *plugins: Plugin, settings: Settings | None = None, level: str | None = None, metres: float = 1.0
+) -> tuple[World, Level]:
+    """(a new world with the plugins that a map needs and others, the map in it); classes of a game that nothing here
+    knows mean nothing. MapError for what is wrong with the map."""
+    options: Any = ((), None, None, None, level, metres, True)
+    plan = Plan.of(path, None, *options)
+    plan.findings.refuse()
+    names = {component.plugin or component.__module__.split(".")[2] for component in plan.types if _is_carom(component)}
+    given = {plugin.name for plugin in plugins}
+    needed = [find(name) for name in sorted(names - given)]
+    world = World(Physics(dimensions=2, gravity=(0.0, -9.81)), *needed, *plugins, settings=settings or Settings())
+    plan = Plan.of(path, world, *options)
+    plan.findings.refuse()
+    Maker(world, plan.level).make(plan.planned)
+    return world, plan.level
+
+
+def _is_carom(component: type[Component]) -> bool:
+    """Whether a plugin of this package brings it."""
+    return bool(component.plugin) or component.__module__.startswith(f"{__package__.partition('.')[0]}.plugins.")
+
+
+def levels_of(path: str | Path) -> list[str | None]:
+    """The names of the levels in an LDtk project; of a map of Tiled, or a file that cannot be read, [None]."""
+    try:
+        node = document(Path(path))
+        return list(level_names(node)) if is_ldtk(node) else [None]
+    except RefusedError:
+        return [None]
 
 
 def missing_images(level: Level) -> list[Path]:

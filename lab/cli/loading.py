@@ -24,6 +24,8 @@ from ...framework import Plugin, Settings, World
 from .options import Corners, apply, corners
 from .usage_errors import Problem, did_you_mean, one_line
 
+MAPS = (".tmx", ".tmj", ".ldtk")
+
 
 @dataclass(frozen=True)
 class Loaded:
@@ -129,6 +131,10 @@ def load(target: str) -> Loaded:
         return Loaded(scene.name, scene.build, seconds=scene.seconds, view=scene.view, settings=scene.settings)
     if path.suffix == ".py":
         return _load_file(path)
+    if path.suffix in MAPS:
+        from .maps import loaded_map  # only here: it needs this module
+
+        return loaded_map(path)
     if path.exists() or path.parent != Path():
         raise Problem(f"{target!r} is no scene, and no Python file: its name ends in .py")
     raise Problem(f"no scene named {target!r}{did_you_mean(target, scenes.names())} (a file of one's own ends in .py)")

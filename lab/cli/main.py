@@ -17,6 +17,7 @@ from .group import LateCommands
 COMMANDS = {
     "build": ("build.command:build_command", "Build a game's kernels into a library."),
     "limits": ("limits.command:limits_command", "How long a scene's step may be, and what limits it."),
+    "maps": ("cli.maps:maps_command", "Check maps of Tiled and LDtk."),
     "plan": ("cli.plan:plan_command", "Show what a step of a scene runs, and why."),
     "plugins": ("plugins.command:plugins_command", "List plugins, or check one."),
     "run": ("cli.run:run_command", "Run a scene or a file and show what happened."),

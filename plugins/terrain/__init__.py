@@ -1,6 +1,7 @@
 """Terrain: ground of many pieces that bodies roll and slide over without catching where the pieces meet."""
 
 from .chain import create_chain
+from .image import outline_of_image
 from .mesh import create_height_field, create_triangle_mesh
 from .segment import ChainSegmentCollider
 from .segment import plugin as plugin
@@ -12,4 +13,5 @@ __all__ = [
     "create_chain",
     "create_height_field",
     "create_triangle_mesh",
+    "outline_of_image",
 ]

@@ -37,7 +37,7 @@ _NAMES = {
     "plugins.springs": ("Spring", "Springs"),
     "plugins.terrain": (
         "ChainSegmentCollider", "TerrainTriangleCollider",
-        "create_chain", "create_height_field", "create_triangle_mesh",
+        "create_chain", "create_height_field", "create_triangle_mesh", "outline_of_image",
     ),
     "plugins.tile_grid": ("TileGridCollider", "cells_of_text"),
     "plugins.timers": ("Timer", "Timers"),

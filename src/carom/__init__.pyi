@@ -34,6 +34,7 @@ from .plugins.terrain import TerrainTriangleCollider as TerrainTriangleCollider
 from .plugins.terrain import create_chain as create_chain
 from .plugins.terrain import create_height_field as create_height_field
 from .plugins.terrain import create_triangle_mesh as create_triangle_mesh
+from .plugins.terrain import outline_of_image as outline_of_image
 from .plugins.tile_grid import TileGridCollider as TileGridCollider
 from .plugins.tile_grid import cells_of_text as cells_of_text
 from .plugins.timers import Timer as Timer
