@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -149,8 +150,8 @@ class LevelLayer:
 class Level:
     """A map in a world; see :func:`carom.maps.load`.
 
-    size, metres
-        (width, height) m of the map, and the side of a tile; its lower left corner is at (0, 0)
+    size, metres, tile_pixels
+        (width, height) m of the map, and the side of a tile in m and pixels; its lower left corner is at (0, 0)
     entities, points
         by the names of objects: entities, and places (x, y) m of points
     of_class
@@ -163,8 +164,8 @@ class Level:
         of the map
     """
 
-    def __init__(self, file: Path, size: tuple[float, float], metres: float) -> None:
-        self.file, self.size, self.metres = file, size, metres
+    def __init__(self, file: Path, size: tuple[float, float], metres: float, tile_pixels: float) -> None:
+        self.file, self.size, self.metres, self.tile_pixels = file, size, metres, tile_pixels
         self.entities: dict[str, int] = Names("object")
         self.points: dict[str, tuple[float, float]] = Names("point")
         self.of_class: dict[str, list[int]] = Classes()
@@ -173,12 +174,42 @@ class Level:
         self.properties: dict[str, Any] = {}
         self.background = ""
         self.objects: dict[Any, LevelObject] = {}
+        self._pictures: Any = None
 
     def object(self, id: Any) -> LevelObject:
         """The object with this id: of Tiled a number, of LDtk a text; KeyError if there is none."""
         if id not in self.objects:
             raise KeyError(f"no object has the id {id!r}")
         return self.objects[id]
+
+    def draw(self, surface: Any, camera: Any, layers: Iterable[str] | None = None, seconds: float = 0.0) -> None:
+        """Draw tiles, images, and objects without a body, on a pygame.Surface; ImportError without pygame.
+
+        camera
+            where metres are on it, as :class:`carom.view.Camera`
+        layers
+            names of those to draw, in this order; None: all that are visible
+        seconds
+            of game time, for animated tiles
+        """
+        self._pictures_with_pygame().draw(surface, camera, layers, seconds)
+
+    def add_sprites(self, sprites: Any, layers: Iterable[str] | None = None) -> None:
+        """Give the bodies of tile objects their pictures; ImportError without pygame.
+
+        sprites
+            as :class:`carom.view.Sprites`, whose ``add`` is called for each
+        layers
+            names of those whose objects get some; None: all
+        """
+        self._pictures_with_pygame().add_sprites(sprites, layers)
+
+    def _pictures_with_pygame(self) -> Any:
+        if self._pictures is None:
+            from .pictures import Pictures  # only here: games without a window have no pygame
+
+            self._pictures = Pictures(self)
+        return self._pictures
 
     def __repr__(self) -> str:
         size = f"{self.size[0]:g} x {self.size[1]:g} m"

@@ -134,7 +134,7 @@ class Plan:
     def __init__(self, file: Path, data: MapData, findings: Findings, known: Vocabulary, metres: float) -> None:
         self.findings, self.known, self.planned = findings, known, list[Planned]()
         scale = metres / data.tile
-        self.level = level = Level(file, (data.columns * metres, data.rows * metres), metres)
+        self.level = level = Level(file, (data.columns * metres, data.rows * metres), metres, data.tile)
         level.pictures, level.background = data.pictures, data.background
         level.properties = {name: each.value for name, each in data.properties.items()}
         objects = {thing.id: (thing, layer) for layer in data.layers for thing in layer.objects}
