@@ -103,7 +103,9 @@ class Bodies:
         if is_place and not kinds and not fielded:
             return None  # what it says is for the game
         fields = self.sorter.sort(kinds, properties, base)
-        if thing.id in self.paths:
+        if thing.id in self.paths and thing.id is not None:
+            if "path" in fields.words:
+                raise RefusedError("it is a path, and has one itself")
             return None
         made = Planned(place, out, fields.kinds, seen)
         solid = fields.is_solid is not False and not is_place

@@ -7,7 +7,16 @@ import math
 import numpy as np
 import pytest
 from helpers_maps import (
-    FLIPPED, SLOPE, map_of, objects_of, quiet_world_for_maps, thing, tile, tiles_of, tileset, write,
+    FLIPPED,
+    SLOPE,
+    map_of,
+    objects_of,
+    quiet_world_for_maps,
+    thing,
+    tile,
+    tiles_of,
+    tileset,
+    write,
 )  # fmt: skip
 
 from carom import BoxCollider, RigidBody, Transform, maps
@@ -87,7 +96,8 @@ def test_objects_of_each_shape_are_where_they_were_drawn(suffix, tmp_path):
         thing(8, 90, 140, polygon=concave, rotation=10, properties={"sensor": True}),
         thing(9, 160, 140, 10, 24, rotation=180, properties={"shape": "capsule"}),
     ]  # fmt: skip
-    group = {"type": "group", "name": "far", "offsetx": 5, "offsety": -3, "layers": [objects_of(*drawn, offsetx=2, offsety=1)]}
+    inner = objects_of(*drawn, offsetx=2, offsety=1)
+    group = {"type": "group", "name": "far", "offsetx": 5, "offsety": -3, "layers": [inner]}
     path = write(tmp_path / f"map.{suffix}", map_of(12, 12, group))
     world = quiet_world_for_maps()
     level = maps.load(path, world, metres=0.5)
@@ -103,6 +113,10 @@ def test_objects_of_each_shape_are_where_they_were_drawn(suffix, tmp_path):
     angle = world.component_for_entity(level.object(2).entity, Transform).rotation
     assert angle == pytest.approx(-math.radians(30))
     world.close()
+
+
+FULL = ((0, 0), (16, 0), (16, 16), (0, 16))
+SHAPES_OF = (), FULL, FULL, SLOPE, ((0, 8), (16, 8), (16, 16), (0, 16)), (), FULL  # of the tiles below
 
 
 def contains(each, pixel) -> bool:
@@ -179,14 +193,15 @@ def test_random_tile_maps_are_solid_where_their_cells_are(seed, tmp_path):
     for k in range(2):
         cells = np.where(random.random((rows, columns)) < 0.5, random.integers(1, 7, (rows, columns)), 0)
         flips = random.integers(0, 8, (rows, columns))
-        gids = np.array([[gid(int(c), int(f)) if c else 0 for c, f in zip(a, b, strict=True)] for a, b in zip(cells, flips, strict=True)])
+        gids = np.array([gid(int(c), int(f)) if c else 0 for c, f in zip(cells.flat, flips.flat, strict=True)])
+        gids = gids.reshape(rows, columns)
         raw = gids.astype("<u4").tobytes()
         coded = {"data": base64.b64encode(zlib.compress(raw)).decode(), "encoding": "base64", "compression": "zlib"}
         layers.append(tiles_of(gids, f"layer {k}", **(coded if k else {})))
         for r in range(rows):
             for c in range(columns):
                 kind = int(cells[r, c])
-                shape = {0: (), 5: (), 3: SLOPE, 4: ((0, 8), (16, 8), (16, 16), (0, 16))}.get(kind, ((0, 0), (16, 0), (16, 16), (0, 16)))
+                shape = SHAPES_OF[kind]
                 part = slice(16 * r, 16 * r + 16), slice(16 * c, 16 * c + 16)
                 if len(shape):
                     wanted[part] |= flipped(mask_of(shape), flips[r, c])

@@ -43,6 +43,7 @@ def with_layer(**fields):
     return map_of(6, 4, {**tiles_of(CELLS), **fields})
 
 
+LINE = thing(8, 0, 0, polyline=((0, 0), (9, 9)))
 IT = "layer 'things', object 7 'it'"
 BROKEN = {
     # of the file
@@ -53,18 +54,26 @@ BROKEN = {
     "too large": (good(width=10_000, height=1_000), ["10000 x 1000 = 10,000,000 tiles; at most"]),
     "no squares": (good(tileheight=8), ["tiles are 16 x 8 pixels; they must be square"]),
     "no size": ({**good(), "width": "many"}, ["'width' must be a number, got 'many'"]),
-    "missing tileset": (good(tilesets=[{"firstgid": 1, "source": "none.tsx"}]), ["tileset 'none.tsx': none.tsx is missing"]),
+    "missing tileset": (
+        good(tilesets=[{"firstgid": 1, "source": "none.tsx"}]),
+        ["tileset 'none.tsx': none.tsx is missing"],
+    ),
     "not a tileset": (good(tilesets=[{"firstgid": 1, "source": "map.tmx"}]), ["map.tmx is no tileset"]),
     # of tile layers
     "rows missing": (with_layer(data=[1] * 18), ["layer 'ground': its data has 18 cells, and the map 6 x 4 = 24"]),
     "no numbers": (with_layer(data="1,x,2"), ["layer 'ground': its data cannot be read"]),
     "bad base64": (with_layer(data="!!!", encoding="base64"), ["layer 'ground': its data"]),
-    "bad zlib": (with_layer(data="AAAA", encoding="base64", compression="zlib"), ["layer 'ground': its data cannot be read"]),
+    "bad zlib": (
+        with_layer(data="AAAA", encoding="base64", compression="zlib"),
+        ["layer 'ground': its data cannot be read"],
+    ),
     "zstd": (with_layer(data="AAAA", encoding="base64", compression="zstd"), ["compression zstd; choose CSV or zlib"]),
     "unknown tile": (with_layer(data=[99] + [0] * 23), ["row 0, column 0 has tile 99, which is in no tileset"]),
     "solid in parallax": (with_layer(parallaxx=0.5), ["layer 'ground': solid tiles with parallax (0.5, 1.0)"]),
-    "tile's property": (good(tilesets=[tileset(tile(0, "Solid", friktion=1.0))]),
-                        ["tileset 'basic', tile 0, property 'friktion'", "did you mean 'friction'?"]),
+    "tile's property": (
+        good(tilesets=[tileset(tile(0, "Solid", friktion=1.0))]),
+        ["tileset 'basic', tile 0, property 'friktion'", "did you mean 'friction'?"],
+    ),
     "tile's class": (good(tilesets=[tileset(tile(0, "Solidd"))]), ["tile 0, class 'Solidd'", "did you mean 'Solid'?"]),
     "layer's class": (with_layer(**{"class": "Lavva"}), ["layer 'ground', class 'Lavva'"]),
     # of objects
@@ -72,37 +81,82 @@ BROKEN = {
     "one of two classes": (with_object(kind="Coin, Enmy"), [f"{IT}, class 'Enmy'", "did you mean 'Enemy'?"]),
     "a collider as class": (with_object(kind="SphereCollider"), [f"{IT}, class 'SphereCollider': the shape"]),
     "misspelt property": (with_object(properties={"mas": 2.0}), [f"{IT}, property 'mas'", "did you mean 'mass'?"]),
-    "unknown component": (with_object(properties={"Enemi.health": 1.0}), [f"{IT}, property 'Enemi.health'", "'Enemy'?"]),
-    "unknown field": (with_object(properties={"Enemy.helth": 1.0}), ["Enemy has no field 'helth' (did you mean 'health'?)"]),
-    "field of a class": (with_object(properties={"foe": ("Enemy", {"helth": 1.0})}), [f"{IT}, property 'foe'", "'health'?"]),
+    "unknown component": (
+        with_object(properties={"Enemi.health": 1.0}),
+        [f"{IT}, property 'Enemi.health'", "'Enemy'?"],
+    ),
+    "unknown field": (
+        with_object(properties={"Enemy.helth": 1.0}),
+        ["Enemy has no field 'helth' (did you mean 'health'?)"],
+    ),
+    "field of a class": (
+        with_object(properties={"foe": ("Enemy", {"helth": 1.0})}),
+        [f"{IT}, property 'foe'", "'health'?"],
+    ),
     "no such class": (with_object(properties={"foe": ("Enmy", {"health": 1.0})}), ["class 'Enmy' is no component"]),
-    "negative mass": (with_object(properties={"mass": -2.0}), [f"{IT}, property 'mass': RigidBody.mass must be positive"]),
+    "negative mass": (
+        with_object(properties={"mass": -2.0}),
+        [f"{IT}, property 'mass': RigidBody.mass must be positive"],
+    ),
     "text for a number": (with_object(properties={"mass": "2"}), [f"{IT}, property 'mass'", "choose the type float"]),
     "negative field": (with_object(kind="Enemy", properties={"health": -1.0}), ["Enemy.health must be at least 0"]),
     "a kind": (with_object(properties={"kind": "dynamik"}), [f"{IT}, property 'kind'", "dynamic, kinematic, static"]),
     "no vector": (with_object(properties={"linear_velocity": "fast"}), [f"{IT}, property 'linear_velocity'", "'0, 1'"]),
     "three numbers": (with_object(properties={"linear_velocity": "1, 2, 3"}), [f"{IT}", "must have 2 components"]),
-    "unknown layer": (with_object(properties={"layer": "coins"}), [f"{IT}, property 'layer': no layer is named 'coins'"]),
-    "unknown shape": (with_object(properties={"shape": "blob"}), [f"{IT}, property 'shape': it must be one of box, capsule"]),
+    "unknown layer": (
+        with_object(properties={"layer": "coins"}),
+        [f"{IT}, property 'layer': no layer is named 'coins'"],
+    ),
+    "unknown shape": (
+        with_object(properties={"shape": "blob"}),
+        [f"{IT}, property 'shape': it must be one of box, capsule"],
+    ),
     "no extent": (with_object(w=0), [f"{IT}: a rectangle of 0 x 16 pixels"]),
     "flat polygon": (with_object(polygon=((0, 0), (8, 8), (16, 16))), [f"{IT}: the polygon has no area"]),
     "two corners": (with_object(polygon=((0, 0), (8, 8))), [f"{IT}: a polygon of 2 points"]),
     "crossing": (with_object(polygon=((0, 0), (16, 16), (20, 0), (0, 12))), [f"{IT}: the outline crosses"]),
-    "crossing body": (with_object(polygon=((0, 0), (16, 16), (20, 0), (0, 12)), properties={"mass": 1.0}), [f"{IT}: ", "cross"]),
+    "crossing body": (
+        with_object(polygon=((0, 0), (16, 16), (20, 0), (0, 12)), properties={"mass": 1.0}),
+        [f"{IT}: ", "cross"],
+    ),
     "line of a point": (with_object(polyline=((3, 3), (3, 3))), [f"{IT}: a polyline of less than two points"]),
-    "body of a line": (with_object(polyline=((0, 0), (9, 9)), properties={"mass": 1.0}), [f"{IT}: a polyline is a chain"]),
-    "no numbers in points": ({**good(), "layers": [objects_of({**thing(7, 0, 0, name="it"), "polygon": [{"x": "a", "y": 0}]})]},
-                             [f"{IT}: 'polygon' must be pairs of numbers"]),
-    "no place": ({**good(), "layers": [objects_of({"id": 7, "name": "it", "width": 3, "height": 3, "y": 2})]},
-                 [f"{IT}: 'x' is missing"]),
+    "body of a line": (
+        with_object(polyline=((0, 0), (9, 9)), properties={"mass": 1.0}),
+        [f"{IT}: a polyline is a chain"],
+    ),
+    "no numbers in points": (
+        {**good(), "layers": [objects_of({**thing(7, 0, 0, name="it"), "polygon": [{"x": "a", "y": 0}]})]},
+        [f"{IT}: 'polygon' must be pairs of numbers"],
+    ),
+    "no place": (
+        {**good(), "layers": [objects_of({"id": 7, "name": "it", "width": 3, "height": 3, "y": 2})]},
+        [f"{IT}: 'x' is missing"],
+    ),
     "unknown tile of an object": (with_object(gid=77), [f"{IT}: it shows tile 77, which is in no tileset"]),
-    "body in parallax": ({**good(), "layers": [objects_of(thing(7, 0, 0, 5, 5, name="it"), parallaxx=0.5)]}, ["a body in a layer"]),
+    "body in parallax": (
+        {**good(), "layers": [objects_of(thing(7, 0, 0, 5, 5, name="it"), parallaxx=0.5)]},
+        ["a body in a layer"],
+    ),
     # of references
-    "no such object": (with_object(kind="Enemy", properties={"target": Ref(55)}), [f"{IT}, property 'Enemy.target'", "object 55"]),
-    "a path of a box": (with_object(properties={"path": Ref(1), "speed": 1.0}), [f"{IT}: object 1 'crate' is a rectangle"]),
-    "a path without speed": (with_object(properties={"path": Ref(8)}), [f"{IT}"]),
+    "no such object": (
+        with_object(kind="Enemy", properties={"target": Ref(55)}),
+        [f"{IT}, property 'Enemy.target'", "object 55"],
+    ),
+    "a path of a box": (
+        with_object(properties={"path": Ref(1), "speed": 1.0}),
+        [f"{IT}: object 1 'crate' is a rectangle"],
+    ),
+    "a path without speed": (
+        {**good(), "layers": [objects_of(thing(7, 0, 0, 5, 5, name="it", properties={"path": Ref(8)}), LINE)]},
+        [f"{IT}: its path needs a speed"],
+    ),
+    "a path of itself": (
+        with_object(polygon=U, properties={"path": Ref(7), "speed": 1.0}),
+        [f"{IT}: it is a path, and has one itself"],
+    ),
+    "a path of nothing": (with_object(properties={"path": Ref(8), "speed": 1.0}), [f"{IT}: it refers to object 8"]),
     "a template": (with_object(template="none.tx"), [f"{IT}: none.tx is missing"]),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", BROKEN)
@@ -148,9 +202,10 @@ def test_all_findings_are_told_at_once(tmp_path):
     found = maps.check(path, (Coin, Enemy))
     places = [each.place for each in found]
     assert places == [
-        "layer 'ground'", *(f"layer 'things', object {k}, property '{name}'" for k in (3, 4) for name in ("mas", "frction")),
+        "layer 'ground'",
+        *(f"layer 'things', object {k}, property '{name}'" for k in (3, 4) for name in ("mas", "frction")),
         "",
-    ]  # fmt: skip
+    ]
     assert "basic.png is missing" in found[-1].text
     with pytest.raises(maps.MapError, match="and 4 more: carom maps check") as told:
         maps.load(path, World(Physics(2)))
@@ -192,9 +247,11 @@ def test_templates_in_a_circle_are_refused(tmp_path):
 def test_wrong_arguments_are_told_before_a_file_is_read():
     world = World(Physics(2))
     for bad, told in (
-        ({"components": (3,)}, "components are classes"), ({"prefabs": {"a": 3}}, r"prefabs\['a'\] must be a Prefab"),
-        ({"materials": {"Ice": {"frction": 1}}}, "no field 'frction' .did you mean 'friction'"), ({"metres": 0}, "above 0"),
-    ):  # fmt: skip
+        ({"components": (3,)}, "components are classes"),
+        ({"prefabs": {"a": 3}}, r"prefabs\['a'\] must be a Prefab"),
+        ({"materials": {"Ice": {"frction": 1}}}, "no field 'frction' .did you mean 'friction'"),
+        ({"metres": 0}, "above 0"),
+    ):
         with pytest.raises((ValueError, TypeError), match=told):
             maps.load("none.tmx", world, **bad)
     with pytest.raises(ValueError, match="maps are for 2D worlds, this world has 3"):
