@@ -192,32 +192,40 @@ def test_paths_follow_their_lines(tmp_path, world):
 
 
 def test_lines_are_solid_on_their_right_and_rings_inside(tmp_path, world):
-    """Rays meet a chain from its front alone."""
+    """Balls lie on a line and an island, in a hollow, and fall through a line drawn from right to left."""
     island = ((0, 16), (16, 0), (32, 16), (16, 8))
     drawn = [
         thing(1, 0, 32, polyline=((0, 0), (32, 0))), thing(2, 48, 32, polyline=((32, 0), (0, 0))),
-        thing(3, 96, 16, polygon=island), thing(4, 96, 64, 0, 0, polygon=[*reversed(island)]),
+        thing(3, 96, 16, polygon=island), thing(4, 96, 64, polygon=[*reversed(island)]),
         thing(5, 144, 16, polygon=((0, 0), (32, 0), (32, 32), (0, 32)), properties={"hollow": True}),
         thing(6, 0, 64, polyline=((0, 0), (16, 0), (32, -16)), properties={"one_way": True, "friction": 0.2}),
     ]  # fmt: skip
     level = load(write(tmp_path / "map.tmx", map_of(12, 8, objects_of(*drawn))), world)
-    world.step()
 
-    def met(k, x, y, dy):
-        return bool({each.entity for each in world.ray_cast((x, y), (0, dy), 1.4)} & set(level.object(k).entities))
+    def points(k):
+        entities = level.object(k).entities
+        segments = [world.component_for_entity(each, ChainSegmentCollider) for each in entities]
+        places = [world.component_for_entity(each, Transform).position for each in entities]
+        return np.array([place + each.start for place, each in zip(places, segments, strict=True)]), segments
 
-    assert met(1, 1, 6.5, -1)
-    assert not met(1, 1, 5.5, 1)
-    assert not met(2, 4, 6.5, -1)
-    assert met(2, 4, 5.5, 1)  # it was drawn the other way
-    for k, top in ((3, 7), (4, 4)):
-        assert met(k, 6.5, top + 0.5, -1)
-        assert not met(k, 7.1, top - 0.3, 1)  # from within it is no wall
-    assert met(5, 10, 6, -1)  # the inside is free
-    assert not met(5, 10, 7.5, -1)
-    segments = [world.component_for_entity(each, ChainSegmentCollider) for each in level.object(6).entities]
+    for k, sign in ((3, -1), (4, -1), (5, 1)):
+        x, y = points(k)[0].T
+        assert sign * (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() > 0  # clockwise is solid inside
+    segments = points(6)[1]
     np.testing.assert_allclose([each.one_way for each in segments], ((0, 1), (-1, 1)), atol=1e-12)
     assert {each.friction for each in segments} == {0.2}
+    balls = [
+        world.create_entity(Transform(place), RigidBody(), SphereCollider(0.2))
+        for place in ((1, 6.5), (4, 6.5), (10, 6), (0.5, 4.5), (0.5, 3.4))
+    ]
+    for _ in range(90):
+        world.step()
+    heights = [world.component_for_entity(each, Transform).y for each in balls]
+    assert heights[0] == pytest.approx(6.2, abs=0.01)
+    assert heights[1] < 5
+    assert heights[2] == pytest.approx(5.2, abs=0.01)
+    assert heights[3] == pytest.approx(4.2, abs=0.01)
+    assert heights[4] < 3
 
 
 def test_concave_bodies_are_parts_with_the_mass_of_the_whole(tmp_path, world):
