@@ -1,0 +1,66 @@
+"""``carom maps check``, and maps in ``carom run``."""
+
+from __future__ import annotations
+
+import helpers_cli
+import numpy as np
+import pytest
+from helpers_cli import refusal, report_of
+from helpers_maps import map_of, objects_of, thing, tiles_of, write
+
+carom = helpers_cli.carom  # a fixture
+
+GAME = """
+import enum
+from carom import Component, Prefab, RigidBody, SphereCollider, column
+
+class Layers(enum.IntFlag):
+    WALL, FOE = 1, 2
+
+class Enemy(Component):
+    health = column(default=1.0)
+
+PREFABS = {"goom": Prefab(RigidBody(), SphereCollider(0.5))}
+MATERIALS = {"ice": {"friction": 0.02}}
+"""
+
+
+@pytest.fixture
+def level(tmp_path):
+    cells = np.zeros((4, 6), int)
+    cells[3] = 1
+    drawn = [
+        thing(1, 20, 10, 8, 8, kind="Enemy, goom", properties={"health": 2.0, "layer": "foe"}),
+        thing(2, 60, 10, 8, 8, properties={"mas": 2.0, "spins": True}),
+    ]
+    tileset = {"firstgid": 1, "name": "t", "tilewidth": 16, "tileheight": 16, "tilecount": 1, "columns": 1}
+    tileset["tiles"] = [{"id": 0, "type": "ice"}]
+    return write(tmp_path / "level.tmx", map_of(6, 4, tiles_of(cells), objects_of(*drawn), tilesets=[tileset]))
+
+
+def test_all_findings_are_listed(carom, level, tmp_path):
+    (tmp_path / "game.py").write_text(GAME)
+    with_game = carom("maps", "check", "level.tmx", "--with", "game.py")
+    assert with_game.exit_code == 1
+    (line,) = with_game.stdout.splitlines()
+    assert line.startswith("level.tmx: layer 'things', object 2, property 'mas': ")
+    assert "did you mean 'mass'?" in line
+    alone = carom("maps", "check", "level.tmx")
+    assert (alone.exit_code, alone.stdout) == (1, with_game.stdout)
+    assert alone.stderr == "carom: level.tmx: not looked at without --with game.py: Enemy, goom, ice\n"
+    level.write_text(level.read_text().replace('name="mas"', 'name="mass"'))
+    assert carom("maps", "check", "level.tmx", "--with", "game.py").exit_code == 0
+    (tmp_path / "other.tmj").write_text("{")
+    several = carom("maps", "check", "level.tmx", "other.tmj", "--with", "game.py")
+    assert several.exit_code == 1
+    assert several.stdout.startswith("other.tmj: other.tmj is no JSON that can be read")
+    assert "level.py" in refusal(carom("maps", "check", "level.tmx", "--with", "level.py"))
+
+
+def test_a_map_runs_with_the_plugins_that_it_needs(carom, level):
+    level.write_text(level.read_text().replace('name="mas"', 'name="mass"').replace('type="ice"', 'type="Solid"'))
+    report = report_of(carom("run", "level.tmx", "--steps", "3", "--no-pictures", "--json"))
+    assert report["bodies"] == {"dynamic": 1, "kinematic": 0, "static": 3, "total": 4}
+    level.write_text("<map")
+    assert "is no XML that can be read" in refusal(carom("run", "level.tmx"))
+    assert "none.tmx is missing" in refusal(carom("run", "none.tmx"))

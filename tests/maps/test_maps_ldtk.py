@@ -1,0 +1,173 @@
+"""Levels of LDtk projects, written by code in the form of its JSON."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from helpers_maps import quiet_world_for_maps
+
+from carom import AABBCollider, Component, Path, RigidBody, SphereCollider, TileGridCollider, Transform, column, maps
+from carom.framework.typing import VectorField
+
+GRID = 16
+
+
+class Enemy(Component):
+    health = column(default=3.0, minimum=0.0)
+    target = column(default=0, dtype=int)
+    home: VectorField = column(default=0.0, item="vector")
+
+
+class Spring(Component):
+    power = column(default=1.0)
+
+
+class Gate(Component): ...
+
+
+def field(name, kind, value):
+    return {"__identifier": name, "__type": kind, "__value": value}
+
+
+def entity(iid, kind, x, y, w=16, h=16, pivot=(0, 0), fields=(), uid=1, tile=None):
+    return {
+        "__identifier": kind, "__grid": [x // GRID, y // GRID], "__pivot": [*pivot], "__tags": [], "__tile": tile,
+        "iid": iid, "width": w, "height": h, "defUid": uid, "px": [x, y], "fieldInstances": [*fields],
+    }  # fmt: skip
+
+
+def layer(kind, name, columns, rows, **fields):
+    whole = {"__cWid": columns, "__cHei": rows, "__gridSize": GRID, "__opacity": 1, "__pxTotalOffsetX": 0}
+    more = {"__pxTotalOffsetY": 0, "layerDefUid": 7, "visible": True, "__tilesetDefUid": 3, "intGridCsv": []}
+    lists = {"autoLayerTiles": [], "gridTiles": [], "entityInstances": []}
+    return {"__identifier": name, "__type": kind, **whole, **more, **lists, **fields}
+
+
+def project(*levels, **fields):
+    names = (None, "ice", "one_way", "Decoration", "Spring")
+    values = [{"value": k, "identifier": name} for k, name in enumerate(names, 1)]
+    modes = ("Rectangle", "Ellipse", "Cross", "Tile")
+    defs = {
+        "layers": [{"uid": 7, "intGridValues": values, "parallaxFactorX": 0, "parallaxFactorY": 0}],
+        "entities": [{"uid": k + 1, "renderMode": mode} for k, mode in enumerate(modes)],
+        "tilesets": [{"uid": 3, "relPath": "tiles.png", "tileGridSize": 16}],
+    }
+    return {"jsonVersion": "1.5.3", "defs": defs, "defaultGridSize": 16, "levels": [*levels], **fields}
+
+
+def level(name, cells, *entities, **fields):
+    rows, columns = np.shape(cells)
+    tiles = [{"px": [16, 32], "src": [48, 16], "f": 3, "t": 7, "d": [], "a": 1}]
+    layers = [
+        layer("Entities", "Things", columns, rows, entityInstances=[*entities]),
+        layer("IntGrid", "Ground", columns, rows, intGridCsv=np.ravel(cells).tolist(), autoLayerTiles=tiles),
+    ]
+    size = {"pxWid": columns * GRID, "pxHei": rows * GRID, "worldX": 0, "worldY": 0, "__bgColor": "#40465b"}
+    return {"identifier": name, "iid": name, **size, "fieldInstances": [], "layerInstances": layers, **fields}
+
+
+def write(path, node):
+    path.write_text(json.dumps(node))
+    return path
+
+
+NOBODY = field("target", "EntityRef", {"entityIid": "q"})
+CELLS = np.array(((0, 0, 0, 0, 0, 0), (0, 3, 3, 0, 5, 0), (4, 0, 0, 0, 0, 0), (1, 1, 2, 2, 1, 1)))
+
+
+@pytest.fixture
+def world():
+    made = quiet_world_for_maps()
+    yield made
+    made.close()
+
+
+def test_a_level_becomes_a_world(tmp_path, world):
+    of_boss = [
+        field("name", "String", "boss"), field("health", "Float", 7), field("home", "Point", {"cx": 2, "cy": 1}),
+        field("target", "EntityRef", {"entityIid": "b-2"}), field("kind", "LocalEnum.Kind", "kinematic"),
+        field("mass", "Float", None),
+    ]  # fmt: skip
+    of_gate = [field("path", "Array<Point>", [{"cx": 4, "cy": 1}, {"cx": 4, "cy": 2}]), field("speed", "Float", 2)]
+    shown = {"tilesetUid": 3, "x": 16, "y": 0, "w": 16, "h": 16}
+    things = [
+        entity("a-1", "Enemy", 40, 40, 16, 24, (0.5, 1), of_boss),
+        entity("b-2", "Gate", 64, 16, fields=of_gate, uid=2),
+        entity("c-3", "Start", 8, 24, uid=3, pivot=(0.5, 0.5)),
+        entity("d-4", "Gate", 0, 0, uid=4, tile=shown),
+    ]
+    own = [field("music", "String", "cave"), field("unset", "Int", None)]
+    path = write(tmp_path / "world.ldtk", project(level("Level_0", CELLS, *things, fieldInstances=own)))
+    made = maps.load(path, world, (Enemy, Gate, Spring), materials={"ice": {"friction": 0.02}})
+    of = lambda id, kind: world.component_for_entity(made.object(id).entity, kind)  # noqa: E731
+    assert made.size == (6.0, 4.0)
+    assert made.properties == {"music": "cave"}
+    boss = made.entities["boss"]
+    assert made.of_class["Enemy"] == [boss]
+    assert made.of_class["Gate"] == [made.object("b-2").entity, made.object("d-4").entity]
+    enemy = of("a-1", Enemy)
+    assert (enemy.health, enemy.target, enemy.home.tolist()) == (7.0, made.object("b-2").entity, [2.5, 2.5])
+    assert of("a-1", RigidBody).kind == "kinematic"
+    assert of("a-1", Transform).position.tolist() == [2.5, 2.25]  # the pivot is at its feet
+    assert of("a-1", AABBCollider).half_extents.tolist() == [0.5, 0.75]
+    assert np.array_equal(of("b-2", Path).points, ((4.5, 2.5), (4.5, 1.5)))
+    assert of("b-2", SphereCollider).radius == 0.5
+    assert made.points["Start"] == (0.5, 2.5)
+    (sprite,) = made.layers["Things"].sprites
+    assert made.pictures[sprite.picture].rectangle == (16, 0, 16, 16)
+    tiles = made.layers["Ground"].tiles
+    assert (tiles.place.tolist(), tiles.flips.tolist()) == ([[1.0, 1.0]], [3])
+    assert made.pictures[tiles.picture[0]].path == tmp_path / "tiles.png"
+    assert [*made.layers] == ["Ground", "Things"]  # the first one is in front
+    (spring,) = made.of_class["Spring"]
+    assert world.component_for_entity(spring, Transform).position.tolist() == [4.5, 2.5]
+    world.step()
+    solid = {(r, c) for r in range(4) for c in range(6) if any(
+        world.has_component(each, TileGridCollider) for each in world.query_point((c + 0.5, 3.5 - r)))}  # fmt: skip
+    assert solid == {(3, c) for c in range(6)}
+    icy = [world.component_for_entity(each, TileGridCollider) for each in world.query_point((3.5, 0.5))]
+    assert {tiles.friction for tiles in icy} == {0.02}
+
+
+def test_one_of_several_levels_is_chosen(tmp_path, world):
+    one, two = level("One", CELLS[3:]), level("Two", np.ones((2, 3), int), worldX=500)
+    external = {**two, "layerInstances": None, "externalRelPath": "world/Two.ldtkl"}
+    (tmp_path / "world").mkdir()
+    write(tmp_path / "world" / "Two.ldtkl", two)
+    path = write(tmp_path / "world.ldtk", project(one, external, externalLevels=True))
+    assert maps.load(path, world, level="Two").size == (3.0, 2.0)
+    assert maps.levels_of(path) == ["One", "Two"]
+    with pytest.raises(maps.MapError, match=r"the project has 2 levels: choose one, level=\.\.\., of One, Two"):
+        maps.load(path, world)
+    with pytest.raises(maps.MapError, match="no level is named 'Three'; there are One, Two"):
+        maps.load(path, world, level="Three")
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"cells": [[6]]}, None),
+        ({"things": [entity("x", "Enmy", 0, 0)]}, r"layer 'Things', object x 'Enmy', class 'Enmy': .*'Enemy'"),
+        ({"things": [entity("x", "Enemy", 0, 0, fields=[field("helth", "Int", 3)])]}, r"property 'helth': .*'health'"),
+        ({"things": [entity("x", "Enemy", 0, 0, fields=[field("health", "Int", -3)])]}, r"property 'health'.*at least"),
+        ({"things": [entity("x", "Enemy", 0, 0, fields=[NOBODY])]}, r"object q, which is not in the map"),
+        ({"cells": [[2]]}, r"IntGrid value 2 'ice', class 'ice': it is no component"),
+        ({"short": True}, r"layer 'Ground': its data has 1 cells, and the level 2 x 1 = 2"),
+        ({"tile": {"px": [1]}}, r"layer 'Ground': its tiles cannot be read"),
+    ],
+)
+def test_what_is_wrong_is_told(change, told, tmp_path, world):
+    node = level("L", change.get("cells", [[1, 0]]), *change.get("things", ()))
+    if "short" in change:
+        node["layerInstances"][1]["intGridCsv"] = [1]
+    if "tile" in change:
+        node["layerInstances"][1]["gridTiles"] = [change["tile"]]
+    path = write(tmp_path / "world.ldtk", project(node))
+    if told is None:
+        assert maps.load(path, world, (Enemy,)).layers["Ground"].entities
+        return
+    with pytest.raises(maps.MapError, match=told):
+        maps.load(path, world, (Enemy,))
+    assert len(world.bodies) == 0
