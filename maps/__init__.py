@@ -7,6 +7,6 @@
 
 from .errors import Finding, MapError
 from .level import Level
-from .loading import check, levels_of, load, look_at, world_of
+from .loading import check, levels_of, load, world_of
 
-__all__ = ["Finding", "Level", "MapError", "check", "levels_of", "load", "look_at", "world_of"]
+__all__ = ["Finding", "Level", "MapError", "check", "levels_of", "load", "world_of"]

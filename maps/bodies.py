@@ -11,6 +11,7 @@ from ..components import Collider, RigidBody, Transform
 from ..components.spin import Spin
 from ..plugins.character import Character
 from ..plugins.parts import parts_from_outline
+from ..plugins.parts.outline import sound_corners
 from ..plugins.paths import MODES, Legs, Path
 from .errors import RefusedError
 from .fields import Fields, Sorter
@@ -154,7 +155,7 @@ class Bodies:
 
     def _rigid(self, fields: Fields) -> RigidBody | None:
         """Whether it moves: its RigidBody, which is among its fields then."""
-        prefab = next((p._components[RigidBody] for _, p in fields.prefabs if RigidBody in p._components), None)
+        prefab: Any = next((p._components[RigidBody] for _, p in fields.prefabs if RigidBody in p._components), None)
         if fields.words.get("spins"):
             fields.of.setdefault(Spin, {})
         driven = Path in fields.of or Character in fields.of
@@ -217,7 +218,7 @@ class Bodies:
             return centre, [collider], angle + own
         pieces.sort(key=lambda piece: -piece.area)
         total = sum(piece.area for piece in pieces)
-        middle = sum(piece.area * piece.centre for piece in pieces) / total
+        middle = np.sum([piece.area * piece.centre for piece in pieces], axis=0) / total
         own_collider: list[Any] = []
         sensor = bool(fields.material.get("sensor"))
         for k, piece in enumerate(pieces):
@@ -306,10 +307,8 @@ def _convex(shape: Shape) -> list[Shape]:
 
 
 def _refuse_crossing(corners: np.ndarray) -> None:
-    from ..plugins.parts.outline import _sound
-
     try:
-        _sound(corners)
+        sound_corners(corners)
     except ValueError as error:
         raise RefusedError(str(error)) from error
 

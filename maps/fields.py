@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from ..components import Collider, Prefab, RigidBody
 from ..components.spin import Spin
 from ..framework import Component, World
@@ -27,6 +25,7 @@ VELOCITY = ("velocity_x", "velocity_y")
 WORDS: dict[str, tuple[type, ...]] = {
     "solid": (bool,), "spins": (bool,), "shape": (str,), "thickness": (float, int), "hollow": (bool,), "path": (),
 }  # fmt: skip
+THICKNESS = Column(minimum=0.0, owner="create_chain", name="thickness")
 SHAPES = ("box", "capsule", "ellipse")
 NO_OBJECT = 0  # an object property that is not set
 
@@ -72,9 +71,15 @@ class Vocabulary:
     """
 
     def __init__(
-        self, world: World | None, components: Iterable[type[Component]], prefabs: Mapping[str, Prefab],
-        layers: Any, materials: Mapping[str, Mapping[str, Any] | None], lenient: bool,
-    ) -> None:  # fmt: skip
+        self,
+        world: World | None = None,
+        components: Iterable[type[Component]] = (),
+        prefabs: Mapping[str, Prefab] | None = None,
+        layers: Any = None,
+        materials: Mapping[str, Mapping[str, Any] | None] | None = None,
+        lenient: bool = False,
+    ) -> None:
+        prefabs, materials = prefabs or {}, materials or {}
         self.components: dict[str, type[Component]] = {}
         for each in components:
             if not (isinstance(each, type) and issubclass(each, Component)):
@@ -98,7 +103,7 @@ class Vocabulary:
         """The game's component of that name, or carom's."""
         own = self.components.get(name)
         if own is None:
-            root = import_module(__package__.partition(".")[0])
+            root = import_module(__name__.partition(".")[0])
             if name in root._MODULES:
                 found = getattr(root, name)
                 if isinstance(found, type) and issubclass(found, Component) and not found._abstract:
@@ -110,7 +115,7 @@ class Vocabulary:
 
     def bits(self, value: Any) -> Any:
         """Of layers: a number, or names with commas."""
-        if isinstance(value, (int, float)) and not isinstance(value, bool):
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and value == value // 1:
             return int(value)
         names = [name.strip() for name in str(value).replace("|", ",").split(",") if name.strip()]
         if self.layers is None:
@@ -276,8 +281,8 @@ class Sorter:
             raise RefusedError(f"it must be of type {takes[0].__name__}, got {given.value!r}")
         if name == "shape" and given.value not in SHAPES:
             raise RefusedError(f"it must be one of {', '.join(SHAPES)}, got {given.value!r}")
-        if name == "thickness" and not 0.0 <= given.value < np.inf:
-            raise RefusedError(f"it must be at least 0, got {given.value!r}")
+        if name == "thickness":
+            checked(THICKNESS, given.value)
         found.words[name] = given.value
 
     def _field(self, component: type[Component], name: str, given: Property, found: Fields) -> None:
@@ -288,6 +293,8 @@ class Sorter:
         value: Any = given.value
         if given.type == "places":
             value = self.to_world(value)
+            if not len(value):
+                raise RefusedError("it has no points")
             value = value if isinstance(column, ArrayColumn) else tuple(value[0].tolist())
         elif given.type == "object":
             if value == NO_OBJECT:

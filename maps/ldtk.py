@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from .errors import Findings, RefusedError
-from .model import MapData, MapLayer, MapObject, Picture, Tile
-from .reading import Node, Property, document, nodes, number, whole, word
+from .model import HORIZONTAL, VERTICAL, MapData, MapLayer, MapObject, Picture, Tile
+from .reading import Node, Property, above_0, document, nodes, number, whole, word
 from .tiled import LARGEST
 
 SHAPES = {"Rectangle": "rectangle", "Ellipse": "ellipse", "Cross": "point", "Tile": "tile"}
@@ -67,10 +67,8 @@ class Reader:
     def level(self, node: Node) -> MapData:
         layers = nodes(node, "layerInstances")
         grids = [each for each in layers if each.get("intGridCsv")] or layers
-        tile = number(grids[0], "__gridSize") if grids else number(self.node, "defaultGridSize", 16)
-        width, height = number(node, "pxWid"), number(node, "pxHei")
-        if not (tile > 0.0 and width > 0.0 and height > 0.0):
-            raise RefusedError(f"the level is {width:g} x {height:g} pixels, with cells of {tile:g}")
+        tile = above_0(grids[0], "__gridSize") if grids else above_0(self.node, "defaultGridSize", 16)
+        width, height = above_0(node, "pxWid"), above_0(node, "pxHei")
         columns, rows = int(-(-width // tile)), int(-(-height // tile))
         if columns * rows > LARGEST:
             raise RefusedError(f"the level has {columns} x {rows} = {columns * rows:,} cells; at most {LARGEST:,}")
@@ -124,17 +122,18 @@ class Reader:
     def painted(self, node: Node) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What a layer shows, rules and painted tiles."""
         tiles = nodes(node, "autoLayerTiles") + nodes(node, "gridTiles")
-        uid = node.get("__tilesetDefUid")
-        size = number(self.tilesets.get(uid, {}), "tileGridSize", self.data.tile)  # type: ignore[arg-type]
-        try:
-            place = np.array([each["px"] for each in tiles], float).reshape(len(tiles), 2)
-            pictures = [self.picture(uid, (*map(int, each["src"]), int(size), int(size))) for each in tiles]
-            flips = np.array([int(each.get("f", 0)) for each in tiles], np.uint8)
-        except (KeyError, TypeError, ValueError) as error:
-            raise RefusedError(f"its tiles cannot be read: {error!r}") from error
-        return place, np.array(pictures, np.int64), flips
+        if not tiles:
+            return np.zeros((0, 2)), np.zeros(0, np.int64), np.zeros(0, np.uint8)
+        uid = whole(node, "__tilesetDefUid", -1)
+        size = above_0(self.tilesets.get(uid, {}), "tileGridSize", self.data.tile)
+        parts = [(*map(int, _pair(each, "src")), int(size), int(size)) for each in tiles]
+        flips = np.array([whole(each, "f", 0) & (HORIZONTAL | VERTICAL) for each in tiles], np.uint8)
+        return (
+            np.array([_pair(each, "px") for each in tiles]),
+            np.array([self.picture(uid, part) for part in parts], np.int64), flips,
+        )  # fmt: skip
 
-    def picture(self, uid: Any, part: tuple[int, ...]) -> int:
+    def picture(self, uid: int, part: tuple[int, ...]) -> int:
         """The number of a part of a tileset's image."""
         if (uid, part) not in self.numbers:
             file = word(self.tilesets.get(uid, {}), "relPath")
@@ -154,8 +153,9 @@ class Reader:
         shape = SHAPES.get(word(of, "renderMode"), "rectangle")
         part, tile = node.get("__tile"), None
         if shape == "tile" and isinstance(part, dict):
-            w, h = whole(part, "w"), whole(part, "h")
-            picture = self.picture(part.get("tilesetUid"), (whole(part, "x"), whole(part, "y"), w, h))
+            w, h = above_0(part, "w"), above_0(part, "h")
+            place = whole(part, "x"), whole(part, "y"), int(w), int(h)
+            picture = self.picture(whole(part, "tilesetUid", -1), place)
             tile = Tile(f"entity {kind!r}", "", (w, h), picture=picture)
         elif shape == "tile":
             shape = "rectangle"
@@ -170,14 +170,15 @@ class Reader:
         found = {}
         for each in nodes(node, "fieldInstances"):
             kind, value, name = word(each, "__type"), each.get("__value"), word(each, "__identifier")
-            if value is None or value == [] or "Tile" in kind:
+            if value is None or value == []:
                 continue
             if kind == "EntityRef":
                 found[name] = Property("object", word(value, "entityIid"))
             elif kind in ("Point", "Array<Point>"):
-                cells = np.array([(number(p, "cx"), number(p, "cy")) for p in (value if kind != "Point" else [value])])
+                given = nodes({name: [value] if kind == "Point" else value}, name)
+                cells = np.array([(number(each, "cx"), number(each, "cy")) for each in given]).reshape(-1, 2)
                 found[name] = Property("places", (cells + 0.5) * grid + offset)
-            else:
+            elif not isinstance(value, dict):  # a tile is only a picture
                 found[name] = Property(kind, value)
         return found
 

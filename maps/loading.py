@@ -53,7 +53,7 @@ def load(
     """
     if world.dimensions != 2:
         raise ValueError(f"maps.load: maps are for 2D worlds, this world has {world.dimensions} dimensions")
-    plan = Plan.of(path, world, components, prefabs, layers, materials, level, metres)
+    plan = Plan.of(path, Vocabulary(world, components, prefabs, layers, materials), level, metres)
     plan.findings.refuse()
     Maker(world, plan.level).make(plan.planned)
     return plan.level
@@ -72,22 +72,18 @@ def check(
 ) -> list[Finding]:
     """All that is wrong with a map, [] if nothing is; arguments as of :func:`load`, ``lenient``: classes that are not
     given are taken for the game's, and not looked at; images that are missing are findings too."""
-    names = {"components": components, "prefabs": prefabs, "layers": layers, "materials": materials}
-    return look_at(path, level=level, world=world, lenient=lenient, **names)[0]
+    return look_at(path, Vocabulary(world, components, prefabs, layers, materials, lenient), level)
 
 
-def look_at(
-    path: str | Path, *, level: str | None = None, world: World | None = None, lenient: bool = False, **names: Any
-) -> tuple[list[Finding], set[str]]:
-    """(what :func:`check` finds, the classes that a lenient check has not looked at)."""
-    given = {"components": (), "prefabs": None, "layers": None, "materials": None, **names}
+def look_at(path: str | Path, known: Vocabulary, level: str | None = None) -> list[Finding]:
+    """What :func:`check` finds; ``known.unknown`` has the classes that a lenient one has not looked at."""
     try:
-        plan = Plan.of(path, world, *given.values(), level, 1.0, lenient)
+        plan = Plan.of(path, known, level)
     except MapError as error:
-        return error.findings, set()
+        return error.findings
     for each in missing_images(plan.level):
         plan.findings.add(f"image {each} is missing; what it shows is drawn as boxes")
-    return plan.findings.found, plan.known.unknown
+    return plan.findings.found
 
 
 def world_of(
@@ -95,14 +91,13 @@ def world_of(
 ) -> tuple[World, Level]:
     """(a new world with the plugins that a map needs and others, the map in it); classes of a game that nothing here
     knows mean nothing. MapError for what is wrong with the map."""
-    options: Any = ((), None, None, None, level, metres, True)
-    plan = Plan.of(path, None, *options)
+    plan = Plan.of(path, Vocabulary(lenient=True), level, metres)
     plan.findings.refuse()
     names = {component.plugin or component.__module__.split(".")[2] for component in plan.types if _is_carom(component)}
     given = {plugin.name for plugin in plugins}
     needed = [find(name) for name in sorted(names - given)]
     world = World(Physics(dimensions=2, gravity=(0.0, -9.81)), *needed, *plugins, settings=settings or Settings())
-    plan = Plan.of(path, world, *options)
+    plan = Plan.of(path, Vocabulary(world, lenient=True), level, metres)
     plan.findings.refuse()
     Maker(world, plan.level).make(plan.planned)
     return world, plan.level
@@ -110,7 +105,7 @@ def world_of(
 
 def _is_carom(component: type[Component]) -> bool:
     """Whether a plugin of this package brings it."""
-    return bool(component.plugin) or component.__module__.startswith(f"{__package__.partition('.')[0]}.plugins.")
+    return bool(component.plugin) or component.__module__.startswith(f"{__name__.partition('.')[0]}.plugins.")
 
 
 def levels_of(path: str | Path) -> list[str | None]:
@@ -148,24 +143,21 @@ class Plan:
         self._check_world()
 
     @classmethod
-    def of(
-        cls, path: str | Path, world: World | None, components: Any, prefabs: Any, layers: Any, materials: Any,
-        level: str | None, metres: float, lenient: bool = False,
-    ) -> Plan:  # fmt: skip
+    def of(cls, path: str | Path, known: Vocabulary, level: str | None, metres: float = 1.0) -> Plan:
         """Of a file; MapError if there is no way on after what is wrong."""
         if not 0.0 < metres < np.inf:
             raise ValueError(f"maps.load: metres must be above 0, got {metres!r}")
         file = Path(path)
         findings = Findings(file)
-        known = Vocabulary(world, components, prefabs or {}, layers, materials or {}, lenient)
         try:
             node = document(file)
             if is_ldtk(node):
                 data = read_ldtk(file, node, level, findings, known.is_class)
             else:
                 data = read_tiled(file, node, findings)
-        except RefusedError as error:
-            findings.found.insert(0, Finding(file, "", str(error)))
+        except (RefusedError, RecursionError) as error:
+            text = str(error) if isinstance(error, RefusedError) else "groups are nested too deep"
+            findings.found.insert(0, Finding(file, "", text))
             raise MapError(findings.found) from error
         return cls(file, data, findings, known, metres)
 

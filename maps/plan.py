@@ -67,7 +67,8 @@ class Planned:
     @property
     def types(self) -> Iterator[type[Component]]:
         """Of all components."""
-        for each in (*(c for body in self.bodies for c in body), *self.beside, *(part[3] for part in self.parts)):
+        given: list[Any] = [*(c for body in self.bodies for c in body), *self.beside, *(part[3] for part in self.parts)]
+        for each in given:
             yield each.kind if isinstance(each, Late) else type(each)
         if self.chains:
             yield ChainSegmentCollider
@@ -119,7 +120,7 @@ class Maker:
 
     def _one(self, planned: Planned) -> None:
         world, entities = self.world, []
-        for k, body in enumerate((*planned.bodies, *([[]] if not planned.bodies and not planned.chains else []))):
+        for k, body in enumerate(planned.bodies):
             entity = world.create_entity(*map(self._component, (*body, *self._beside(planned, k))))
             self.made.append(entity)
             entities.append(entity)

@@ -20,6 +20,7 @@ Node = dict[str, Any]
 LAYERS = {"layer": "tilelayer", "objectgroup": "objectgroup", "imagelayer": "imagelayer", "group": "group"}
 MARKS = ("ellipse", "point", "capsule")
 REQUIRED: Any = object()
+LARGEST = 1e12  # pixels, and numbers of tiles
 
 
 def document(path: Path) -> Node:
@@ -94,17 +95,31 @@ def _property(element: ElementTree.Element) -> Node:
 # -- fields ----------------------------------------------------------------------------------------------
 
 
+def _of(node: Any) -> Node:
+    if not isinstance(node, dict):
+        raise RefusedError(f"there must be an object with fields, got {str(node)[:60]!r}")
+    return node
+
+
 def number(node: Node, name: str, default: Any = REQUIRED) -> float:
-    """A finite number; RefusedError if it is none, or missing without a default."""
-    value = node.get(name, default)
+    """A number up to LARGEST; RefusedError if it is none, or missing without a default."""
+    value = _of(node).get(name, default)
     if value is REQUIRED:
         raise RefusedError(f"{name!r} is missing")
     try:
         found = math.nan if isinstance(value, bool) else float(value)
     except (TypeError, ValueError):
         found = math.nan
-    if not math.isfinite(found):
-        raise RefusedError(f"{name!r} must be a number, got {value!r}")
+    if not abs(found) <= LARGEST:
+        limit = "" if math.isnan(found) else f" up to {LARGEST:g}"
+        raise RefusedError(f"{name!r} must be a number{limit}, got {value!r}")
+    return found
+
+
+def above_0(node: Node, name: str, default: Any = REQUIRED) -> float:
+    found = number(node, name, default)
+    if found <= 0.0:
+        raise RefusedError(f"{name!r} must be above 0, got {found:g}")
     return found
 
 
@@ -117,7 +132,7 @@ def whole(node: Node, name: str, default: Any = REQUIRED) -> int:
 
 
 def flag(node: Node, name: str, default: bool) -> bool:
-    value = node.get(name, default)
+    value = _of(node).get(name, default)
     known = {"1": True, "true": True, "0": False, "false": False}.get(str(value).lower())
     if known is None:
         raise RefusedError(f"{name!r} must be true or false, got {value!r}")
@@ -126,12 +141,12 @@ def flag(node: Node, name: str, default: bool) -> bool:
 
 def word(node: Node, *names: str) -> str:
     """The first of these texts that is there, else ""."""
-    return next((str(node[name]) for name in names if node.get(name)), "")
+    return next((str(node[name]) for name in names if _of(node).get(name)), "")
 
 
 def nodes(node: Node, name: str) -> list[Node]:
     """A list of dictionaries, [] if there is none."""
-    found = node.get(name) or []
+    found = _of(node).get(name) or []
     if not isinstance(found, list) or not all(isinstance(each, dict) for each in found):
         raise RefusedError(f"{name!r} must be a list of objects")
     return found
@@ -148,8 +163,8 @@ def points(node: Node, name: str) -> np.ndarray:
         found = np.array(rows, float).reshape(len(rows), 2)
     except (TypeError, ValueError, KeyError) as error:
         raise RefusedError(f"{name!r} must be pairs of numbers, got {str(given)[:60]!r}") from error
-    if not np.isfinite(found).all():
-        raise RefusedError(f"{name!r} must be finite numbers, got {str(given)[:60]!r}")
+    if not (np.abs(found) <= LARGEST).all():
+        raise RefusedError(f"{name!r} must be numbers up to {LARGEST:g}, got {str(given)[:60]!r}")
     return found
 
 
@@ -166,9 +181,13 @@ class Property(NamedTuple):
 
 def properties(node: Node) -> dict[str, Property]:
     """By name, of their types."""
-    given = node.get("properties") or []
+    given = _of(node).get("properties") or []
     if isinstance(given, dict):  # of old JSON
         given = [{"name": name, "value": value} for name, value in given.items()]
+    return _by_name(given)
+
+
+def _by_name(given: Any) -> dict[str, Property]:
     if not isinstance(given, list) or not all(isinstance(each, dict) and "name" in each for each in given):
         raise RefusedError("'properties' must be a list of names and values")
     return {str(each["name"]): _typed(each) for each in given}
@@ -178,7 +197,7 @@ def _typed(node: Node) -> Property:
     kind, value, name = str(node.get("type") or ""), node.get("value", ""), str(node["name"])
     if kind == "class" or isinstance(value, dict):
         if isinstance(value, list):
-            return Property(str(node.get("propertytype") or name), {str(each["name"]): _typed(each) for each in value})
+            return Property(str(node.get("propertytype") or name), _by_name(value))
         if not isinstance(value, dict):
             raise RefusedError(f"property {name!r} must be a class with fields, got {value!r}")
         inner = {key: _typed({"name": key, "value": each}) for key, each in value.items()}

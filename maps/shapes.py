@@ -67,7 +67,7 @@ def shape_of(thing: MapObject, scale: float, shape: str = "") -> Shape | None:
     kind = shape if shape and thing.shape == "rectangle" and shape != "box" else thing.shape
     if kind in ("point", "text"):
         return None
-    if kind in ("polygon", "polyline"):
+    if thing.points is not None:
         points = thing.points * (scale, -scale)
         return Shape("line", _line(points)) if kind == "polyline" else Shape("polygon", _corners(points))
     w, h = thing.size[0] * scale, thing.size[1] * scale

@@ -13,7 +13,7 @@ import numpy as np
 
 from .errors import Findings, RefusedError
 from .model import DIAGONAL, HORIZONTAL, VERTICAL, MapData, MapLayer, MapObject, Picture, Tile
-from .reading import Node, document, flag, nodes, number, points, properties, whole, word
+from .reading import Node, above_0, document, flag, nodes, number, points, properties, whole, word
 
 LARGEST = 4_000_000  # cells
 FLIPS = ((0x80000000, HORIZONTAL), (0x40000000, VERTICAL), (0x20000000, DIAGONAL))  # bits of a number in a cell
@@ -76,9 +76,11 @@ class Reader:
             node, folder = document(file), file.parent
             if node.get("") not in (None, "tileset") or "tilewidth" not in node:
                 raise RefusedError(f"{file.name} is no tileset")
-        width, height = number(node, "tilewidth"), number(node, "tileheight")
+        width, height = above_0(node, "tilewidth"), above_0(node, "tileheight")
         count = whole(node, "tilecount", 0)
         own = {whole(each, "id"): each for each in nodes(node, "tiles")}
+        if min(own, default=0) < 0:
+            raise RefusedError(f"a tile has the id {min(own)}")
         count = max(count, 1 + max(own, default=-1))
         if count > LARGEST:
             raise RefusedError(f"it has {count:,} tiles")
@@ -105,10 +107,10 @@ class Reader:
     def tile(self, tile: Tile, node: Node, folder: Path, picture: int, first: int) -> None:
         tile.kinds, tile.properties = word(node, "class", "type"), properties(node)
         if node.get("image"):  # a collection of images, each with its own size
-            width, height = number(node, "imagewidth", tile.size[0]), number(node, "imageheight", tile.size[1])
+            width, height = above_0(node, "imagewidth", tile.size[0]), above_0(node, "imageheight", tile.size[1])
             part = None
             if "width" in node:
-                width, height = number(node, "width"), number(node, "height")
+                width, height = above_0(node, "width"), above_0(node, "height")
                 part = (whole(node, "x", 0), whole(node, "y", 0), int(width), int(height))
             tile.size = width, height
             self.data.pictures[picture] = Picture(folder / str(node["image"]), part, tile.size)

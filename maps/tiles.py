@@ -43,7 +43,6 @@ class TileLayers:
         self.bodies, self.sorter, self.findings = bodies, bodies.sorter, findings
 
     def planned(self, layer: MapLayer, base: Fields, out: LevelLayer) -> list[Planned]:
-        assert layer.cells is not None
         out.tiles = self.pictures(layer)
         if base.is_solid is False:
             return []
@@ -72,7 +71,8 @@ class TileLayers:
                     _add(runs if ONE_WAY in meaning.fields.marks else grids, meaning, here)
         for cells, fields in grids.values():
             if cells.any():
-                for faces in TileGridCollider.floors_and_walls(cells, self.metres, lower=(0, 0), **fields.material):
+                where: Any = {"lower": (0, 0), **fields.material}
+                for faces in TileGridCollider.floors_and_walls(cells, self.metres, **where):
                     body = [transform(lower), faces, *self._components(base)]
                     made.append(Planned(place, out, list(base.kinds), bodies=[body]))
         for cells, fields in runs.values():
@@ -81,8 +81,8 @@ class TileLayers:
 
     def _meanings(self, layer: MapLayer, base: Fields) -> dict[int, Meaning]:
         """Of the tiles that are more than pictures, by their numbers."""
-        found = {}
-        for gid in np.unique(layer.cells).tolist():
+        found: dict[int, Meaning] = {}
+        for gid in np.unique(layer.cells).tolist() if layer.cells is not None else ():
             tile = self.data.tiles.get(gid)
             if tile is None:
                 continue
@@ -112,7 +112,7 @@ class TileLayers:
         base = Fields(material=dict(meaning.fields.material))
         for row, column in np.argwhere(here).tolist():
             flips = int(layer.flips[row, column])
-            size = tile.size[::-1] if flips & DIAGONAL else tile.size
+            size = (tile.size[1], tile.size[0]) if flips & DIAGONAL else tile.size
             corner = np.array((column, row + 1.0)) * self.data.tile + tile.offset
             thing = MapObject(None, "", "", "tile", corner, size, tile=tile, flips=flips, origin=(0.0, 1.0))
             place = f"layer {layer.name!r}, row {row}, column {column}"
@@ -133,6 +133,7 @@ class TileLayers:
             shapes = self.shapes(meaning.tile, flips)
             if len(shapes) == 1 and self._fills(shapes[0]):
                 full |= cells
+            if not shapes or full[cells].all():
                 continue
             material = dict(meaning.fields.material)
             if ONE_WAY in meaning.fields.marks:

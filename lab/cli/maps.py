@@ -12,6 +12,8 @@ import click
 from ... import maps
 from ...components import Prefab
 from ...framework import Component, Settings, World
+from ...maps.fields import Vocabulary
+from ...maps.loading import look_at
 from .group import Commands
 from .loading import Loaded, import_file
 from .options import traceback_option
@@ -40,8 +42,9 @@ def check_command(files: tuple[Path, ...], game: Path | None, level: str | None)
     for file in files:
         unknown: set[str] = set()
         for name in (level,) if level is not None else maps.levels_of(file):
-            found, classes = maps.look_at(file, level=name, lenient=game is None, **known)
-            unknown |= classes
+            words = Vocabulary(lenient=game is None, **known)
+            found = look_at(file, words, name)
+            unknown |= words.unknown
             count += len(found)
             for each in found:
                 click.echo(str(each))

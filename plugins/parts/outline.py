@@ -44,7 +44,7 @@ def parts_from_outline(points: Any) -> Outline:
         import mapbox_earcut  # pyright: ignore[reportMissingImports]
     except ImportError as error:
         raise ImportError(MISSING) from error
-    corners = _sound(points)
+    corners = sound_corners(points)
     triangles = np.asarray(mapbox_earcut.triangulate_float64(corners, np.array([len(corners)], np.uint32)), np.int64)
     polygons = _joined(corners, [tuple(triangle) for triangle in triangles.reshape(-1, 3).tolist()])
     found = sorted((_measured(corners[list(polygon)]) for polygon in polygons), key=lambda one: -one[0])
@@ -54,7 +54,7 @@ def parts_from_outline(points: Any) -> Outline:
     return Outline(centre, area, pieces)
 
 
-def _sound(points: Any) -> np.ndarray:
+def sound_corners(points: Any) -> np.ndarray:
     """The corners, counter-clockwise, without those that turn by nothing."""
     corners = np.array(points, float)
     if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3:

@@ -244,6 +244,18 @@ def test_templates_in_a_circle_are_refused(tmp_path):
         maps.load(path, quiet_world_for_maps(), (Enemy,))
 
 
+def test_groups_without_end_are_told(tmp_path):
+    path = tmp_path / "map.tmx"
+    for depth in (400, 5_000):
+        inside = '<group name="g">' * depth + "</group>" * depth
+        size = 'width="1" height="1" tilewidth="8" tileheight="8"'
+        path.write_text(f'<map orientation="orthogonal" {size}>{inside}</map>')
+        try:
+            maps.load(path, World(Physics(2)))
+        except maps.MapError as error:
+            assert "recursion" in str(error) or "too deep" in str(error)  # noqa: PT017
+
+
 def test_wrong_arguments_are_told_before_a_file_is_read():
     world = World(Physics(2))
     for bad, told in (
