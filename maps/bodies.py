@@ -14,7 +14,7 @@ from ..plugins.parts import parts_from_outline
 from ..plugins.parts.outline import sound_corners
 from ..plugins.paths import MODES, Legs, Path
 from .errors import RefusedError
-from .fields import Fields, Sorter
+from .fields import Fields, Sorter, checked
 from .level import LevelLayer, LevelObject, LevelSprite
 from .model import MapLayer, MapObject
 from .plan import Chain, Late, Planned, transform
@@ -267,7 +267,7 @@ class Bodies:
             points, closed = self.to_world(given.value), False
         else:
             points, closed = self.points_of(given.value)
-        values.setdefault("points", points)
+        values.setdefault("points", checked(Path.columns["points"], points))
         if closed:
             values.setdefault("mode", "loop")
         if "speed" not in values:

@@ -207,6 +207,6 @@ def _typed(node: Node) -> Property:
             return Property(kind, int(value))
         if isinstance(value, str):
             value = {"int": int, "float": float, "bool": lambda each: each == "true"}.get(kind, str)(value)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise RefusedError(f"property {name!r} must be of type {kind}, got {value!r}") from error
     return Property(kind, value)
