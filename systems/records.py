@@ -219,6 +219,7 @@ SHAPES = Schema(
     bounds=ints(),
     rotated=ints(),  # 0 for shapes that rotation does not change
     moments=ints(),  # 0 for shapes that do not tell; empty unless a stage of a plugin asks
+    material=ints(),  # 0 for shapes that are the same everywhere
     concave=flags(),
     sharp=flags(),  # of faces that meet in corners
     flipped=flags(),  # pairs that are registered as (second, first); the functions below take them so

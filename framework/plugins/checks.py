@@ -32,6 +32,7 @@ SHAPE_FUNCTIONS = {
     "turned": (("shape", "axes"), ""),
     "outline": (("shape", "dimensions"), "corners, faces"),
     "second_moments": (("shape", "dimensions"), "measure, centre, means of xx, xy, yy (in 3D xx, yy, zz, xy, xz, yz)"),
+    "material": (("shape", "point", "normal"), "friction, restitution, surface velocity"),
 }
 POSES = np.array(((1.0, 0.0, 0.0), (0.3, -0.2, 0.1), (0.0, 0.0, 0.0), (-2.0, 3.0, 1.0)))  # of b as seen from a
 STEPS = np.array(((0.1, 0.2, 0.0), (-0.3, 0.1, 0.2), (0.0, 0.5, -0.1), (0.04, -0.06, -0.02)))
@@ -156,7 +157,8 @@ def _shape_function(where: str, component: Any, name: str, dimensions: int) -> P
         )
     moments = 1 + dimensions + dimensions * (dimensions + 1) // 2
     form = {"rounding": float, "second_moments": moments}.get(name, dimensions)
-    return None if function is None else PlainFunction(f"{where}: {name}", function, *SHAPE_FUNCTIONS[name], form)
+    forms = (float, float, dimensions) if name == "material" else (form,)
+    return None if function is None else PlainFunction(f"{where}: {name}", function, *SHAPE_FUNCTIONS[name], *forms)
 
 
 def _extents(where: str, component: Any, samples: list[Any], dimensions: int) -> tuple[np.ndarray, Support | None]:

@@ -106,13 +106,16 @@ class Plugin:
         rotated; and ``outline(shape, dimensions)``, what it looks like along its body's axes: ``(corners, faces)`` of a
         :class:`carom.framework.outlines.Outline`, without which pictures ask its support; and ``turned(shape, axes)``,
         a tuple of its fields as they are on a body with these axes. In place of that ``rotates = True`` in the class
-        gives the functions ``shape.axes``, the body's axes in the world;
+        gives the functions ``shape.axes``, the body's axes in the world; and ``material(shape, point, normal)``:
+        (friction, restitution, surface velocity) where it is touched, at a point from its centre, the normal leading
+        away; nan for what is as the collider's own, which must be the most that its restitution is anywhere, and not 0
+        if its surface runs somewhere;
         ``dimensions = (2,)`` makes it a shape of 2D worlds only.
         """
 
         def register(component: ShapeClass) -> ShapeClass:
             checks.check_shape(self, component, cost)
-            bounds, support, rounding, turned, outline, moments = (
+            bounds, support, rounding, turned, outline, moments, material = (
                 checks.shape_function(component, name) for name in checks.SHAPE_FUNCTIONS
             )
             shape = Shape(
@@ -120,6 +123,7 @@ class Plugin:
                 None if support is None else checked_support(inlined(support)),
                 inlined(rounding or _no_rounding) if support is not None else None,
                 None if moments is None else pasted(moments), outline,
+                None if material is None else inlined(material),
             )  # fmt: skip
             self._register(self.shapes, component, shape)
             return component

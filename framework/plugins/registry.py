@@ -34,6 +34,8 @@ class Shape:
         compiled, or None; (shape, dimensions) -> measure, centre, means of products of coordinates
     outline
         plain Python, or None; (shape, dimensions) -> corners and faces, along the axes of its body
+    material
+        compiled, or None; (shape, point, normal) -> friction, restitution, surface velocity where it is touched
     """
 
     component: type[Component]
@@ -45,6 +47,7 @@ class Shape:
     rounding: Any | None = None
     second_moments: Any | None = None
     outline: Any | None = None
+    material: Any | None = None
 
     @property
     def rotates(self) -> bool:

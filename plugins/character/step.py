@@ -34,6 +34,7 @@ from .ways import climb, fall, is_on_ladder, walk
 JUMP_SPEED = 9.0  # m/s, if nothing else is given
 FARTHEST_CARRIED = 1.0  # m in a step; what goes farther was put elsewhere
 NEAR_BY = 0.25  # m: room around what it may reach in a step
+SOLE = 0.5  # of the least half extent: how far below its foot the floor is looked at, on which only an edge may stand
 DROPS_FOR = 0.1  # s in which it falls through what holds from above,
 DROPS_AGAIN = 0.2  # and until when it does not begin anew
 WALL = 0.9  # of a normal across up: is a wall
@@ -136,7 +137,11 @@ def ride_of(state, character, i, at, floor, up, dt):
             if turns:
                 arm = sub(at, then)
                 ride = add(ride, sub(turned(arm, character.floor_x[i], character.floor_y[i], x, y), arm))
-    return add_scaled(ride, across(surface_velocity_of(state, floor), character.floor_normal[i]), dt)
+    foot, half, out = at, state.bodies.half_extents[i], character.floor_normal[i]
+    for k in range(len(up)):
+        foot = add_scaled(foot, up, 0.0 - abs(item(up, k)) * item(half, k))
+    run = surface_velocity_of(state, floor, add_scaled(foot, out, 0.0 - SOLE * least(half)), out)
+    return add_scaled(ride, across(run, out), dt)
 
 
 @inlined

@@ -5,13 +5,14 @@ exist. The rectangle with the deepest overlap gives the contact.
 """
 
 from ...framework import Convex
-from .cells import cells_of_text
+from .cells import cells_of_text, map_of_text
 from .collider import TileGridCollider
-from .collider import plugin as plugin
 from .contact import deepest_contact
+from .faces import plugin as plugin
+from .materials import TileMaterial, TileShape
 from .sweep import first_touch
 
-__all__ = ["TileGridCollider", "cells_of_text"]
+__all__ = ["TileGridCollider", "TileMaterial", "TileShape", "cells_of_text", "map_of_text"]
 
 
 @plugin.pair(TileGridCollider, Convex)

@@ -12,7 +12,7 @@ from ...framework.compilation import part
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, divided, length, sub
 from .cells import BLOCK
-from .collider import ALL, WALLS
+from .faces import ALL, WALLS
 from .rectangles import (
     EMPTY,
     MIXED,

@@ -9,7 +9,7 @@ from __future__ import annotations
 from ...framework.compilation import part
 from ...systems.bits import highest_bit, lowest_bit
 from .cells import BITS, BLOCK, HEAD, PER_BLOCK, PER_NUMBER
-from .collider import ALL, FLOORS, plugin
+from .faces import ALL, FLOORS, plugin
 
 EMPTY, MIXED, FULL = range(3)
 ALL_BITS = 2**BITS - 1
@@ -36,8 +36,9 @@ def grid_of(packed):
     """A map as the functions here take it: its array, columns and rows of cells, numbers in a row of bits, the index of
     the first sum over blocks, and numbers in a row of these."""
     columns, rows = int(packed[0, 0]), int(packed[1, 0])
-    words = (columns + BITS - 1) >> PER_NUMBER
-    return packed, columns, rows, words, HEAD + rows * words, ((columns + BLOCK - 1) >> PER_BLOCK) + 1
+    words, width = (columns + BITS - 1) >> PER_NUMBER, ((columns + BLOCK - 1) >> PER_BLOCK) + 1
+    sums = width * (((rows + BLOCK - 1) >> PER_BLOCK) + 1)
+    return packed, columns, rows, words, len(packed) - sums, width
 
 
 @plugin.kernel

@@ -9,7 +9,7 @@ from __future__ import annotations
 from ...framework.compilation import part
 from ...framework.vectors import add_scaled, clamped, length
 from ..standard_shapes import convex_convex, sharp
-from .collider import plugin
+from .faces import plugin
 
 
 @plugin.kernel

@@ -8,8 +8,8 @@ from ...framework.compilation import part
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, length, sub
 from .cells import BLOCK
-from .collider import plugin
 from .contact import box_on_map, cells_under, searched
+from .faces import plugin
 from .rectangles import (
     EMPTY,
     MIXED,

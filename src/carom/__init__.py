@@ -39,7 +39,7 @@ _NAMES = {
         "ChainSegmentCollider", "TerrainTriangleCollider",
         "create_chain", "create_height_field", "create_triangle_mesh", "outline_of_image",
     ),
-    "plugins.tile_grid": ("TileGridCollider", "cells_of_text"),
+    "plugins.tile_grid": ("TileGridCollider", "TileMaterial", "TileShape", "cells_of_text", "map_of_text"),
     "plugins.timers": ("Timer", "Timers"),
     "plugins.zones": ("Field", "Water", "Wind", "Zones", "explode"),
 }  # fmt: skip

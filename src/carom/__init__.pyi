@@ -36,7 +36,10 @@ from .plugins.terrain import create_height_field as create_height_field
 from .plugins.terrain import create_triangle_mesh as create_triangle_mesh
 from .plugins.terrain import outline_of_image as outline_of_image
 from .plugins.tile_grid import TileGridCollider as TileGridCollider
+from .plugins.tile_grid import TileMaterial as TileMaterial
+from .plugins.tile_grid import TileShape as TileShape
 from .plugins.tile_grid import cells_of_text as cells_of_text
+from .plugins.tile_grid import map_of_text as map_of_text
 from .plugins.timers import Timer as Timer
 from .plugins.timers import Timers as Timers
 from .plugins.zones import Field as Field

@@ -28,8 +28,8 @@ from ..narrow_phase.manifolds import (
     make_manifold,
 )  # fmt: skip
 from ..parts.rows import owner_of
-from ..shapes.dispatch import both_convex, friction_of, restitution_of
-from ..shapes.surfaces import any_surface_runs, slip_of
+from ..shapes.dispatch import both_convex, friction_at, restitution_at, restitution_of
+from ..shapes.surfaces import any_surface_runs, slip_at
 from ..shapes.tolerances import (
     SAME_PLACE,
     contact_margin,
@@ -99,7 +99,8 @@ def still_bounces(state, dt, c, depth, normal):
     Notes in pairs.parting how it parts.
     """
     pairs, bodies, a, b = state.pairs, state.bodies, state.pairs.a[c], state.pairs.b[c]
-    velocity, e = bodies.linear_velocity, restitution_of(state, a, b)
+    velocity = bodies.linear_velocity
+    e = restitution_at(state, a, b, (pairs.point[c], pairs.normal[c], pairs.at[c]))
     if not e > 0.0:
         return False
     if e == 1.0 and state.impacts.sweeps and is_trapped(state, a, b):
@@ -236,7 +237,8 @@ def find_surface_slips(state):
     pairs, solver, runs = state.pairs, state.solver, False
     for r in range(solver.contacts):
         c, k = solver.pair[r], solver.slot[r]
-        solver.surface_slip[k] = slip_of(state, pairs.a[c], pairs.b[c], zero_of(state))
+        touch = pairs.point[c], pairs.normal[c], centre_offset_at_start(state.bodies, pairs.a[c], pairs.b[c])
+        solver.surface_slip[k] = slip_at(state, pairs.a[c], pairs.b[c], zero_of(state), touch)
         runs |= solver.friction[k] != 0.0 and not is_zero(solver.surface_slip[k])
     return runs
 
@@ -273,7 +275,7 @@ def linearise(state, dt):
         # After an impact at time t the body seems to come from dv t behind: no overlap to be pushed out.
         solver.parting[k] = parting == SEPARATES or (pairs.impulse[c] > 0.0 and gap > 0.0)
         solver.extent[k] = extent
-        mu = friction_of(state, a, b)
+        mu = friction_at(state, a, b, (pairs.point[c], normal, d))
         solver.friction[k] = mu
         has_friction |= mu != 0.0
     solver.has_friction, solver.surfaces_run = has_friction, any_surface_runs(state) and find_surface_slips(state)

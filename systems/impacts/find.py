@@ -26,9 +26,17 @@ from ..linking.parts import FIRST_TOUCH, TURNING_RESPONSE, call_first_touch, cal
 from ..narrow_phase.manifolds import is_at_manifold
 from ..narrow_phase.stages import rank_rows
 from ..parts.rows import owner_of
-from ..shapes.dispatch import both_convex, evaluate, friction_of, has_corner_rule, is_corner_touch, restitution_of
+from ..shapes.dispatch import (
+    both_convex,
+    evaluate,
+    friction_at,
+    has_corner_rule,
+    is_corner_touch,
+    restitution_at,
+    restitution_of,
+)
 from ..shapes.poses import advance_pose, motion_of, set_motion
-from ..shapes.surfaces import slip_of
+from ..shapes.surfaces import slip_at
 from ..shapes.tolerances import is_turning, slop_of, smaller_extent, turning_travel
 from .heap import heap_push
 from .impulses import (
@@ -205,7 +213,7 @@ def approach_speed(state, c, path, touch, kind, dt):
     if has_corner_rule(state, bodies.shape[a], bodies.shape[b]):  # what turns reaches the edge by that as well
         slides &= not turns
     if slides and turns:  # what tips over on another body lands on its next corner while the one before holds it
-        slides = state.pairs.early[c] and restitution_of(state, a, b) == 0.0
+        slides = state.pairs.early[c] and restitution_at(state, a, b, (point, normal, apart)) == 0.0
         slides &= -speed * dt <= smaller_extent(bodies, a, b)
     elif slides:
         slides = is_held_by_edge(state, a, b, path, touch, speed, dt)
@@ -254,8 +262,9 @@ def queue_event(state, c, kind, path, touch, speed, restitution):
     """Put an event into the queue."""
     impacts, pairs, bodies, (t, normal, point, _) = state.impacts, state.pairs, state.bodies, touch
     a, b = pairs.a[c], pairs.b[c]
-    change, pull, mu = -(1.0 + restitution) * speed, zero_of(state), friction_of(state, a, b)
-    w = slip_of(state, a, b, rate_along(path, t))
+    place = point, normal, touch[3]
+    change, pull, mu = -(1.0 + restitution) * speed, zero_of(state), friction_at(state, a, b, place)
+    w = slip_at(state, a, b, rate_along(path, t), place)
     if state.spinning and kind != CROSSING:
         address, motion = state.links[TURNING_RESPONSE], (w, speed)
         change, pull = call_turning_response(address, state, (a, b), touch, motion, restitution, mu)
@@ -294,6 +303,9 @@ def queue_next_impact(state, c, since, dt):
         return
     found, touch = find_touch(state, c, a, b, path, since, e, dt)
     if found == NO_TOUCH:
+        return
+    e = restitution_at(state, a, b, (touch[2], touch[1], touch[3]))
+    if e == 0.0 and not (passive or impacts.sweeps):  # nothing of what bounces elsewhere
         return
     if not state.spinning:
         queue_touch(state, c, path, found, touch, e, dt)

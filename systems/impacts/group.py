@@ -20,10 +20,10 @@ from ..integration.trajectory import rate_along, relative_path
 from ..integration.turning import compliance, is_turned, velocity_by_spin
 from ..linking.parts import TURN_BY_IMPACT, call_turn_by_impact
 from ..parts.rows import owner_of
-from ..shapes.dispatch import friction_of
-from ..shapes.surfaces import slip_of
+from ..shapes.dispatch import friction_at
+from ..shapes.surfaces import slip_at
 from .exact_sum import exact_sum
-from .impulses import count_impact, deflect, is_counted, is_immovable, log_impact, note_trapped
+from .impulses import count_impact, deflect, is_counted, is_immovable, log_impact, note_trapped, touch_of_event
 from .turning import arms_of
 
 PASSES, LEAST_PASSES = 1000, 8  # over the impacts of a group
@@ -211,9 +211,10 @@ def solve_group_friction(state, count):
         m = impacts.group[g]
         c = impacts.event_pair[impacts.member[m]]
         a, b, normal = pairs.a[c], pairs.b[c], impacts.event_normal[impacts.member[m]]
-        mu, impacts.friction_impulse[m] = friction_of(state, a, b), zero_of(state)
+        touch = touch_of_event(state, impacts.member[m])
+        mu, impacts.friction_impulse[m] = friction_at(state, a, b, touch), zero_of(state)
         if mu > 0.0 and impacts.ahead[m] > 0.0:
-            w = slip_of(state, a, b, rate_along(relative_path(state, a, b), impacts.now))
+            w = slip_at(state, a, b, rate_along(relative_path(state, a, b), impacts.now), touch)
             w = add(w, sub(impacts.gained[owner_of(state, b)], impacts.gained[owner_of(state, a)]))
             arms = normal, normal
             if state.spinning:

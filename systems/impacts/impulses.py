@@ -12,11 +12,11 @@ from ...framework.elementary import exp
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST
-from ..integration.trajectory import along, path_of, rate_along
+from ..integration.trajectory import along, centre_at, path_of, rate_along
 from ..linking.parts import TURN_BY_IMPACT, call_turn_by_impact
 from ..narrow_phase.manifolds import forget_manifold
 from ..parts.rows import next_row, owner_of
-from ..shapes.dispatch import restitution_of
+from ..shapes.dispatch import restitution_at, restitution_of
 from .turning import kinematic_normal_speed
 
 STOPPED = 1 << 30  # added to a body's impacts: it moves no more in this step, and the solver leaves it alone
@@ -92,6 +92,14 @@ def is_immovable(bodies, i):
     return bodies.inverse_mass[i] == 0.0 and length(bodies.path_velocity[i]) == 0.0
 
 
+@inlined
+def touch_of_event(state, event):
+    """(point from the centre of a's shape, normal, from that centre to that of b's shape) of an impact."""
+    impacts, c, t = state.impacts, state.impacts.event_pair[event], state.impacts.event_time[event]
+    one, other = centre_at(state, state.pairs.a[c], t), centre_at(state, state.pairs.b[c], t)
+    return sub(impacts.event_point[event], one), impacts.event_normal[event], sub(other, one)
+
+
 @part
 def is_counted(state, event):
     """Whether the cap counts an impact: in an event-driven world an elastic one only if something drives the bodies or
@@ -101,7 +109,7 @@ def is_counted(state, event):
         return True
     c, t, inverse_mass = impacts.event_pair[event], impacts.event_time[event], state.bodies.inverse_mass
     a, b = state.pairs.a[c], state.pairs.b[c]
-    if restitution_of(state, a, b) != 1.0 or t <= last[a] or t <= last[b]:
+    if restitution_at(state, a, b, touch_of_event(state, event)) != 1.0 or t <= last[a] or t <= last[b]:
         return True
     one = a if inverse_mass[a] == 0.0 else b
     return inverse_mass[one] == 0.0 and not is_immovable(state.bodies, one)

@@ -19,7 +19,7 @@ from ..narrow_phase.one_way import is_from_front as is_from_front
 from ..narrow_phase.one_way import is_one_way as is_one_way
 from ..narrow_phase.stages import layers_meet
 from ..shapes.dispatch import evaluate, half_extents, sweep
-from ..shapes.surfaces import along_world, any_surface_runs
+from ..shapes.surfaces import any_surface_runs, surface_velocity_at
 from ..step_stages import FEW_BODIES
 from .candidates import is_box_near, make_find_all, order_by_entity
 from .candidates import to_collider as to_collider
@@ -54,11 +54,12 @@ def half_extents_of_row(state, i):
 
 
 @part
-def surface_velocity_of(state, i):
-    """At which the surface of row i runs, m/s along the axes of the world."""
+def surface_velocity_of(state, i, at, out):
+    """At which the surface of row i runs, m/s along the axes of the world, at a place in the world; out: the unit
+    vector away from it."""
     if not any_surface_runs(state):
         return zero_of(state)
-    return along_world(state, i, state.colliders.surface_velocity[state.bodies.collider_slot[i], i])
+    return surface_velocity_at(state, i, negative(to_collider(state, at, i)), out)
 
 
 @inlined

@@ -10,7 +10,8 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.vectors import add_scaled, negative
 from .linking.batches import SOUND, repeat_batch, turned_back
-from .linking.mixing import friction_of as friction_of
+from .linking.mixing import friction_at as friction_at
+from .linking.mixing import restitution_at as restitution_at
 from .linking.mixing import restitution_of as restitution_of
 from .linking.signatures import (
     call_batch,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ...framework.compilation import part
-from ...framework.vectors import add, item, replace, sub
+from ...framework.vectors import add, item, negative, replace, sub
+from .linking.mixing import has_material, material_at
 
 
 @part
@@ -25,10 +26,25 @@ def any_surface_runs(state):
 
 
 @part
-def slip_of(state, a, b, velocity):
-    """The velocity of the surface of b as that of a sees it, where the bodies' own is ``velocity``."""
+def surface_velocity_at(state, i, point, normal):
+    """At which the surface of body i runs, along the axes of the world, where some surface runs.
+
+    point, normal: of the surface, from the centre of its shape, leading away
+    """
+    local = state.colliders.surface_velocity[state.bodies.collider_slot[i], i]
+    if has_material(state, i):
+        there = material_at(state, i, point, normal)[2]
+        if item(there, 0) == item(there, 0):
+            local = there
+    return along_world(state, i, local)
+
+
+@part
+def slip_at(state, a, b, velocity, touch):
+    """The velocity of the surface of b as that of a sees it, where the bodies' own is ``velocity``; touch: as for
+    :func:`restitution_at`."""
     if not any_surface_runs(state):
         return velocity
-    surface, slot = state.colliders.surface_velocity, state.bodies.collider_slot
-    one, other = along_world(state, a, surface[slot[a], a]), along_world(state, b, surface[slot[b], b])
-    return add(velocity, sub(other, one))
+    point, normal, apart = touch
+    one = surface_velocity_at(state, a, point, normal)
+    return add(velocity, sub(surface_velocity_at(state, b, sub(point, apart), negative(normal)), one))

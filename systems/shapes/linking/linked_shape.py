@@ -31,6 +31,7 @@ from .signatures import (
     NOT_FINITE,
     bounds_signature,
     call_bounds,
+    material_signature,
     moments_signature,
     rotated_signature,
     rounding_signature,
@@ -105,11 +106,22 @@ class LinkedShape:
         made = self._function("def moments(state, p, i):", source, function=self.shape.second_moments)
         return self._linked(made.moments, moments_signature(self.dimensions))
 
+    @cached_property
+    def material(self) -> Linked | None:
+        """What it is made of where it is touched; None if it is the same everywhere."""
+        if self.shape.material is None:
+            return None
+        source = f"return function({self._parameters('p')}, point, normal)"
+        made = self._function("def material(p, i, point, normal):", source, function=self.shape.material)
+        return self._linked(made.material, material_signature(self.dimensions))
+
     def all_functions(self, by_address: bool) -> Iterator[Linked]:
         """by_address: whether some pair takes the shape by the addresses of support and rounding."""
         yield self.bounds
         if self.rotated is not None:
             yield self.rotated
+        if self.material is not None:
+            yield self.material
         if by_address:
             yield from (self.support, self.rounding)
 

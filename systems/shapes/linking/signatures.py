@@ -63,6 +63,13 @@ def moments_signature(dimensions: int) -> Signature:
 
 
 @cache
+def material_signature(dimensions: int) -> Signature:
+    """(parameters, row, point, normal) -> (friction, restitution, surface velocity)."""
+    vector = floats(dimensions)
+    return tuple_of(FLOAT, FLOAT, vector)(INT, INT, vector, vector)
+
+
+@cache
 def rotated_signature(dimensions: int) -> Signature:
     """(state, own parameters, parameters as rotated, row, whether bodies are rotated) -> 0."""
     return INT(record_kind(STATE, dimensions), INT, INT, INT, BOOL)
@@ -110,6 +117,7 @@ call_sweep = call_in_dimension(sweep_signature)
 call_corner = call_in_dimension(corner_signature)
 call_bounds = call_in_dimension(bounds_signature)
 call_moments = call_in_dimension(moments_signature)
+call_material = call_in_dimension(material_signature)
 call_rotated = call_in_dimension(rotated_signature)
 call_support = call_in_dimension(support_signature)
 call_rounding = linked_call(rounding_signature)
