@@ -104,7 +104,8 @@ class TileGridCollider(Collider):
         shapes: Any = None,
         **common: Unpack[ColliderFields],
     ) -> tuple[Self, Self]:
-        """The map as two colliders, for two entities: floors and ceilings, and walls; arguments as of the class.
+        """The map of ``cells`` and ``tile_size`` as two colliders, for two entities: floors and ceilings, and walls;
+        ``lower``, ``materials`` and ``shapes`` as of one.
 
         Two bodies have only one contact. A body that is pushed against a wall and stands on the floor needs two, so
         that it stands still; two entities provide them. Both colliders share their memory.

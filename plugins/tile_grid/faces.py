@@ -8,6 +8,6 @@ from ...framework import Plugin
 
 plugin = Plugin("tile_grid", version="1.0")
 
-Faces = Literal["all", "floors", "walls"]
-FACES = ("all", "floors", "walls")
-ALL, FLOORS, WALLS = range(3)
+Faces = Literal["all", "floors", "walls", "one_way"]
+FACES = ("all", "floors", "walls", "one_way")
+ALL, FLOORS, WALLS, ONE_WAYS = range(4)

@@ -1,0 +1,234 @@
+"""How a shape meets a map near tiles that are not full: each run of the outline as a segment of a chain.
+
+Farther from such tiles the map is one of full tiles, which those are in.
+"""
+
+from __future__ import annotations
+
+import collections
+import math
+
+from ...framework.compilation import part
+from ...framework.jit.stack_arrays import stack_array
+from ...framework.vectors import add, add_scaled, divided, dot, length, scale, sub
+from ..terrain.segment import BEHIND as SEGMENT_BEHIND
+from ..terrain.segment import FOLDED, contact_of_segment
+from .contact import around, box_on_map, cells_under, deepest_contact
+from .faces import ALL, FLOORS, ONE_WAYS, plugin
+from .outline import any_shaped, is_inside, next_run
+from .rectangles import grid_of
+from .shapes import core_of
+from .surface import first_code
+from .sweep import LOOKS, ROUNDING, first_touch
+
+RING = 1  # cells around a shape in which runs are looked for
+NEAR = 0.1  # of a tile: a face that is nearer is the contact, whatever else is near
+MISSED = 0.05  # of a tile: what is beside all faces counts as so far away, so that nothing rests on it
+BEHIND, ON = 0.1, 1e-6  # of a tile: how far the centre of a body in a tile, or of another, may be behind a face that
+# pushes it out
+SUNK = 0.02  # of a tile: by how much a body may have sunk into a one-way cell
+STRIDE = 0.01  # of a tile: the least way between two looks at a face that a shape is not over
+TOUCHED = 8  # faces that a shape touches at once
+PARALLEL = 1.0 - 1e-9  # cosine: faces that lean less from each other are one
+OPPOSED = -0.1  # cosine: between faces that lean more against each other nothing is pushed out aside
+
+Segment = collections.namedtuple("Segment", "start end before after thickness")
+
+
+@plugin.kernel
+def has_face(run, faces):
+    """Whether a run is among the selected faces: slopes are with the walls, so that what goes from a floor to one has
+    two contacts."""
+    return faces in (ALL, ONE_WAYS) or (run.y0 == run.y1) == (faces == FLOORS)
+
+
+@plugin.kernel
+def is_shaped(packed):
+    """Whether a map has a tile that is not full."""
+    grid = grid_of(packed)
+    start = first_code(grid)
+    return start < grid[4] and packed[start + 1, 0] > 0.0
+
+
+@part
+def segment_of(run, tile, middle, behind):
+    """A run of the outline as a segment of a chain, relative to the map's middle; behind: how far behind it the centre
+    of a body may be that it pushes out."""
+    half = 0.5 * tile
+    start, end = (
+        (half * run.x0 - middle[0], half * run.y0 - middle[1]),
+        (half * run.x1 - middle[0], half * run.y1 - middle[1]),
+    )
+    if run.short_start or run.short_end:  # a body that has sunk into the cell beside it comes over it
+        way = sub(end, start)
+        cut = scale(way, min(0.5, FOLDED + SUNK * tile / length(way)))
+        start = add(start, cut) if run.short_start else start
+        end = sub(end, cut) if run.short_end else end
+    before = sub(start, (half * run.before_x, half * run.before_y))
+    after = add(end, (half * run.after_x, half * run.after_y))
+    if run.short_start:
+        before = add_scaled(start, sub(start, end), 1e-3)
+    if run.short_end:
+        after = add_scaled(end, sub(end, start), 1e-3)
+    return Segment(start, end, before, after, behind - SEGMENT_BEHIND * length(sub(end, start)))
+
+
+@part
+def reach_of_shape(b, at, tile, size, support, rounding):
+    """The rectangle of cells that a shape may meet, a ring more than it touches."""
+    _, touched = cells_under(box_on_map(core_of(b, support), rounding(b), at), tile, size)
+    return around(touched, RING, size)
+
+
+@part
+def outline_contact(a, b, d, cells, support, rounding):
+    """The contact with the runs within a rectangle of cells; a miss is by no more than a tile."""
+    grid, tile = grid_of(a.packed), a.tile_size
+    middle = (0.5 * grid[1] * tile, 0.5 * grid[2] * tile)
+    touched, count = stack_array(TOUCHED, (0.0, 0.0, 0.0, 0.0, 0.0)), 0
+    depth, normal, point, first = -tile, (0.0, 1.0), d, -1  # of the best of the faces that it is over
+    beside, other = -tile, (0.0, 1.0)  # of the nearest of all others
+    one_way, at = a.faces == ONE_WAYS, 0
+    behind = (BEHIND if one_way or is_inside(grid, tile, add(d, middle)) else ON) * tile
+    while True:
+        at, there, run = next_run(grid, cells, one_way, at)
+        if not there:
+            break
+        if not has_face(run, a.faces):
+            continue
+        over, deep, n, p = contact_of_segment(segment_of(run, tile, middle, behind), b, d, support, rounding)
+        if not over:
+            if deep > beside:
+                beside, other = deep, n
+            continue
+        if deep >= 0.0 and count < TOUCHED:
+            touched[count, 0], touched[count, 1], touched[count, 2] = deep, n[0], n[1]
+            if deep > depth:
+                first = count
+            count += 1
+        better = deep > depth
+        if one_way and depth >= 0.0:
+            better = 0.0 <= deep < depth  # it stands on the highest of those that it has come down to
+        if better:
+            depth, normal, point = deep, n, p
+    if depth >= 0.0:
+        if count > 1 and not one_way:
+            depth, normal = both_ways(touched, count, first)
+        return True, depth, normal, point
+    if depth >= -NEAR * tile:
+        return False, depth, normal, point
+    if depth >= beside:
+        return False, depth, normal, point
+    return False, min(beside, -MISSED * tile), other, point
+
+
+@part
+def both_ways(touched, count, first):
+    """(depth, normal) of the shortest way out of the deepest of several faces, and of one more that it keeps."""
+    deep, n = touched[first, 0], (touched[first, 1], touched[first, 2])
+    depth, normal = deep, n
+    for k in range(count):
+        m = (touched[k, 1], touched[k, 2])
+        cosine = dot(n, m)
+        if k == first or not OPPOSED <= cosine <= PARALLEL:
+            continue
+        left = (touched[k, 0] - cosine * deep) / (1.0 - cosine * cosine)
+        if left > 0.0:
+            way = add_scaled(scale(n, (deep - cosine * touched[k, 0]) / (1.0 - cosine * cosine)), m, left)
+            if length(way) > depth:
+                depth, normal = length(way), divided(way, length(way))
+    return depth, normal
+
+
+@part
+def shaped_contact(a, b, d, support, rounding):
+    """The contact of a shape with a map that has tiles that are not full."""
+    grid, tile = grid_of(a.packed), a.tile_size
+    size = (grid[1], grid[2])
+    place = add(d, (0.5 * size[0] * tile, 0.5 * size[1] * tile))
+    cells = reach_of_shape(b, place, tile, size, support, rounding)
+    if a.faces == ONE_WAYS:
+        if not is_shaped(a.packed):
+            return False, -math.inf, d, d
+        return outline_contact(a, b, d, cells, support, rounding)
+    if not any_shaped(grid, cells):
+        return deepest_contact(a, b, d, support, rounding)
+    hit, depth, normal, point = outline_contact(a, b, d, cells, support, rounding)
+    if not hit and is_inside(grid, tile, place):
+        return deepest_contact(a, b, d, support, rounding)
+    return hit, depth, normal, point
+
+
+@part
+def touch_of_segment(segment, b, d, v, times, tile, faces, support, rounding):
+    """(whether, when) a shape that moves by v from d on first touches a segment, between two times."""
+    (time, until), speed, before = times, length(v), times[0]
+    for look in range(2 * LOOKS):
+        at = add_scaled(d, v, time)
+        over, deep, n, _ = contact_of_segment(segment, b, at, support, rounding)
+        if not over:
+            before = time
+            time += min(max(-deep, STRIDE * tile), NEAR * tile) / speed
+        else:
+            rate = -dot(v, n)
+            if look == 0 and faces == ONE_WAYS and deep > SUNK * tile:
+                return False, 0.0
+            touches = deep >= 0.0 or (-deep <= ROUNDING * length(at) and (look > 0 or rate > 0.0))
+            if touches and look > 0 and deep > 0.0 and rate > 0.0:  # it has come over it within a stride
+                time = max(before, time - deep / rate)
+            if touches or not rate > 0.0:
+                return touches, time
+            further = time - deep / rate
+            if not further > time:
+                return True, time
+            time = further
+        if time > until:
+            break
+    return False, 0.0
+
+
+@part
+def shaped_touch(a, b, d, v, support, rounding):
+    """When a moving shape first touches a map that has tiles that are not full: by windows in which it moves by no more
+    than a tile; where no such tile is near, it first goes on to the next tile of any shape."""
+    grid, tile, faces = grid_of(a.packed), a.tile_size, a.faces
+    if not is_shaped(a.packed):
+        return False, 0.0
+    size, speed = (grid[1], grid[2]), length(v)
+    middle = (0.5 * size[0] * tile, 0.5 * size[1] * tile)
+    if speed == 0.0:
+        hit, _, _, _ = shaped_contact(a, b, d, support, rounding)
+        return hit, 0.0
+    time, window = 0.0, tile / speed
+    while time <= 1.0:
+        here = add_scaled(d, v, time)
+        cells = reach_of_shape(b, add(here, middle), tile, size, support, rounding)
+        shaped = any_shaped(grid, cells)
+        if not shaped and faces == ALL:
+            hit, share = first_touch(a, b, here, scale(v, 1.0 - time), support, rounding)
+            if not hit:
+                return False, 0.0
+            ahead = time + share * (1.0 - time)
+            cells = reach_of_shape(b, add(add_scaled(d, v, ahead), middle), tile, size, support, rounding)
+            if not any_shaped(grid, cells):
+                return True, min(ahead, 1.0)
+            if ahead > time:
+                time = ahead
+                continue
+        best, until, at = math.inf, min(time + window, 1.0), 0
+        while shaped or faces != ONE_WAYS:
+            at, there, run = next_run(grid, cells, faces == ONE_WAYS, at)
+            if not there:
+                break
+            segment = segment_of(run, tile, middle, ON * tile)
+            if not has_face(run, faces):
+                continue
+            hit, when = touch_of_segment(segment, b, d, v, (time, min(until, best)), tile, faces, support, rounding)
+            if hit:
+                best = min(best, when)
+        if best <= 1.0:
+            return True, best
+        if until >= 1.0:
+            break
+        time = until
+    return False, 0.0
