@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..components import AABBCollider
-from ..plugins.tile_grid import TileGridCollider
+from ..plugins.tile_grid import TileGridCollider, TileMaterial, TileShape
 from .bodies import Bodies
 from .errors import Findings, RefusedError
 from .fields import ONE_WAY, Fields
@@ -17,7 +17,23 @@ from .model import DIAGONAL, MapData, MapLayer, MapObject, Tile
 from .plan import Chain, Planned, transform
 from .shapes import Shape, collider_of, is_convex, tile_shapes
 
-SAME = 1e-9  # of a tile
+DIGITS = 6  # of a tile: corners that are nearer to those of a shape of the grid are these
+# By shape of the grid: how high its line is at its left and right end, in tiles, and whether it is solid above.
+LINES = {
+    TileShape.FULL: (1.0, 1.0, False), TileShape.SLOPE_UP: (0.0, 1.0, False), TileShape.SLOPE_DOWN: (1.0, 0.0, False),
+    TileShape.CEILING_UP: (0.0, 1.0, True), TileShape.CEILING_DOWN: (1.0, 0.0, True),
+    TileShape.GENTLE_UP_LOW: (0.0, 0.5, False), TileShape.GENTLE_UP_HIGH: (0.5, 1.0, False),
+    TileShape.GENTLE_DOWN_HIGH: (1.0, 0.5, False), TileShape.GENTLE_DOWN_LOW: (0.5, 0.0, False),
+    TileShape.GENTLE_CEILING_UP_LOW: (0.0, 0.5, True), TileShape.GENTLE_CEILING_UP_HIGH: (0.5, 1.0, True),
+    TileShape.GENTLE_CEILING_DOWN_HIGH: (1.0, 0.5, True), TileShape.GENTLE_CEILING_DOWN_LOW: (0.5, 0.0, True),
+    TileShape.LOWER_HALF: (0.5, 0.5, False), TileShape.UPPER_HALF: (0.5, 0.5, True),
+}  # fmt: skip
+CORNERS = {  # of each shape, in tiles
+    frozenset({(0.0, float(above)), (1.0, float(above)), (1.0, right), (0.0, left)}): shape
+    for shape, (left, right, above) in LINES.items()
+}
+IN_CELLS = ("friction", "restitution", "surface_velocity")  # of a material; others are those of the whole grid
+MOST = 255  # materials of a grid
 
 
 @dataclass
@@ -29,10 +45,51 @@ class Meaning:
     solid: bool
     is_entity: bool
 
-    @property
-    def key(self) -> tuple[Any, ...]:
-        """The same for tiles of one material."""
-        return tuple(sorted((name, _hashable(value)) for name, value in self.fields.material.items()))
+
+class Grid:
+    """Cells of one grid: numbers of their materials, and their shapes.
+
+    common
+        fields of the collider for all its cells
+    """
+
+    def __init__(self, shape: tuple[int, ...], common: dict[str, Any]) -> None:
+        self.common, self.materials = common, dict[Any, int]()
+        self.numbers, self.shapes = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
+
+    def add(self, cells: np.ndarray, material: dict[str, Any], shape: int) -> None:
+        number = self.materials.setdefault(_key(material), 1 + len(self.materials))
+        if number > MOST:
+            raise RefusedError(f"more than {MOST} different materials in a layer")
+        self.numbers[cells], self.shapes[cells] = number, shape
+
+    def colliders(self, metres: float) -> tuple[TileGridCollider, TileGridCollider]:
+        """Floors and walls; a plain grid if all cells are alike."""
+        given: dict[str, Any] = {"lower": (0, 0), **self.common}
+        if len(self.materials) == 1 and not self.shapes.any():
+            given |= dict(next(iter(self.materials)))
+        else:
+            given["materials"] = {number: TileMaterial(**dict(key)) for key, number in self.materials.items()}
+            given["shapes"] = self.shapes
+        return TileGridCollider.floors_and_walls(self.numbers, metres, **given)
+
+
+class Grids:
+    """The grids of a layer: one for all tiles whose layers, masks and other common fields are the same."""
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self.shape, self.by_key = shape, dict[Any, Grid]()
+
+    def add(self, cells: np.ndarray, material: dict[str, Any], shape: int = 0) -> None:
+        own = {name: value for name, value in material.items() if name in IN_CELLS}
+        common = {name: value for name, value in material.items() if name not in IN_CELLS}
+        self.by_key.setdefault(_key(common), Grid(self.shape, common)).add(cells, own, shape)
+
+
+def _key(material: dict[str, Any]) -> tuple[Any, ...]:
+    """The same for equal fields."""
+    plain = {n: tuple(v) if isinstance(v, (list, tuple, np.ndarray)) else v for n, v in material.items()}
+    return tuple(sorted(plain.items()))
 
 
 class TileLayers:
@@ -56,27 +113,22 @@ class TileLayers:
         place = f"layer {layer.name!r}"
         lower = np.array((layer.offset[0], -layer.offset[1])) * self.scale
         made: list[Planned] = []
-        grids: dict[tuple[Any, ...], tuple[np.ndarray, Fields]] = {}
-        runs: dict[tuple[Any, ...], tuple[np.ndarray, Fields]] = {}
+        grids = Grids((self.data.rows, self.data.columns))
         for gid, meaning in meanings.items():
             with self.findings.at(meaning.tile.where):
                 here = layer.cells == gid
                 if meaning.is_entity:
                     made += self._entities(here, meaning, layer, out)
                 elif meaning.tile.shapes:
-                    full, others = self._shaped(here, meaning, layer, out, lower, place)
-                    _add(grids, meaning, full)
-                    made += others
+                    made += self._shaped(here, meaning, layer, out, lower, place, grids)
+                elif ONE_WAY in meaning.fields.marks:
+                    made += self._one_way(here, meaning.fields, base, out, lower, place)
                 else:
-                    _add(runs if ONE_WAY in meaning.fields.marks else grids, meaning, here)
-        for cells, fields in grids.values():
-            if cells.any():
-                where: Any = {"lower": (0, 0), **fields.material}
-                for faces in TileGridCollider.floors_and_walls(cells, self.metres, **where):
-                    body = [transform(lower), faces, *self._components(base)]
-                    made.append(Planned(place, out, list(base.kinds), bodies=[body]))
-        for cells, fields in runs.values():
-            made += self._one_way(cells, fields, base, out, lower, place)
+                    grids.add(here, meaning.fields.material)
+        for grid in grids.by_key.values():
+            for faces in grid.colliders(self.metres):
+                body = [transform(lower), faces, *self._components(base)]
+                made.append(Planned(place, out, list(base.kinds), bodies=[body]))
         return made
 
     def _meanings(self, layer: MapLayer, base: Fields) -> dict[int, Meaning]:
@@ -123,21 +175,23 @@ class TileLayers:
         return made
 
     def _shaped(
-        self, here: np.ndarray, meaning: Meaning, layer: MapLayer, out: LevelLayer, lower: np.ndarray, place: str
-    ) -> tuple[np.ndarray, list[Planned]]:
-        """(the cells that are full, plans of the others): tiles with shapes of the collision editor."""
-        made, full = [], np.zeros(here.shape, bool)
+        self, here: np.ndarray, meaning: Meaning, layer: MapLayer, out: LevelLayer, lower: np.ndarray, place: str,
+        grids: Grids,
+    ) -> list[Planned]:  # fmt: skip
+        """Tiles with shapes of the collision editor: cells of a grid, or what a grid does not have as bodies."""
+        made: list[Planned] = []
         assert layer.flips is not None
         for flips in np.unique(layer.flips[here]).tolist():
             cells = here & (layer.flips == flips)
             shapes = self.shapes(meaning.tile, flips)
-            if len(shapes) == 1 and self._fills(shapes[0]):
-                full |= cells
-            if not shapes or full[cells].all():
-                continue
             material = dict(meaning.fields.material)
             if ONE_WAY in meaning.fields.marks:
                 material.setdefault("one_way", (0.0, 1.0))
+            elif len(shapes) == 1 and (named := self._named(shapes[0])) is not None:
+                grids.add(cells, material, named)
+                continue
+            elif not shapes:
+                continue
             for row, column in np.argwhere(cells).tolist():
                 corner = lower + self.corner(row, column)
                 planned = Planned(f"{place}, {meaning.tile.where}", out, [])
@@ -150,7 +204,7 @@ class TileLayers:
                         collider, centre, angle = collider_of(shape, material, False)
                         planned.bodies.append([transform(corner + centre, angle), collider])
                 made.append(planned)
-        return full, made
+        return made
 
     def shapes(self, tile: Tile, flips: int) -> list[Shape]:
         """Of a tile as it lies in a cell, from the cell's lower left corner, m."""
@@ -159,12 +213,12 @@ class TileLayers:
         found = tile_shapes(tile.shapes, tile.size, flips, (width * self.scale, height * self.scale))
         return [shape.moved(lambda points: points + aside) for shape in found]
 
-    def _fills(self, shape: Shape) -> bool:
-        """Whether it is the whole cell."""
-        whole = self.metres * np.array(((0, 0), (1, 0), (1, 1), (0, 1)))
-        if len(shape.points) != 4 or shape.kind not in ("box", "polygon"):
-            return False
-        return all(np.abs(shape.points - corner).max(axis=1).min() <= SAME * self.metres for corner in whole)
+    def _named(self, shape: Shape) -> TileShape | None:
+        """The shape of a grid that has these corners."""
+        if shape.kind not in ("box", "polygon"):
+            return None
+        corners = np.round(shape.points / self.metres, DIGITS) + 0.0
+        return CORNERS.get(frozenset(map(tuple, corners.tolist())))
 
     def corner(self, row: int, column: int) -> np.ndarray:
         """(2,) m, the lower left one of a cell."""
@@ -208,13 +262,3 @@ class TileLayers:
         seen = picture[which] >= 0
         return Tiles((place * self.scale)[seen], picture[which][seen], layer.flips[rows, columns][seen],
                      np.stack((rows, columns), axis=1)[seen])  # fmt: skip
-
-
-def _add(found: dict[tuple[Any, ...], tuple[np.ndarray, Fields]], meaning: Meaning, cells: np.ndarray) -> None:
-    if meaning.key not in found:
-        found[meaning.key] = np.zeros(cells.shape, bool), meaning.fields
-    found[meaning.key][0][cells] = True
-
-
-def _hashable(value: Any) -> Any:
-    return tuple(value) if isinstance(value, (list, tuple, np.ndarray)) else value

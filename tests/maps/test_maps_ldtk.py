@@ -78,7 +78,7 @@ def test_a_level_becomes_a_world(tmp_path, world):
         world.has_component(each, TileGridCollider) for each in world.query_point((c + 0.5, 3.5 - r)))}  # fmt: skip
     assert solid == {(3, c) for c in range(6)}
     icy = [world.component_for_entity(each, TileGridCollider) for each in world.query_point((3.5, 0.5))]
-    assert {tiles.friction for tiles in icy} == {0.02}
+    assert {tiles.materials[tiles.material_of(3, 3)].friction for tiles in icy} == {0.02}
 
 
 def test_one_of_several_levels_is_chosen(tmp_path, world):
