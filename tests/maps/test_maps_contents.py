@@ -34,6 +34,8 @@ from carom import (
     RigidBody,
     SphereCollider,
     Spin,
+    TileGridCollider,
+    TileShape,
     Transform,
     column,
     maps,
@@ -120,8 +122,6 @@ def test_layers_give_their_objects_classes_and_fields(tmp_path, world):
     assert [world.component_for_entity(each, Enemy).health for each in (first, second)] == [2.0, 1.0]
     assert world.component_for_entity(first, AABBCollider).sensor
     assert not world.has_component(second, AABBCollider)
-    from carom import TileGridCollider
-
     grid = world.component_for_entity(level.layers["ground"].entities[0], TileGridCollider)
     assert (grid.friction, grid.layer) == (0.25, 2)
     assert level.layers["sky"].entities == []
@@ -246,6 +246,36 @@ def test_concave_bodies_are_parts_with_the_mass_of_the_whole(tmp_path, world):
     centre = 3 + x * math.cos(turn) - y * math.sin(turn), 9 - x * math.sin(turn) - y * math.cos(turn)
     before = world.component_for_entity(entities[0], Transform).position - (0, -10 / 60**2)
     np.testing.assert_allclose(before, centre, atol=1e-9)
+
+
+def test_slopes_halves_and_materials_are_cells_of_one_grid(tmp_path, world):
+    """In whichever way they are flipped; what stands upright is no cell of a grid. Layers make a grid of their own."""
+    gentle, high = ((0, 16), (16, 8), (16, 16)), ((0, 8), (16, 0), (16, 16), (0, 16))
+    tiles = tileset(
+        tile(0, "Solid"), tile(1, "", thing(1, 0, 0, polygon=((0, 16), (16, 0), (16, 16))), friction=0.1),
+        tile(2, "", thing(1, 0, 0, polygon=gentle)), tile(3, "", thing(1, 0, 0, polygon=high), restitution=0.5),
+        tile(4, "", thing(1, 0, 8, 16, 8), surface_velocity=2.0), tile(5, "Solid", layer=2),
+    )  # fmt: skip
+    flips = np.arange(4)[:, None] << 30  # none, vertically, horizontally, both
+    cells = np.concatenate((np.arange(1, 7) | flips, np.full((1, 6), 1)))
+    level = load(write(tmp_path / "map.tmx", map_of(6, 5, tiles_of(cells), tilesets=[tiles])), world)
+    grids = [world.component_for_entity(each, TileGridCollider) for each in level.layers["ground"].entities]
+    assert [(grid.faces, grid.layer) for grid in grids] == [(f, k) for k in (1, 2) for f in ("floors", "walls")]
+    shapes, kinds = grids[0].shapes, TileShape
+    assert shapes[0].tolist() == [0, kinds.SLOPE_UP, kinds.GENTLE_UP_LOW, kinds.GENTLE_UP_HIGH, kinds.LOWER_HALF, 0]
+    assert shapes[1:4, 1].tolist() == [kinds.CEILING_DOWN, kinds.SLOPE_DOWN, kinds.CEILING_UP]
+    assert (grids[0].cells[:, 5] != 0).tolist() == [False, False, False, False, True]
+    made_of = [grids[0].materials.get(grids[0].material_of(0, c)) for c in range(5)]
+    assert made_of[1].friction == 0.1
+    assert made_of[3].restitution == 0.5
+    assert tuple(made_of[4].surface_velocity) == (2.0, 0.0)
+    assert (made_of[0], made_of[2]) == (None, None)
+    peak = thing(1, 0, 0, polygon=((0, 16), (8, 0), (16, 16)))
+    steep = tileset(tile(0, "", thing(1, 0, 0, 8, 16)), tile(1, "", peak))
+    other = load(write(tmp_path / "map.tmx", map_of(2, 1, tiles_of([[1, 2]]), tilesets=[steep])), world)
+    half, roof = other.layers["ground"].entities
+    assert world.component_for_entity(half, AABBCollider).half_extents.tolist() == [0.25, 0.5]
+    assert world.has_component(roof, ConvexPolygonCollider)
 
 
 @FORMATS
