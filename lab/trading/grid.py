@@ -187,7 +187,7 @@ def survey(subject: Subject, seconds: float, jobs: Jobs) -> Facts:
     with closing(subject.world(None)) as recommended, subject.loaded.attribute_errors(), stdout_kept_clean():
         settings, start = recommended.settings, recommended.state_hash()
         dynamic = recommended.bodies.dynamic
-        if not len(dynamic):
+        if not len(dynamic) and subject.loaded.compared is None:  # a game may begin with characters, or with a title
             raise Problem(f"{subject.name}: there is no body that moves by itself: nothing to measure")
         forces = bool(recommended.force_systems), bool(np.any(recommended.gravity) and np.any(dynamic.gravity_scale))
         free = not (any(forces) or np.any(dynamic.constant_force) or np.any(dynamic.linear_damping))

@@ -99,6 +99,27 @@ def test_without_a_name_for_it_bodies_are_matched_in_the_order_of_their_creation
     assert found.points[0].figures["position"].error < 0.1
 
 
+def begins_with_a_title(settings, seed=0):
+    """Nothing that moves by itself is there at the start: the first ball comes after half a second."""
+
+    class Begin(System):
+        def process(self, dt):
+            if self.world.time >= 0.5 and not len(self.world.bodies.dynamic):
+                self.world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(2, 0)), SphereCollider(0.3))
+
+    world = World(Physics(dimensions=2, gravity=0), settings=settings)
+    world.create_entity(Transform((0, -5)), RigidBody(kind="kinematic"), SphereCollider(0.3))
+    world.add_system(Begin())
+    return world
+
+
+def test_a_game_may_begin_without_a_body_that_moves_by_itself():
+    with pytest.raises(Problem, match="there is no body that moves by itself"):
+        survey(Subject.of(begins_with_a_title), 1.0, Jobs(1))
+    begins_with_a_title.compared = lambda world: {"balls": len(world.bodies.dynamic)}
+    assert survey(Subject.of(begins_with_a_title), 1.0, Jobs(1)).trial.values == {"balls": [1.0]}
+
+
 def test_balls_on_a_line_touch_in_order():
     def line(settings, seed=0):
         world = World(Physics(dimensions=2, gravity=(0, 0)), settings=settings)
