@@ -24,7 +24,7 @@ def swarm():
     def hold(frame):
         of.health, of.rate = 1e9, game.FASTEST
         if of.state == "play":
-            game.come(world, of, game.GRUB, game.MOST)  # as many as are missing
+            game.come(world, of, np.zeros(game.MOST, int))  # as many as are missing
         world.get_processor(game.Act).held = {"space", ("right", "up", "left", "down")[frame // 90 % 4]}
 
     return game, world, hold

@@ -126,7 +126,7 @@ class Act(System):
         x, y = ("right" in held) - ("left" in held), ("up" in held) - ("down" in held)
         body.linear_velocity = game.speed * np.array((x, y)) / max(hypot(x, y), 1.0)
         if "space" in pressed and not self.world.has_component(game.hero, Timer):
-            explode(self.world, transform.position, radius=9.0, impulse=40.0, mask=ENEMY)
+            explode(self.world, transform.position, radius=9.0, impulse=14.0, mask=ENEMY)
             self.world.add_component(game.hero, Timer(4.0))
         return transform.position.copy()
 
@@ -210,29 +210,26 @@ class Harvest(System):
             game.state = "won"
 
 
-def come(world, game, kind, n):
-    """``n`` enemies of that kind, in a ring around the hero; no more than MOST in all."""
-    n = max(min(n, MOST - len(world.bodies.dynamic)), 0)
+def come(world, game, kinds):
+    """Enemies of these ``kinds``, (n,), in a ring around the hero; no more than MOST in all."""
+    kinds = kinds[: max(MOST - len(world.bodies.dynamic), 0)]
     game.came += 1
-    random = np.random.default_rng((game.seed, game.came))
+    random, n = np.random.default_rng((game.seed, game.came)), len(kinds)
     angle, far = random.uniform(0, 2 * pi, n), random.uniform(21.0, 34.0, n)  # beyond what is seen
     place = world.component_for_entity(game.hero, Transform).position
     world.create_entities(
         n, Transform.many(place + far[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)),
-        RigidBody.many(mass=MASS[kind]),
-        SphereCollider.many(radius=RADIUS[kind], friction=0.0, layer=ENEMY, mask=HERO | ENEMY | BULLET),
-        Enemy.many(kind=kind, health=HEALTH[kind] * (game.waves if kind == QUEEN else 1) + game.wave**2 // 12),
+        RigidBody.many(mass=MASS[kinds]),
+        SphereCollider.many(radius=RADIUS[kinds], friction=0.0, layer=ENEMY, mask=HERO | ENEMY | BULLET),
+        Enemy.many(kind=kinds, health=HEALTH[kinds] * np.where(kinds == QUEEN, game.waves, 1) + game.wave**2 // 12),
     )  # fmt: skip
 
 
 def next_wave(world, game):
-    if game.state != "play":
-        return
-    game.wave += 1
-    come(world, game, QUEEN, int(game.wave == game.waves))
-    come(world, game, BRUTE, game.wave // 2)
-    come(world, game, RUNNER, game.wave**2)
-    come(world, game, GRUB, 20 + 4 * game.wave**2)
+    if game.state == "play":
+        game.wave += 1
+        counts = (int(game.wave == game.waves), game.wave // 2, game.wave**2, 20 + 4 * game.wave**2)
+        come(world, game, np.repeat((QUEEN, BRUTE, RUNNER, GRUB), counts))
 
 
 def build(settings=None, seed=0, keys=RECORDED, waves=20):

@@ -12,19 +12,20 @@ swarm = load("swarm")
 
 
 def test_recorded_keys_kill_the_queen():
-    world = swarm.play(islice(recorded("swarm.keys"), 30), waves=4)
+    world = swarm.play(islice(recorded("swarm.keys"), 30), waves=3)
     game, most = swarm.game_of(world), 0
     for held in islice(recorded("swarm.keys"), 30, 60 * 60):
         swarm.play([held], world)
         most = max(most, len(world.bodies.dynamic))
         if game.state != "play":
             break
-    assert (game.state, game.wave) == ("won", 8)
-    assert most > 200 and game.kills > 500 and game.level > 8 and 50 < game.health <= 100
+    assert (game.state, game.wave) == ("won", 6)
+    assert min(most / 150, game.kills / 300, game.level / 6) > 1
+    assert 50 < game.health <= 100
     assert not world.faults
     gems = game.gems
     swarm.play([{"right"}] * 30, world)  # nothing goes on
-    assert game.gems == gems and game.state == "won"
+    assert (game.gems, game.state) == (gems, "won")
 
 
 def test_who_stands_still_is_overrun():
@@ -32,14 +33,14 @@ def test_who_stands_still_is_overrun():
     game = swarm.game_of(world)
     while game.state == "play" and world.time < 90:
         swarm.play([set()], world)
-    assert game.state == "over" and game.health <= 0 and game.wave > 2
+    assert (game.state, game.wave) == ("over", 3)
 
 
 def test_the_horde_has_a_most_and_the_guns_a_rate():
     world = swarm.play([{"space"}])
     game = swarm.game_of(world)
     game.health, game.rate = 1e9, swarm.FASTEST
-    swarm.come(world, game, swarm.GRUB, 5000)
+    swarm.come(world, game, np.zeros(5000, int))
     assert len(world.bodies.dynamic) == swarm.MOST
     shots = game.shots
     swarm.play([set()] * 60, world)
@@ -49,8 +50,9 @@ def test_the_horde_has_a_most_and_the_guns_a_rate():
 
 def check(world):
     game, bodies = swarm.game_of(world), world.bodies
-    assert np.isfinite(bodies.position).all() and np.isfinite(bodies.linear_velocity).all()
-    assert len(bodies.dynamic) <= swarm.MOST and game.health <= 100.0
+    assert np.isfinite(np.hstack([bodies.position, bodies.linear_velocity])).all()
+    assert len(bodies.dynamic) <= swarm.MOST
+    assert game.health <= 100.0
     assert (game.state == "over") == (game.health <= 0.0)
     fading = bodies.has(swarm.Fades)
     assert (bodies.fades.until[fading] > world.time - 0.1).all()  # what is over is gone in the step that follows
