@@ -45,7 +45,7 @@ def fuzz(game, seconds, check, seed=0, **how):
     left, worlds, world = round(seconds / DT), 0, None
     while left > 0:
         if world is None:
-            world = game.play([{"space"}, set()], seed=seed + worlds, **how)
+            world = game.play([set(game.KEYS), set()], seed=seed + worlds, **how)
             worlds += 1
         start, frames = world.snapshot(), list(pressed_at_random(random, game.KEYS, min(left, 300)))
         game.play(frames, world)

@@ -1,6 +1,7 @@
 """How long frames take, physics, rules and drawing, without a display: python examples/games/measure.py swarm
 
-Swarm with 2,000 enemies and 600 bullets a second. Pin it to a core that nothing else uses: taskset -c 1 python ...
+Swarm with 2,000 enemies and 600 bullets a second; Siege with 300 bodies, random keys and, each frame, a snapshot, and how
+long it takes to go back by 8 frames. Pin it to a core that nothing else uses: taskset -c 1 python ...
 """
 
 from __future__ import annotations
@@ -13,36 +14,62 @@ from time import perf_counter, process_time
 import numpy as np
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+BEFORE, FRAMES = 300, 1200
 
 
 def swarm():
+    """Yields its world once a frame is over."""
     import swarm as game
 
-    world = game.build(keys=None)
+    world, pictures = game.build(keys=None), game.Pictures()
     of = game.game_of(world)
-
-    def hold(frame):
+    for frame in range(BEFORE + FRAMES):
         of.health, of.rate = 1e9, game.FASTEST
         if of.state == "play":
             game.come(world, of, np.zeros(game.MOST, int))  # as many as are missing
         world.get_processor(game.Act).held = {"space", ("right", "up", "left", "down")[frame // 90 % 4]}
-
-    return game, world, hold
-
-
-def measure(name, frames=1200, before=300):
-    game, world, hold = globals()[name]()
-    pictures, taken = game.Pictures(), []
-    gc.freeze()
-    for frame in range(before + frames):
-        start = perf_counter(), process_time()
-        hold(frame)
         world.advance(1 / 60)
         pictures.draw(world, 1 / 60)
         game.pygame.display.flip()
-        taken.append((1000 * (perf_counter() - start[0]), 1000 * (process_time() - start[1])))
-    print(f"{name}: {frames} frames, at last of {len(world.bodies)} bodies: ms a frame, median, p99 and worst")
-    for label, times in zip(("by the clock", "of the processor"), np.array(taken[before:]).T, strict=True):
+        yield world
+
+
+def siege():
+    import siege as game
+
+    world = game.build(keys=None, rows=17)
+    frames = iter(game.Pictures(world, real_time=False, prepare=False).view)
+    random, held, times = np.random.default_rng(0), set(), []
+    for frame in range(BEFORE + FRAMES):
+        next(frames)  # draws the frame before
+        held ^= {name for name in game.KEYS if random.random() < 0.03}
+        start = perf_counter()
+        snapshot = world.snapshot()
+        times.append(perf_counter() - start)
+        game.play([held], world)
+        if frame % 100 == 99:
+            for _ in range(7):
+                game.play([held], world)
+            start = perf_counter()
+            world.restore(snapshot)
+            for _ in range(8):
+                world.snapshot()
+                game.play([held], world)
+            print(f"back by 8 frames: {1000 * (perf_counter() - start):.1f} ms, {len(world.bodies)} bodies")
+        yield world
+    print("a snapshot: median {:.2f} ms, p99 {:.2f} ms".format(*1000 * np.percentile(times, (50, 99))))
+
+
+def measure(name):
+    taken, start = [], (0.0, 0.0)
+    for world in globals()[name]():
+        taken.append((perf_counter() - start[0], process_time() - start[1]))
+        if len(taken) == BEFORE:
+            gc.freeze()
+        start = perf_counter(), process_time()
+    print(f"{name}: {FRAMES} frames, at last of {len(world.bodies)} bodies: ms a frame, median, p99 and worst")
+    for label, times in zip(("by the clock", "of the processor"), 1000 * np.array(taken[BEFORE:]).T, strict=True):
         print(f"{label:>16}  {np.percentile(times, 50):5.1f}  {np.percentile(times, 99):5.1f}  {times.max():5.1f}")
 
 
