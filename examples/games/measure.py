@@ -1,7 +1,7 @@
 """How long frames take, physics, rules and drawing, without a display: python examples/games/measure.py swarm
 
-Swarm with 2,000 enemies and 600 bullets a second; Siege with 300 bodies, random keys and, each frame, a snapshot, and how
-long it takes to go back by 8 frames. Pin it to a core that nothing else uses: taskset -c 1 python ...
+Swarm with 2,000 enemies and 600 bullets a second; Siege with 300 bodies, random keys and a snapshot in each frame, and
+how long it takes to go back by 8 frames. Pin it to a core that nothing else uses: taskset -c 1 python ...
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ BEFORE, FRAMES = 300, 1200
 
 
 def swarm():
-    """Yields its world once a frame is over."""
+    """Yields once a frame is over."""
     import swarm as game
 
     world, pictures = game.build(keys=None), game.Pictures()
@@ -32,7 +32,8 @@ def swarm():
         world.advance(1 / 60)
         pictures.draw(world, 1 / 60)
         game.pygame.display.flip()
-        yield world
+        yield
+    print(f"{len(world.bodies)} bodies at last")
 
 
 def siege():
@@ -57,18 +58,18 @@ def siege():
                 world.snapshot()
                 game.play([held], world)
             print(f"back by 8 frames: {1000 * (perf_counter() - start):.1f} ms, {len(world.bodies)} bodies")
-        yield world
+        yield
     print("a snapshot: median {:.2f} ms, p99 {:.2f} ms".format(*1000 * np.percentile(times, (50, 99))))
 
 
 def measure(name):
     taken, start = [], (0.0, 0.0)
-    for world in globals()[name]():
+    for _ in globals()[name]():
         taken.append((perf_counter() - start[0], process_time() - start[1]))
         if len(taken) == BEFORE:
             gc.freeze()
         start = perf_counter(), process_time()
-    print(f"{name}: {FRAMES} frames, at last of {len(world.bodies)} bodies: ms a frame, median, p99 and worst")
+    print(f"{name}: {FRAMES} frames, ms each: median, p99 and worst")
     for label, times in zip(("by the clock", "of the processor"), 1000 * np.array(taken[BEFORE:]).T, strict=True):
         print(f"{label:>16}  {np.percentile(times, 50):5.1f}  {np.percentile(times, 99):5.1f}  {times.max():5.1f}")
 
