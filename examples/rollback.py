@@ -1,9 +1,9 @@
 """Two peers of a network game that never wait for each other: python examples/rollback.py
 
-Each peer plays with what it knows: its own inputs at once, those of the other as soon as they arrive. It keeps a
-snapshot of every frame of the last ones. When it is told what the other did some frames ago, it goes back there and
-plays these frames again, with bullets that are fired in them, in the time of one frame. At the end both have the same
-world, to the bit.
+Each peer plays with what it knows: its own inputs at once, those of the other as soon as they arrive. When it is told
+what the other did some frames ago, and that is not what it took for it, carom.Rollback goes back there and plays these
+frames again, with bullets that are fired in them, in the time of one frame. At the end both have the same world, to the
+bit. examples/games/siege.py does this over a network.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from carom import (
     Phase,
     Physics,
     RigidBody,
+    Rollback,
     Settings,
     SphereCollider,
     System,
@@ -46,74 +47,46 @@ class Expire(System):
                 self.world.delete_entity(entity)
 
 
-class Peer:
-    """One of two players, number 0 or 1, with a world of its own."""
+def new_peer():
+    """The world of one of the two, and what plays it."""
+    world = World(Physics(dimensions=2, gravity=(0, -9.81)), settings=Settings(max_impacts_per_step=32))
+    world.add_system(Expire())
+    world.create_entity(Transform((0, -0.5)), AABBCollider((20, 0.5)))
+    players = [
+        world.create_entity(Transform((x, 0.5)), RigidBody(mass=5), SphereCollider(0.5, friction=0.3)) for x in (-8, 8)
+    ]
+    for k in range(30):  # a wall between them
+        place = (0.8 * (k % 3) - 0.8, 0.4 + 0.8 * (k // 3))
+        world.create_entity(Transform(place), RigidBody(), AABBCollider((0.4, 0.4), friction=0.5))
 
-    def __init__(self, number):
-        self.number, self.frame, self.replayed = number, 0, 0
-        self.inputs = {}  # by frame and player
-        self.snapshots = {}  # by frame, before it was played
-        self.world = World(Physics(dimensions=2, gravity=(0, -9.81)), settings=Settings(max_impacts_per_step=32))
-        self.world.add_system(Expire())
-        self.world.create_entity(Transform((0, -0.5)), AABBCollider((20, 0.5)))
-        self.players = [
-            self.world.create_entity(Transform((x, 0.5)), RigidBody(mass=5), SphereCollider(0.5, friction=0.3))
-            for x in (-8, 8)
-        ]
-        for k in range(30):  # a wall between them
-            place = (0.8 * (k % 3) - 0.8, 0.4 + 0.8 * (k // 3))
-            self.world.create_entity(Transform(place), RigidBody(), AABBCollider((0.4, 0.4), friction=0.5))
+    def act(inputs):
+        for player, ahead, (push, fires) in zip(players, (1, -1), inputs, strict=True):
+            world.component_for_entity(player, RigidBody).apply_impulse((push, 0))
+            if fires:
+                x, y = world.component_for_entity(player, Transform).position
+                flight = RigidBody(mass=0.2, linear_velocity=(25 * ahead, 3), ccd=True)
+                lasts = Bullet(world.time + 0.5)
+                world.create_entity(Transform((x + 0.8 * ahead, y + 0.5)), flight, SphereCollider(0.1), lasts)
 
-    def play(self, push, fires):
-        """One frame with this player's input; returns what the other is to be told."""
-        self.inputs[self.frame, self.number] = (push, fires)
-        self._play_frame()
-        return self.frame - 1, self.number, (push, fires)
-
-    def hear(self, frame, player, given):
-        """The other's input of a frame that is over: go back, and play forward again."""
-        self.inputs[frame, player] = given
-        now, self.frame = self.frame, frame
-        self.world.restore(self.snapshots[frame])
-        for known in [known for known in self.snapshots if known < frame]:
-            del self.snapshots[known]
-        while self.frame < now:
-            self._play_frame()
-            self.replayed += 1
-
-    def _play_frame(self):
-        self.snapshots[self.frame] = self.world.snapshot()
-        for number in range(2):
-            self._act(number, *self.inputs.get((self.frame, number), NOTHING))
-        self.world.step()
-        self.frame += 1
-
-    def _act(self, number, push, fires):
-        world, player = self.world, self.players[number]
-        body = world.component_for_entity(player, RigidBody)
-        body.apply_impulse((push, 0))
-        if fires:
-            ahead = 1 if number == 0 else -1
-            x, y = world.component_for_entity(player, Transform).position
-            flight = RigidBody(mass=0.2, linear_velocity=(25 * ahead, 3), ccd=True)
-            lasts = Bullet(world.time + 0.5)
-            world.create_entity(Transform((x + 0.8 * ahead, y + 0.5)), flight, SphereCollider(0.1), lasts)
+    return Rollback(world, act, most=DELAY + 1, idle=NOTHING)
 
 
 def play(frames=FRAMES, delay=DELAY, seed=0):
     """Two peers that press random buttons; every input reaches the other after ``delay`` frames."""
-    rng, peers = np.random.default_rng(seed), [Peer(0), Peer(1)]
+    rng, peers = np.random.default_rng(seed), [new_peer(), new_peer()]
     under_way = []
-    for frame in range(frames + delay):
+    for frame in range(frames + delay + 1):
         while under_way and under_way[0][0] <= frame:
-            _, told = under_way.pop(0)
-            peers[1 - told[1]].hear(*told)
+            _, number, told = under_way.pop(0)
+            peers[1 - number].give(number, *told)
         if frame < frames:
-            for peer in peers:
-                told = peer.play(float(rng.normal()), bool(rng.random() < 0.1))
-                under_way.append((frame + delay, told))
-    for _, told in under_way:
-        peers[1 - told[1]].hear(*told)
+            for number, peer in enumerate(peers):
+                told = frame, [(float(rng.normal()), bool(rng.random() < 0.1))]
+                peer.give(number, *told)
+                peer.step()
+                under_way.append((frame + delay, number, told))
+    for peer in peers:
+        peer.settle()
     return peers
 
 

@@ -24,6 +24,7 @@ from .settings import Settings
 from .typing import Vector
 from .world.contacts import Contact, Contacts, ContactsBetween
 from .world.hits import CastHit, CastHits, Hits, NearestHit, NearestHits, Neighbours, OverlapHit, OverlapHits
+from .world.rollback import Rollback
 from .world.snapshots import Snapshot
 from .world.world import World
 
@@ -53,6 +54,7 @@ __all__ = [
     "Plan",
     "Plugin",
     "PluginError",
+    "Rollback",
     "ScheduleError",
     "Settings",
     "Snapshot",

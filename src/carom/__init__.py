@@ -14,8 +14,8 @@ _NAMES = {
         "Bodies", "CaromError", "CastHit", "CastHits", "Column", "Component", "Contact", "Contacts", "ContactsBetween",
         "Convex", "FaultError", "ForceSystem", "Hits", "MissingComponentError", "NearestHit", "NearestHits",
         "Neighbours", "NoPhysicsError", "OverlapHit", "OverlapHits", "Phase", "PhysicsWarning", "Plan", "Plugin",
-        "PluginError", "ScheduleError", "Settings", "Snapshot", "Stats", "StepError", "System", "UnhandledPairError",
-        "Vector", "World", "array_column", "column", "use_kernels",
+        "PluginError", "Rollback", "ScheduleError", "Settings", "Snapshot", "Stats", "StepError", "System",
+        "UnhandledPairError", "Vector", "World", "array_column", "column", "use_kernels",
     ),
     "components": ("ALL_LAYERS", "AABBCollider", "Collider", "Prefab", "RigidBody", "SphereCollider", "Transform"),
     "systems": (

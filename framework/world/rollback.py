@@ -1,0 +1,123 @@
+"""Rollback: a world that is played ahead of inputs which come late."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .snapshots import Snapshot
+    from .world import World
+
+CHECKED = 30  # frames from one hash to the next
+KEPT = 10  # hashes
+
+
+class Rollback:
+    """Steps a world with the inputs of several players, some of whom are far away::
+
+        rollback = Rollback(world, apply)
+        rollback.give(me, rollback.frame, [keys])       # one's own, at once
+        rollback.give(other, frame, [keys, more])       # of that frame and those that follow, when they arrive
+        rollback.step()
+
+    As long as an input is not known, the last one of that player is taken for it. When it comes, and is another, the
+    world goes back to its frame and is stepped forward again in the next :meth:`step` or :meth:`settle`. The worlds of
+    all players then have the same bits, if the world holds all state of the game.
+
+    world
+        the World; nothing else may step it
+    apply
+        is called before each step with the inputs, a list with one of each player, and writes them into the world.
+        Inputs are anything that compares with ``==``
+    players
+        how many
+    most
+        frames that the world may be ahead of the inputs of the slowest player
+    idle
+        what is taken for an input before the first one of a player is known
+    """
+
+    def __init__(
+        self, world: World, apply: Callable[[list[Any]], object], players: int = 2, most: int = 8, idle: Any = 0
+    ) -> None:
+        if players < 1 or most < 1:
+            raise ValueError(f"Rollback needs a player at least, and most of 1 or more, got {players!r}, {most!r}")
+        self.world, self.most = world, most
+        self.frame, self.replayed = 0, 0  # the next frame; steps that were taken again
+        self._apply, self._idle = apply, idle
+        self._inputs: list[list[Any]] = [[] for _ in range(players)]
+        self._used: dict[int, list[Any]] = {}  # by frame, with guesses
+        self._snapshots: dict[int, Snapshot] = {}  # before each frame that is not confirmed
+        self._hashes: dict[int, str] = {}
+        self._wrong: int | None = None  # the first frame with a guess that was wrong
+
+    def inputs(self, player: int) -> list[Any]:
+        """All inputs of a player that are known, from frame 0 on; not to be changed."""
+        return self._inputs[player]
+
+    @property
+    def confirmed(self) -> int:
+        """The first frame of which not all inputs are known."""
+        return min(map(len, self._inputs))
+
+    def give(self, player: int, frame: int, inputs: Iterable[Any]) -> None:
+        """The inputs of a player in ``frame`` and those that follow. What is known already is skipped, and what leaves
+        a gap is ignored: send all that the other may lack."""
+        known = self._inputs[player]
+        if not 0 <= frame <= len(known):
+            return
+        for new in list(inputs)[len(known) - frame :]:
+            at = len(known)
+            if at in self._used and self._used[at][player] != new:
+                self._wrong = at if self._wrong is None else min(at, self._wrong)
+            known.append(new)
+
+    def step(self) -> bool:
+        """One frame more; False, and none is played, if a player is too far behind."""
+        self.settle()
+        if self.frame - self.confirmed >= self.most:
+            return False
+        self._play()
+        return True
+
+    def settle(self) -> None:
+        """Play again what was played with wrong guesses."""
+        if self._wrong is None:
+            return
+        now, self.frame, self._wrong = self.frame, self._wrong, None
+        self.world.restore(self._snapshots[self.frame])
+        self.replayed += now - self.frame
+        while self.frame < now:
+            self._play()
+
+    def _play(self) -> None:
+        frame, confirmed = self.frame, self.confirmed
+        if frame % CHECKED == 0:
+            self._hashes[frame] = self.world.state_hash()
+        if frame >= confirmed:  # else nothing leads back to here
+            self._snapshots[frame] = self.world.snapshot()
+        used = [known[frame] if frame < len(known) else known[-1] if known else self._idle for known in self._inputs]
+        self._apply(used)
+        self.world.step()
+        self._used[frame] = used
+        self.frame += 1
+        for kept, oldest in (
+            (self._used, confirmed), (self._snapshots, confirmed), (self._hashes, confirmed - KEPT * CHECKED),
+        ):  # fmt: skip
+            for old in [old for old in kept if old < oldest]:
+                del kept[old]
+
+    def checksum(self) -> tuple[int, str]:
+        """A frame whose start depends on no guess, the newest one of every 30th, and the hash of the world there; to be
+        sent to the others. (0, "") before the first."""
+        self.settle()
+        frame = max((frame for frame in self._hashes if frame <= self.confirmed), default=0)
+        return frame, self._hashes.get(frame, "")
+
+    def differs(self, frame: int, checksum: str) -> bool | None:
+        """Whether this world had another hash there than that of another player; None if that is not known here."""
+        self.settle()
+        if frame > self.confirmed or frame not in self._hashes:
+            return None
+        return self._hashes[frame] != checksum

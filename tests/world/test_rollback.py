@@ -1,0 +1,98 @@
+"""Rollback: worlds whose players hear from each other late have the bits of one that knows all inputs at once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from carom import AABBCollider, Physics, RigidBody, Rollback, SphereCollider, Transform, World
+
+
+def game():
+    """Two players push their balls about on a floor, among others."""
+    world = World(Physics(dimensions=2, gravity=(0, -9.81)))
+    world.create_entity(Transform((0, -0.5)), AABBCollider((20, 0.5), friction=0.3))
+    players = [world.create_entity(Transform((x, 0.5)), RigidBody(), SphereCollider(0.5)) for x in (-2, 2)]
+    for k in range(6):
+        world.create_entity(Transform((0.3 * k - 1, 2 + k)), RigidBody(), SphereCollider(0.3))
+
+    def apply(inputs):
+        for player, push in zip(players, inputs, strict=True):
+            world.component_for_entity(player, RigidBody).apply_impulse((push, abs(push)))
+
+    return world, apply
+
+
+def pushes(random, frames):
+    """Some that change now and then."""
+    return (random.integers(-1, 2, frames // 7 + 1).repeat(7)[:frames] * 0.5).tolist()
+
+
+@pytest.mark.parametrize(("late", "lost", "most"), [(0, 0.0, 8), (5, 0.0, 8), (12, 0.3, 8), (3, 0.2, 2)])
+def test_late_and_lost_inputs_end_in_the_same_bits(late, lost, most):
+    random, frames = np.random.default_rng(late), 120
+    given = [pushes(random, frames) for _ in range(2)]
+    world, apply = game()
+    for both in zip(*given, strict=True):
+        apply(list(both))
+        world.step()
+    right = world.state_hash()
+    peers = [Rollback(*game(), most=most) for _ in range(2)]
+    under_way = []  # (tick, to, first frame, inputs, checksum)
+    for tick in range(20 * frames):
+        for packet in [packet for packet in under_way if packet[0] <= tick]:
+            under_way.remove(packet)
+            _, to, first, inputs, checksum = packet
+            peers[to].give(1 - to, first, inputs)
+            assert not peers[to].differs(*checksum)
+        for number, peer in enumerate(peers):
+            known = len(peer.inputs(number))
+            if peer.frame < frames and known == peer.frame:
+                peer.give(number, known, [given[number][known]])
+            if peer.frame < frames:
+                peer.step()
+                assert peer.frame - peer.confirmed <= most
+            if random.random() >= lost:
+                mine = peer.inputs(number)
+                first = max(0, len(mine) - 2 * most - 2)
+                delay = random.integers(0, late + 1)
+                under_way.append((tick + delay, 1 - number, first, mine[first:], peer.checksum()))
+        if all(peer.confirmed == frames for peer in peers):
+            break
+    for peer in peers:
+        peer.settle()
+        assert peer.frame == frames
+        assert peer.world.state_hash() == right
+        assert peer.replayed > 0
+
+
+def test_worlds_that_differ_are_found_out():
+    peers = [Rollback(*game()) for _ in range(2)]
+    for peer in peers:
+        peer.give(0, 0, [0.5] * 70)
+        peer.give(1, 0, [-0.5] * 70)
+        assert peer.checksum() == (0, "")
+    peers[1].world.component_for_entity(2, RigidBody).linear_velocity = 0.0, 1e-12
+    for peer in peers:
+        while peer.frame < 70:
+            assert peer.step()
+    frame, hash_there = peers[0].checksum()
+    assert frame == 60
+    assert peers[1].differs(frame, hash_there) is True
+    assert peers[0].differs(frame, hash_there) is False
+    assert peers[0].differs(90, hash_there) is None  # not played
+
+
+def test_it_waits_for_the_slowest_and_ignores_gaps():
+    world, apply = game()
+    rollback = Rollback(world, apply, most=3)
+    rollback.give(0, 0, [0.0] * 10)
+    assert [rollback.step() for _ in range(5)] == [True, True, True, False, False]
+    rollback.give(1, 2, [0.5])  # frames 0 and 1 are missing
+    assert not rollback.step()
+    rollback.give(1, 0, [0.0, 0.0, 0.5])
+    assert rollback.step()
+    assert (rollback.confirmed, rollback.frame, rollback.replayed) == (3, 4, 1)
+    for wrong in ({"players": 0}, {"most": 0}):
+        with pytest.raises(ValueError, match="Rollback needs"):
+            Rollback(world, apply, **wrong)
