@@ -52,7 +52,7 @@ def write_code(path: Path, into: Path) -> None:
         page = into / f"{path}.md"
         page.parent.mkdir(parents=True, exist_ok=True)
         kind = "python" if path.suffix == ".py" else "text"
-        page.write_text(f"{UNSEARCHED}# {path.name}\n\n````{kind}\n{text}````\n", encoding="utf-8")
+        page.write_text(f"{UNSEARCHED}# {path.name}\n\n````{kind}\n{text.rstrip()}\n````\n", encoding="utf-8")
         return
     files = [file.relative_to(ROOT) for file in sorted((ROOT / path).rglob("*.py")) if file.stat().st_size]
     lines = [f"# {path.as_posix()}/", "", "| file | |", "|---|---|"]
@@ -60,7 +60,8 @@ def write_code(path: Path, into: Path) -> None:
         write_code(file, into)
         about = (ast.get_docstring(ast.parse((ROOT / file).read_text(encoding="utf-8"))) or "").partition("\n\n")[0]
         about = re.sub(r":\w+:`([^`]*)`", r"`\1`", " ".join(about.split())).replace("|", "\\|")
-        lines.append(f"| [{file.relative_to(path).as_posix()}]({file.relative_to(path).as_posix()}.md) | {about} |")
+        name = file.relative_to(path).as_posix()
+        lines.append(f"| [`{name}`]({name}.md) | {about} |")
     (into / path / "README.md").write_text("\n".join((*lines, "")), encoding="utf-8")
 
 
