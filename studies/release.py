@@ -167,19 +167,17 @@ def main(version: str, dry_run: bool, names: Sequence[str], pythons: Sequence[st
         found.append("twine check has findings")
     for file in made:
         click.echo(f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.stat().st_size / 1e6:5.2f} MB  {file.name}")
-    if found:
-        raise click.ClickException("\n".join(found))
-    if not dry_run:
-        git("tag", "--annotate", f"v{version}", "--message", f"carom {version}")
     tags = [PLATFORMS[name].wheel_tag for name in NOT_UPLOADED]
     files = [file for file in made if not any(tag in file.name for tag in tags)]
-    command = [sys.executable, "-m", "twine", "upload", *map(str, files)]
-    if upload and not dry_run:
-        subprocess.run(command, check=True)
-        return
     click.echo("to upload: twine upload " + " ".join(str(file.relative_to(ROOT)) for file in files))
-    if not dry_run:
-        click.echo(f"and: git push origin v{version}")
+    if found:
+        raise click.ClickException("\n".join(found))
+    if dry_run:
+        return
+    git("tag", "--annotate", f"v{version}", "--message", f"carom {version}")
+    if upload:
+        subprocess.run([sys.executable, "-m", "twine", "upload", *map(str, files)], check=True)
+    click.echo(f"tagged; to publish the tag: git push origin v{version}")
 
 
 if __name__ == "__main__":
