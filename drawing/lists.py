@@ -39,6 +39,11 @@ class Things:
     def __len__(self) -> int:
         return len(getattr(self, fields(self)[0].name))
 
+    def boxes(self) -> tuple[Floats, Floats]:
+        """(n, d) m, the lower and the upper corners of the boxes around them."""
+        points = getattr(self, fields(self)[0].name)
+        return points.min(axis=1), points.max(axis=1)
+
     def where(self, chosen: Any) -> Self:
         """Those where ``chosen`` (n,) is true, or of these numbers."""
         return replace(self, **{each.name: getattr(self, each.name)[chosen] for each in fields(self)})
@@ -83,6 +88,10 @@ class Circles(Things):
     style: Styles
     entity: Entities
 
+    def boxes(self) -> tuple[Floats, Floats]:
+        """As of others."""
+        return self.centre - self.radius[:, None], self.centre + self.radius[:, None]
+
 
 @dataclass(frozen=True)
 class Capsules(Things):
@@ -93,6 +102,10 @@ class Capsules(Things):
     radius: Floats
     style: Styles
     entity: Entities
+
+    def boxes(self) -> tuple[Floats, Floats]:
+        """As of others."""
+        return self.ends.min(axis=1) - self.radius[:, None], self.ends.max(axis=1) + self.radius[:, None]
 
 
 @dataclass(frozen=True)
@@ -112,14 +125,18 @@ class Points(Things):
     style: Styles
     entity: Entities
 
+    def boxes(self) -> tuple[Floats, Floats]:
+        """The points."""
+        return self.points, self.points
+
 
 def no_circles(dimensions: int) -> Circles:
     angle = np.zeros((0, 3, 3) if dimensions == 3 else 0)
     return Circles(np.zeros((0, dimensions)), np.zeros(0), angle, NO_STYLES, NO_ENTITIES)
 
 
-def no_capsules() -> Capsules:
-    return Capsules(np.zeros((0, 2, 3)), np.zeros(0), NO_STYLES, NO_ENTITIES)
+def no_capsules(dimensions: int) -> Capsules:
+    return Capsules(np.zeros((0, 2, dimensions)), np.zeros(0), NO_STYLES, NO_ENTITIES)
 
 
 @dataclass(frozen=True)

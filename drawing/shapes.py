@@ -139,7 +139,7 @@ def _follow_turns(table: Any, library: Library, shape: Shape, row: Rows, own: An
 def shapes_at(parts: list[Part], places: Places) -> tuple[list[Polygons], Circles, Capsules, list[Lines]]:
     """The shapes where their bodies are."""
     d = places.position.shape[1]
-    polygons, circles, capsules, lines = [], no_circles(d), no_capsules(), []
+    polygons, circles, capsules, lines = [], no_circles(d), no_capsules(d), []
     for part in parts:
         row = part.row - places.first
         style, entity, centre = places.style[row], places.entity[row], places.position[row]

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...drawing import Style
+from ...drawing import Drawing
 from ...drawing.library import Library
 from ...drawing.outlines import outward
-from ...drawing.shapes import colliders_of, matrices
+from ...drawing.shapes import colliders_of
 from ...framework import World
 from ...framework.outlines import Outline
 
@@ -123,11 +123,11 @@ def walls_around(world: World) -> Enclosure:
     dimensions = dimensions_of(world)
     found = Enclosure(np.full(dimensions, -np.inf), np.full(dimensions, np.inf))
     bodies, walls = _boxes(world)
-    for axis in range(dimensions if len(bodies.centre) and len(walls.centre) else 0):
+    centres = (bodies.lower + bodies.upper) / 2
+    for axis in range(dimensions if len(centres) and len(walls.lower) else 0):
         for sign, bounds in zip((-1.0, 1.0), found, strict=True):
-            inner = sign * walls.centre[:, axis] - walls.half[:, axis]
-            outer = sign * walls.centre[:, axis] + walls.half[:, axis]
-            beyond = inner >= (sign * bodies.centre[:, axis]).max()
+            inner, outer = (sign * ends[:, axis] for ends in walls[:: int(sign)])
+            beyond = inner >= (sign * centres[:, axis]).max()
             outermost = outer >= outer.max() - ROUNDING * np.abs(outer).max()
             if _covered(bodies, walls.where(beyond & outermost), axis) >= COVERED:
                 bounds[axis] = sign * outer.max()
@@ -137,39 +137,28 @@ def walls_around(world: World) -> Enclosure:
 class Boxes(NamedTuple):
     """Boxes around shapes, (n, d) each."""
 
-    centre: Floats
-    half: Floats
+    lower: Floats
+    upper: Floats
 
-    @property
-    def lower(self) -> Floats:
-        return self.centre - self.half
-
-    @property
-    def upper(self) -> Floats:
-        return self.centre + self.half
+    @classmethod
+    def of(cls, groups: list[Any], but: NDArray[np.int64]) -> Boxes:
+        """Around the shapes in groups of a drawing list, but for those of these entities."""
+        some = [group.where(~np.isin(group.entity, but)) for group in groups]
+        return cls(*np.concatenate([np.array(group.boxes()) for group in some], axis=1))
 
     def where(self, chosen: NDArray[np.bool_]) -> Boxes:
-        return Boxes(self.centre[chosen], self.half[chosen])
+        return Boxes(self.lower[chosen], self.upper[chosen])
 
 
 @QUIET
 def _boxes(world: World) -> tuple[Boxes, Boxes]:
     """Around the convex shapes of the bodies that may move, and of those that may be walls."""
-    bodies, library = world.bodies, Library(dimensions_of(world))
-    convex = [shape for shape in world.registry.shapes.values() if shape.support is not None]
-    found = colliders_of(world, library, bodies.rows, convex)
-    axes = matrices(np.asarray(bodies.rotation))[found.row]
-    centre = np.asarray(bodies.position)[found.row] + np.einsum("nij,nj->ni", axes, found.offset)
-    axes[~found.turns] = np.eye(library.dimensions)
-    half, flat = np.empty_like(centre), np.zeros(len(centre), bool)
-    for number in np.unique(found.outline):
-        (corners, _), rounding = library.outlines[number]
-        mine = found.outline == number
-        half[mine] = np.abs(np.einsum("nij,kj->nki", axes[mine], corners)).max(axis=1) + rounding
-        flat[mine] = len(corners) > 1
-    moving = found.row < bodies.kinematic.rows.stop
-    all_boxes = Boxes(centre, half)
-    return all_boxes.where(moving), all_boxes.where(~moving & flat & (found.special != Style.SENSOR))
+    shown, bodies = Drawing(world).update(interpolated=False, joints=False), world.bodies
+    concave = [bodies.has(component) for component, shape in world.registry.shapes.items() if shape.support is None]
+    others = bodies.entity[np.any([np.zeros(len(bodies), bool), *concave], axis=0)]
+    moving = [shown.circles, shown.capsules, *shown.polygons, *shown.lines]
+    still = [shown.fixed_capsules, *shown.fixed, *shown.fixed_lines]
+    return Boxes.of(moving, others), Boxes.of(still, np.concatenate((others, sensor_entities(world))))
 
 
 def _covered(bodies: Boxes, walls: Boxes, axis: int) -> float:

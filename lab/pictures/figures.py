@@ -41,7 +41,7 @@ class Figures:
         moving = [*shown.polygons, shown.circles, shown.capsules, *shown.lines]
         still = [*shown.fixed, shown.fixed_circles, shown.fixed_capsules, *shown.fixed_lines]
         groups = [group for group in (*moving, *still) if len(group) and group.style[0] < Style.JOINT]
-        boxes = [_box(group) for group in groups] or [np.zeros((0, 3, d))]
+        boxes = [np.zeros((0, 3, d)), *(_box(group) for group in groups)]
         entities = np.concatenate([np.zeros(0, np.int64), *(group.entity for group in groups)])
         order = np.argsort(entities, kind="stable")
         entity, first = np.unique(entities[order], return_index=True)
@@ -117,12 +117,6 @@ class Figures:
 
 
 def _box(group: Any) -> Floats:
-    """(n, 3, d): lower and upper corner of the box around each, and its centre."""
-    if isinstance(group, Circles):
-        points, beyond = group.centre[:, None], group.radius[:, None]
-    elif isinstance(group, Capsules):
-        points, beyond = group.ends, group.radius[:, None]
-    else:
-        points, beyond = group.points, 0.0
-    centre = group.centre if isinstance(group, (Polygons, Circles)) else points.mean(axis=1)
-    return np.stack((points.min(axis=1) - beyond, points.max(axis=1) + beyond, centre), axis=1)
+    """(n, 3, d): lower and upper corners of the boxes, and the centres of the shapes."""
+    low, high = group.boxes()
+    return np.stack((low, high, getattr(group, "centre", (low + high) / 2)), axis=1)
