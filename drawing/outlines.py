@@ -43,7 +43,7 @@ def _tuple_of(name: str, names: tuple[str, ...]) -> Any:
 def outline_of(shape: Shape, fields: Any, dimensions: int) -> tuple[Outline, float]:
     """Of a shape with these fields, and how far it goes beyond it, m."""
     component: Any = shape.component
-    around = shape_function(component, "rounding") if shape.support is not None else None
+    around = _rounding_of(component) if shape.support is not None else None
     rounding = 0.0 if around is None else float(around(fields))
     if shape.outline is not None:
         outline = Outline.of(shape.outline(fields, dimensions), dimensions)
@@ -53,6 +53,11 @@ def outline_of(shape: Shape, fields: Any, dimensions: int) -> tuple[Outline, flo
         return _sampled(component, fields, rounding, dimensions)
     half = np.array(component.bounds(fields, dimensions), float)
     return Outline.of(box_outline(np.where(np.isfinite(half), half, 0.0), dimensions), dimensions), 0.0
+
+
+@functools.cache
+def _rounding_of(component: Any) -> Any:
+    return shape_function(component, "rounding")
 
 
 def pieces_of(outline: Outline, rounding: float) -> list[tuple[Floats, float]]:

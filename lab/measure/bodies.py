@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ...drawing import Drawing
 from ...drawing.library import Library
-from ...drawing.outlines import outward
 from ...drawing.shapes import colliders_of
 from ...framework import World
 from ...framework.outlines import Outline
@@ -28,26 +27,32 @@ def sizes_of(world: World) -> dict[int, float]:
     """The smallest extent of each entity that has a shape, m."""
     library = Library(dimensions_of(world))
     found = colliders_of(world, library, world.bodies.rows)
-    sizes = np.array([smallest_extent(*each) for each in library.outlines])[found.outline]
+    sizes = smallest_extents(library.outlines)[found.outline]
     order = np.argsort(-sizes, kind="stable")  # of several shapes of an entity the smallest
     return dict(zip(world.bodies.entity[found.row[order]].tolist(), sizes[order].tolist(), strict=True))
 
 
-def smallest_extent(outline: Outline, rounding: float) -> float:
-    """Of a shape, m: in a plane between the edges of the narrowest piece, in space along an axis; of a line, or a
-    triangle, its length."""
-    corners, faces = outline
-    if len(corners) < 3:
-        return 2 * rounding or float(np.linalg.norm(np.ptp(corners, axis=0)))
-    if corners.shape[1] == 3:
+def smallest_extents(outlines: list[tuple[Outline, float]]) -> Floats:
+    """(n,) m, of shapes with these outlines and roundings: in a plane between the edges of the narrowest piece, else
+    along an axis; of a line, or a triangle in space, the length."""
+    sizes = np.full(len(outlines), np.inf)
+    rings: dict[int, list[tuple[int, Floats]]] = {}
+    for number, ((corners, faces), rounding) in enumerate(outlines):
         extents = np.ptp(corners, axis=0)
-        return float(extents.min() if len(faces) > 1 else extents.max()) + 2 * rounding
-    rings = {len(face): [] for face in faces} or {len(corners): [corners]}
-    for face in faces:
-        rings[len(face)].append(corners[face])
-    different = (np.unique(np.array(some) - np.array(some)[:, :1], axis=0) for some in rings.values())
-    widths = (float(np.ptp(ring @ outward(ring).T, axis=0).min()) for some in different for ring in some)
-    return min(widths) + 2 * rounding
+        if len(corners) < 3:
+            sizes[number] = 2 * rounding or np.linalg.norm(extents)
+        elif corners.shape[1] == 3:
+            sizes[number] = (extents.min() if len(faces) > 1 else extents.max()) + 2 * rounding
+        else:
+            for ring in [corners[face] for face in faces] or [corners]:
+                rings.setdefault(len(ring), []).append((number, ring))
+    for some in rings.values():
+        numbers, corners = (np.array(column) for column in zip(*some, strict=True))
+        edges = np.roll(corners, -1, axis=1) - corners
+        normals = np.stack((edges[..., 1], -edges[..., 0]), axis=2) / np.linalg.norm(edges, axis=2, keepdims=True)
+        widths = np.ptp(np.einsum("nki,nji->nkj", corners, normals), axis=1).min(axis=1)
+        np.minimum.at(sizes, numbers, widths + 2 * np.array([outlines[number][1] for number in numbers]))
+    return sizes
 
 
 def size_of(world: World, sizes: Mapping[int, float]) -> float:
