@@ -32,7 +32,7 @@ class Style(IntEnum):
     BOX = 10
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Things:
     """n things with a ``style (n,)`` and the ``entity (n,)`` that they belong to, 0: none."""
 
@@ -49,7 +49,7 @@ class Things:
         return replace(self, **{each.name: getattr(self, each.name)[chosen] for each in fields(self)})
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Polygons(Things):
     """Closed polygons of k corners each: in a plane convex pieces of shapes, counter-clockwise; in space faces, flat,
     convex, counter-clockwise as seen from outside.
@@ -72,7 +72,7 @@ class Polygons(Things):
         return self.points[:, corners].reshape(-1, 3, self.points.shape[2])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Circles(Things):
     """Circles; in space balls.
 
@@ -93,7 +93,7 @@ class Circles(Things):
         return self.centre - self.radius[:, None], self.centre + self.radius[:, None]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Capsules(Things):
     """In space all points within ``radius`` (n,) m of the segments between ``ends`` (n, 2, 3) m; in a plane they are
     polygons."""
@@ -108,7 +108,7 @@ class Capsules(Things):
         return self.ends.min(axis=1) - self.radius[:, None], self.ends.max(axis=1) + self.radius[:, None]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lines(Things):
     """Segments: ``points`` (n, 2, d) m."""
 
@@ -117,7 +117,7 @@ class Lines(Things):
     entity: Entities
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Points(Things):
     """Dots: ``points`` (n, d) m."""
 
@@ -139,7 +139,7 @@ def no_capsules(dimensions: int) -> Capsules:
     return Capsules(np.zeros((0, 2, dimensions)), np.zeros(0), NO_STYLES, NO_ENTITIES)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DrawingList:
     """A world as it is drawn: all arrays are its own, or never change.
 

@@ -49,7 +49,8 @@ def smallest_extents(outlines: list[tuple[Outline, float]]) -> Floats:
     for some in rings.values():
         numbers, corners = (np.array(column) for column in zip(*some, strict=True))
         edges = np.roll(corners, -1, axis=1) - corners
-        normals = np.stack((edges[..., 1], -edges[..., 0]), axis=2) / np.linalg.norm(edges, axis=2, keepdims=True)
+        lengths = np.maximum(np.linalg.norm(edges, axis=2, keepdims=True), np.finfo(float).tiny)
+        normals = np.stack((edges[..., 1], -edges[..., 0]), axis=2) / lengths
         widths = np.ptp(np.einsum("nki,nji->nkj", corners, normals), axis=1).min(axis=1)
         np.minimum.at(sizes, numbers, widths + 2 * np.array([outlines[number][1] for number in numbers]))
     return sizes

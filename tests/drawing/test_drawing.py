@@ -9,7 +9,18 @@ import numpy as np
 import pytest
 from helpers_drawing import Gem, Pad, collider_of, create, crowd, groups_of, hull, polygon, reach_of, users
 
-from carom import AABBCollider, NoPhysicsError, Physics, Plugin, RigidBody, SphereCollider, Transform, World, column
+from carom import (
+    AABBCollider,
+    NoPhysicsError,
+    Physics,
+    Plugin,
+    RigidBody,
+    Settings,
+    SphereCollider,
+    Transform,
+    World,
+    column,
+)  # fmt: skip
 from carom.components import Collider
 from carom.drawing import Drawing, Lines, Polygons, Style
 from carom.framework.data.arrays.column import ArrayColumn
@@ -222,6 +233,22 @@ def test_styles_tell_what_bodies_are():
         found = {e: s for g in groups_of(shown) for e, s in zip(g.entity.tolist(), g.style.tolist(), strict=True)}
         assert found == {entity: style for style, entity in kinds.items()}
         assert np.isnan(shown.circles.angle).all()
+
+
+@pytest.mark.compiled
+def test_sleepers_are_told():
+    with World(Physics(2, gravity=(0.0, -10.0)), settings=Settings(sleeping=True)) as world:
+        world.create_entity(Transform((0, -1)), AABBCollider((5, 1)))
+        for x in (0, 3):
+            world.create_entity(Transform((x, 0.5)), RigidBody(), SphereCollider(0.5))
+        drawing = Drawing(world)
+        for _ in range(120):
+            world.step()
+        assert drawing.update().circles.style.tolist() == [Style.ASLEEP] * 2
+        world.wake(2)
+        world.step()
+        circles = drawing.update().circles
+        assert (circles.entity.tolist(), circles.style.tolist()) == ([3, 2], [Style.ASLEEP, Style.DYNAMIC])
 
 
 def test_tiles_chains_and_meshes():
