@@ -174,11 +174,10 @@ def _angles(places: Places, row: Rows) -> Floats:
 
 
 def _turned(points: Floats, axes: Floats) -> Floats:
-    """Points (n, k, d) along these axes (n, d, d)."""
-    if points.shape[2] == 3:
-        return np.matmul(points, axes.transpose(0, 2, 1))
-    x, y = points[..., 0], points[..., 1]
+    """Points (n, k, d) along these axes (n, d, d); by hand, for numpy multiplies so small matrices one by one."""
     turned = np.empty(points.shape)
-    turned[..., 0] = axes[:, None, 0, 0] * x + axes[:, None, 0, 1] * y
-    turned[..., 1] = axes[:, None, 1, 0] * x + axes[:, None, 1, 1] * y
+    for i in range(points.shape[2]):
+        turned[..., i] = axes[:, None, i, 0] * points[..., 0]
+        for j in range(1, points.shape[2]):
+            turned[..., i] += axes[:, None, i, j] * points[..., j]
     return turned
