@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..components import SphereCollider
 from ..framework.plugins.registry import Shape
 from ..systems.shapes.rotation import axes_of
 from .library import Kind, Library, Rows
@@ -27,6 +27,7 @@ class Colliders(NamedTuple):
     offset: Floats  # (S, d)
     turns: NDArray[np.bool_]  # whether the shape turns with its body
     special: NDArray[np.int8]  # its style, PLAIN: that of its body
+    radius: Floats  # of a sphere, whose outline is the same for all; NaN: as the library says
 
 
 @dataclass
@@ -91,33 +92,38 @@ def arrays_of(world: Any, rows: slice) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def colliders_of(world: Any, library: Library, rows: slice, shapes: Iterable[Shape] | None = None) -> Colliders:
-    """Those of the bodies of these rows, of all shapes or of some, one shape after the other."""
+def colliders_of(world: Any, library: Library, rows: slice) -> Colliders:
+    """Those of the bodies of these rows, one shape after the other."""
     table, d = world.physics.table, library.dimensions
     none = np.zeros(0, np.int64)
-    found = [(none, none, np.zeros((0, d)), np.zeros(0, bool), np.zeros(0, np.int8))]
-    for shape in world.registry.shapes.values() if shapes is None else shapes:
-        component: Any = shape.component
+    found = [(none, none, np.zeros((0, d)), np.zeros(0, bool), np.zeros(0, np.int8), np.zeros(0))]
+    for component, shape in world.registry.shapes.items():
         mask = table.mask_names.get(component)
         row = np.flatnonzero(table.arrays[mask][rows]) + rows.start if mask else none
         if len(row):
             own = {name: table.values(component.columns[name].key, row) for name in shape.columns}
             offset, sensor, one_way = (table.values(component.columns[name].key, row) for name in ALL)
-            outline = library.numbers_of(shape, own, len(row))
+            if component is SphereCollider:  # often thousands, each of another size, which grow and shrink
+                radius = own["radius"]
+                outline = np.repeat(library.numbers_of(shape, {"radius": np.zeros(1)}, 1), len(row))
+            else:
+                radius, outline = np.full(len(row), np.nan), library.numbers_of(shape, own, len(row))
             if hasattr(component, "turned"):
                 _follow_turns(table, library, shape, row, own, outline)
             special = np.where(sensor, Style.SENSOR, np.where(one_way.any(axis=1), Style.ONE_WAY, PLAIN))
-            found.append((row, outline, offset, np.full(len(row), component.rotates), special.astype(np.int8)))
+            found.append((row, outline, offset, np.full(len(row), component.rotates), special.astype(np.int8), radius))
     return Colliders(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
 
 
 def parts_of(world: Any, library: Library, rows: slice) -> list[Part]:
     """What the bodies of these rows look like."""
-    row, outline, offset, turns, special = colliders_of(world, library, rows)
+    row, outline, offset, turns, special, own = colliders_of(world, library, rows)
     parts = []
     for kind, pieces in sorted(library.pieces.items()):
         shape, ring, radius = pieces.of(outline)
         if len(shape):
+            if kind.corners == 1:
+                radius = np.where(np.isnan(own[shape]), radius, own[shape])
             rest = offset[shape], turns[shape], special[shape]
             used = rest[0].any(), not rest[1].all(), (rest[2] != PLAIN).any()
             rest: Any = (column if some else None for column, some in zip(rest, used, strict=True))

@@ -28,6 +28,7 @@ def sizes_of(world: World) -> dict[int, float]:
     library = Library(dimensions_of(world))
     found = colliders_of(world, library, world.bodies.rows)
     sizes = smallest_extents(library.outlines)[found.outline]
+    sizes = np.where(np.isnan(found.radius), sizes, 2 * found.radius)
     order = np.argsort(-sizes, kind="stable")  # of several shapes of an entity the smallest
     return dict(zip(world.bodies.entity[found.row[order]].tolist(), sizes[order].tolist(), strict=True))
 
