@@ -37,6 +37,7 @@ class Painter:
         self._discs: OrderedDict[tuple[int, int, int], Any] = OrderedDict()
         self._squares: dict[tuple[int, int], Any] = {}
         self._layer: Any = None
+        self._fixed: Any = None  # the same list as long as nothing static changes
         self._layer_of: Any = None
         self._draw: Any = self._pygame.draw
         self._marks_sleepers: bool | None = None
@@ -66,14 +67,14 @@ class Painter:
 
     def _paint_layer(self, surface: Any, shown: DrawingList, camera: Camera) -> None:
         """What does not move, painted once for each place of the camera."""
-        key = shown.fixed_version, camera.scale, *camera.middle.tolist(), camera.size
-        if key != self._layer_of or self._layer.get_size() != surface.get_size():
+        key = camera.scale, *camera.middle.tolist(), camera.size
+        if shown.fixed is not self._fixed or key != self._layer_of or self._layer.get_size() != surface.get_size():
             if self._layer is None or self._layer.get_size() != surface.get_size():
                 self._layer = self._pygame.Surface(surface.get_size(), 0, surface)
             self._layer.fill(BACKGROUND)
             self._paint_grid(self._layer, camera)
             self._paint_shapes(self._layer, shown.fixed, shown.fixed_circles, shown.fixed_lines, camera)
-            self._layer_of = key
+            self._layer_of, self._fixed = key, shown.fixed
         surface.blit(self._layer, (0, 0))
 
     def _paint_shapes(self, surface: Any, polygons: Any, circles: Any, lines: Any, camera: Camera) -> None:

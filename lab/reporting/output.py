@@ -46,7 +46,7 @@ def show_tables(tables: list[TextTable], remarks: list[str]) -> None:
 
 
 def drawing_if_there(name: str, what: str) -> Any:
-    """A module of the lab that draws; None without matplotlib, and a note on stderr with the extra."""
+    """A module of the lab that draws; without matplotlib None, and a note on stderr with the name of the extra."""
     try:
         return importlib.import_module(f"..{name}", __package__)
     except ImportError:

@@ -197,8 +197,8 @@ def marks_of(sheet):
 
 
 def test_pictures_draw_what_the_drawing_list_holds():
-    """Every polygon and circle of the list to the bit, and a joint, in the picture of the end; films and windows
-    are compared with it in tests/view."""
+    """Every polygon and circle of the list to the bit, and a joint, in the picture of the final state; windows and
+    films are compared with it in tests/view."""
     pentagon = ConvexPolygonCollider.regular(5, 0.5)
     shapes = SphereCollider(0.5), BoxCollider((0.5, 0.2)), CapsuleCollider(0.2, 0.4), pentagon
     plugins = Joints(), capsule.plugin, convex_polygon.plugin

@@ -139,9 +139,9 @@ class SpacePainter:
             program["eye"].write(camera.place.astype(np.float32))
             program["up"].write(camera.up.astype(np.float32))
         self._faces["middle"].write(camera.middle.astype(np.float32))
-        if shown.fixed_version != self._fixed_of:
+        if shown.fixed is not self._fixed_of:
             self._fixed = triangles(shown.fixed), rounds(shown.fixed_circles, shown.fixed_capsules)
-            self._fixed_of = shown.fixed_version
+            self._fixed_of = shown.fixed
         moving = rounds(shown.circles, shown.capsules, self._fills)
         faces, (fixed_faces, fixed_rounds) = triangles(shown.polygons, self._fills), self._fixed
         every = np.concatenate((moving, fixed_rounds))
