@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .camera import Camera as Camera
     from .packages import MissingPackageError as MissingPackageError
+    from .pygame_window import View as View
     from .space.orbit import OrbitCamera as OrbitCamera
     from .sprites import Sprites as Sprites
     from .window import DisplayError as DisplayError
-    from .window import View as View
 
 _MODULES = {
     "Camera": "camera", "DisplayError": "window", "MissingPackageError": "packages", "OrbitCamera": "space.orbit",
-    "Sprites": "sprites", "View": "window",
+    "Sprites": "sprites", "View": "pygame_window",
 }  # fmt: skip
 __all__ = ["Camera", "DisplayError", "MissingPackageError", "OrbitCamera", "Sprites", "View"]
 

@@ -408,7 +408,7 @@ def test_while_kernels_compile_the_window_says_so(monkeypatch):
     world, _ = floor_and_ball()
     work, texts = Compiles(), []
     monkeypatch.setattr(world, "prepare", work, raising=False)
-    monkeypatch.setattr(View, "_draw_progress", lambda view, work: texts.append(work.text))
+    monkeypatch.setattr(View, "_paint_progress", lambda view, text, share: texts.append(text))
     player = Player(world)
     player.frame()
     assert work.done == 5

@@ -10,31 +10,6 @@ from ..colours import TEXT
 MOST = 2048  # pictures
 SIZE = 18
 
-HELP = (
-    ("space", "pause, go on"),
-    (".", "one step"),
-    ("backspace, shift", "back in time; forth"),
-    ("- + 0", "slower, faster, as it is"),
-    ("wheel", "zoom at the mouse"),
-    ("right button", "pan; arrows too"),
-    ("left button", "pick, drag"),
-    ("f", "follow what is picked"),
-    ("home", "all in the picture"),
-    ("tab", "panel: settings, body"),
-    ("c", "contacts and normals"),
-    ("v", "velocities"),
-    ("j", "joints"),
-    ("z", "sleepers alone in colour"),
-    ("b", "boxes of the broad phase"),
-    ("n", "names"),
-    ("t", "milliseconds by stage"),
-    ("o", "outlines of shapes"),
-    ("F12", "save a picture"),
-    ("F10", "these keys on, off"),
-    ("F1", "this help"),
-    ("escape", "close"),
-)
-
 
 class Texts:
     """Writes onto surfaces."""
