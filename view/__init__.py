@@ -14,15 +14,16 @@ if TYPE_CHECKING:
     from .camera import Camera as Camera
     from .packages import MissingPackageError as MissingPackageError
     from .pygame_window import View as View
+    from .pyglet_window import PygletView as PygletView
     from .space.orbit import OrbitCamera as OrbitCamera
     from .sprites import Sprites as Sprites
     from .window import DisplayError as DisplayError
 
 _MODULES = {
     "Camera": "camera", "DisplayError": "window", "MissingPackageError": "packages", "OrbitCamera": "space.orbit",
-    "Sprites": "sprites", "View": "pygame_window",
+    "PygletView": "pyglet_window", "Sprites": "sprites", "View": "pygame_window",
 }  # fmt: skip
-__all__ = ["Camera", "DisplayError", "MissingPackageError", "OrbitCamera", "Sprites", "View"]
+__all__ = ["Camera", "DisplayError", "MissingPackageError", "OrbitCamera", "PygletView", "Sprites", "View"]
 
 
 def __getattr__(name: str) -> object:

@@ -1,7 +1,8 @@
-"""What shows a world, by its dimensions."""
+"""What shows a world, by its dimensions and by what is installed."""
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -23,9 +24,21 @@ def camera_of(world: World, size: Vector = (1280, 720)) -> Camera | OrbitCamera:
 def painter_of(world: World) -> Any:
     """What paints drawing lists of such a world onto surfaces."""
     if world.dimensions == 2:
-        from .painter import Painter
+        from .plane.painter import Painter
 
         return Painter()
     from .space.painter import SpacePainter
 
     return SpacePainter()
+
+
+def view_class(world: World, filmed: bool = False) -> Any:
+    """:class:`View`; where pygame-ce is missing and pyglet is there :class:`PygletView`, for worlds in 2D that are not
+    ``filmed``."""
+    if world.dimensions == 2 and not filmed and find_spec("pygame") is None and find_spec("pyglet") is not None:
+        from .pyglet_window import PygletView
+
+        return PygletView
+    from .pygame_window import View
+
+    return View

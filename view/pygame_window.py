@@ -174,9 +174,9 @@ class View(Window):
         elif event.type == pygame.KEYDOWN and self.controls and self._panel.typing:
             self._panel.key(event)
         elif event.type == pygame.KEYDOWN:
-            name = pygame.key.name(event.key)
+            name: str = pygame.key.name(event.key)
             typed = event.unicode if event.unicode.isprintable() and event.unicode.strip() else ""
-            self._key(NAMED.get(name, typed or name), bool(event.mod & pygame.KMOD_SHIFT))
+            self._key(NAMED.get(name) or typed or name, bool(event.mod & pygame.KMOD_SHIFT))
         elif self.controls:
             self._handle_mouse(event)
 

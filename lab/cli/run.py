@@ -121,17 +121,16 @@ def _film_of(world: World, file: Path, view: Corners | None) -> Any:
 def _show(world: World, loaded: Loaded, view: Corners | None, record: Path | None, seconds: float | None) -> None:
     """In a window, until it is closed or so many seconds are simulated."""
     try:
-        from ...view import View
-        from ...view.choice import camera_of
+        from ...view.choice import camera_of, view_class
 
         camera = None
         if view is not None:
             camera = camera_of(world)
             camera.fit(*view)
         with loaded.attribute_errors(), stdout_kept_clean():
-            View(world, camera=camera, title=f"carom: {loaded.name}", record=record).run(
-                math.inf if seconds is None else seconds
-            )
+            filmed = {} if record is None else {"record": record}
+            shown = view_class(world, bool(filmed))(world, camera=camera, title=f"carom: {loaded.name}", **filmed)
+            shown.run(math.inf if seconds is None else seconds)
     except CaromError as error:
         raise Problem(one_line(error)) from error
     milliseconds = world.stats().total

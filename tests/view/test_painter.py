@@ -21,10 +21,10 @@ from carom.drawing import Drawing
 from carom.plugins import capsule, convex_polygon, half_space
 from carom.plugins.half_space import HalfSpaceCollider
 from carom.view import Camera
-from carom.view.clipping import clipped_lines, clipped_polygon
 from carom.view.colours import BACKGROUND, GRID
 from carom.view.film import Recording
-from carom.view.painter import Painter
+from carom.view.plane.clipping import clipped_lines, clipped_polygon
+from carom.view.plane.painter import Painter
 
 random = np.random.default_rng(3)
 

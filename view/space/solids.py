@@ -52,7 +52,7 @@ def rounds(circles: Circles, capsules: Capsules, fills: Any = FILLS) -> NDArray[
     made["one"][:n] = made["other"][:n] = circles.centre
     made["one"][n:], made["other"][n:] = capsules.ends[:, 0], capsules.ends[:, 1]
     made["radius"][:n], made["radius"][n:] = circles.radius, capsules.radius
-    turned = np.isfinite(circles.angle).all(axis=(1, 2))
+    turned: Any = np.isfinite(circles.angle).all(axis=(1, 2))
     made["axes"][:n] = np.where(turned[:, None, None], circles.angle, np.eye(3)).reshape(n, 9)
     made["axes"][n:] = along(capsules.ends[:, 1] - capsules.ends[:, 0]).reshape(m, 9)
     made["colour"][:n] = colours_of(circles.style, circles.entity, fills)

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from ..drawing import DrawingList, Polygons, Style
-from .camera import Camera
+from ...drawing import DrawingList, Polygons, Style
+from ..camera import Camera
+from ..colours import BACKGROUND, EDGES, FILLS, FILLS_MARKED, GRID, tints
+from ..packages import package
 from .clipping import clipped_lines, clipped_polygon
-from .colours import BACKGROUND, EDGES, FILLS, FILLS_MARKED, GRID, tints
-from .packages import package
 
 TINY = 3.0  # pixels: up to this size a shape is a square
 EDGED = 7.0  # pixels: from this size on a shape has an edge
