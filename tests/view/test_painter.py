@@ -109,6 +109,16 @@ def test_small_shapes_are_seen_and_no_larger_than_they_are(world):
             )
 
 
+def test_pictures_of_discs_are_kept_within_a_bound(world, monkeypatch):
+    monkeypatch.setattr("carom.view.plane.painter.MOST_BYTES", 100_000)
+    camera, surface, painter = Camera((300, 100), (7, 0.2), 5.0), pygame.Surface((300, 100)), Painter()
+    for _ in range(60):
+        camera.zoom(1.03)
+        painter.paint(surface, Drawing(world).update(), camera)
+        held = sum(disc.get_width() * disc.get_height() * 4 for disc in painter._discs.values())
+        assert held == painter._disc_bytes <= 100_000
+
+
 def test_what_is_larger_than_the_screen_is_cut(world):
     world.create_entity(Transform((0.0, -1.0)), HalfSpaceCollider((0.0, 1.0)))
     world.create_entity(Transform((500.0, 500.0)), RigidBody(), SphereCollider(700.0))

@@ -8,7 +8,6 @@ not move is painted once for each place of the camera.
 from __future__ import annotations
 
 import math
-from collections import OrderedDict
 from collections.abc import Iterable
 from typing import Any
 
@@ -23,8 +22,8 @@ from .clipping import clipped_lines, clipped_polygon
 TINY = 3.0  # pixels: up to this size a shape is a square
 EDGED = 7.0  # pixels: from this size on a shape has an edge
 ROUND = 10  # corners: an outline of so many is round, and may lose some
-LARGEST_DISC = 64.0  # pixels of radius, of discs that are kept as pictures
-MOST_DISCS = 4096
+LARGEST_DISC = 48.0  # pixels of radius, of discs that are kept as pictures
+MOST_BYTES = 32_000_000  # of these
 FAR = 8000.0  # pixels: shapes that reach beyond are cut
 SMOOTH = 192  # corners of a circle that is so large
 
@@ -34,7 +33,8 @@ class Painter:
 
     def __init__(self) -> None:
         self._pygame: Any = package("pygame", "carom.view")
-        self._discs: OrderedDict[tuple[int, int, int], Any] = OrderedDict()
+        self._discs: dict[tuple[int, int, int], Any] = {}
+        self._disc_bytes = 0
         self._squares: dict[tuple[int, int], Any] = {}
         self._layer: Any = None
         self._fixed: Any = None  # the same list as long as nothing static changes
@@ -52,6 +52,7 @@ class Painter:
         self._fills = [colour(*rgb) for rgb in (FILLS_MARKED if marked else FILLS).reshape(-1, 3).tolist()]
         self._edges = [colour(*rgb) for rgb in EDGES.reshape(-1, 3).tolist()]
         self._discs.clear()
+        self._disc_bytes = 0
         self._squares.clear()
         self._layer_of = None
 
@@ -178,9 +179,10 @@ class Painter:
             angle = 2 * math.pi * turn / min(halves, 64) if turn >= 0 else math.nan
             self._draw_disc(found, (side // 2, side // 2), radius, angle, colour)
             discs[key] = found
-            if len(discs) > MOST_DISCS:
-                for old in list(discs)[: MOST_DISCS // 4]:  # the first made
-                    del discs[old]
+            self._disc_bytes += 4 * side * side
+            if self._disc_bytes > MOST_BYTES:  # those that are used will be made again
+                discs.clear()
+                self._disc_bytes = 0
         return found
 
     def _draw_disc(self, surface: Any, at: Any, radius: float, angle: float, colour: int) -> None:
