@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from .tools.panel import Panel
 from .tools.texts import Texts
 from .window import LONGEST, DisplayError, Window
 
+_owner: weakref.ref[View] | None = None  # which view has pygame's only window
 NAMED = {"[-]": "-", "[+]": "+", "[0]": "0", "[.]": "."}  # keys of the number pad
 
 
@@ -114,6 +116,8 @@ class View(Window):
             raise DisplayError(
                 f"no display for a window: {error}; carom run SCENE --record FILE draws without one"
             ) from error
+        global _owner
+        _owner = weakref.ref(self)
         pygame.display.set_caption(title)
         pygame.key.set_repeat(300, 40)
         return screen
@@ -126,7 +130,9 @@ class View(Window):
                 raise DisplayError(f"the display has gone: {error}") from error
 
     def _shut(self) -> None:
-        if self._pygame.display.get_init():
+        global _owner
+        if _owner is not None and _owner() is self:
+            _owner = None
             self._pygame.display.quit()
 
     def close(self) -> None:
@@ -145,6 +151,9 @@ class View(Window):
     # -- keys and mouse ---------------------------------------------------------------------------
 
     def _hear(self) -> None:
+        self.open = _owner is not None and _owner() is self
+        if not self.open:  # a later view has taken the window
+            return
         self.events = self._pygame.event.get()
         for event in self.events:
             self._handle(event)

@@ -308,9 +308,12 @@ class Window(ABC):
 
     def _pressed(self) -> None:
         """The left button, where the mouse is."""
-        place = self._hand.pick(self.camera, self._at)
-        if place is not None:
-            self._hand.take(place, self.paused)
+        try:
+            place = self._hand.pick(self.camera, self._at)
+            if place is not None:
+                self._hand.take(place, self.paused)
+        except CaromError as error:  # of a query: a shape that has no answer to it
+            self.say(str(error))
 
     def _released(self) -> None:
         self._hand.release()

@@ -25,6 +25,7 @@ from carom import (
     World,
 )
 from carom.framework.compilation import log
+from carom.plugins.parts import PartOf, Parts
 from carom.view import DisplayError, Sprites, View
 from carom.view.packages import MissingPackageError, package
 
@@ -184,6 +185,40 @@ def test_a_body_is_picked_dragged_and_let_go(joints):
     assert player.view.picked is None
     player.view.close()
     world.close()
+
+
+def test_the_part_of_a_body_takes_the_body_along():
+    for joints in ((), (Joints(),)):
+        world = World(Physics(2, gravity=(0.0, -10.0)), Rotation(), Parts(), *joints)
+        world.create_entity(Transform((0.0, -0.5)), AABBCollider((8.0, 0.5)))
+        body = world.create_entity(Transform((0.0, 0.5)), RigidBody(), AABBCollider((0.5, 0.5)))
+        part = world.create_entity(PartOf(body, (1.0, 0.2)), AABBCollider((0.5, 0.2)))
+        player = Player(world)
+        player.frame(2)
+        player.press((1.2, 0.7))
+        assert player.view.picked == part
+        for height in np.linspace(0.7, 3.0, 20):
+            player.move((1.2, height))
+        player.frame(30)
+        assert world.component_for_entity(body, Transform).y == pytest.approx(2.8, abs=0.4)
+        player.view.close()
+        world.close()
+
+
+def test_an_old_view_does_not_close_the_window_of_a_new_one(player):
+    player.frame()
+    world = player.world
+    player.view.close()
+    other = Player(world)
+    other.frame()
+    player._frames.close()
+    other.frame(3)
+    third = View(world, (100, 100))  # pygame has one window, which goes to the last
+    with pytest.raises(StopIteration):
+        other.frame()
+    assert pygame.display.get_surface().get_size() == (100, 100)
+    third.close()
+    assert not pygame.display.get_init()
 
 
 def test_while_time_stands_a_body_is_put_where_the_mouse_is(player):

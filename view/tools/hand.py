@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...components import RigidBody, Transform
+from ...components.part_of import PartOf
 from ...framework import World
 from ...plugins.joints import Joints, MousePull
 
@@ -67,9 +68,15 @@ class Hand:
         kind = int(self.world.bodies.kind[self.world.bodies.row_of(entity)])
         return bool(colliders) and all(c.sensor for c in colliders), kind, -entity
 
+    def _whole(self) -> int | None:
+        """The body that is picked, or that what is picked is a part of."""
+        entity = self.picked
+        part = None if entity is None else self.world.try_component(entity, PartOf)
+        return entity if part is None else part.holder or part.body
+
     def take(self, place: Any, paused: bool) -> None:
         """Hold the picked body at a place (d,) m, if it can be moved."""
-        entity = self.picked
+        entity = self._whole()
         transform = None if entity is None else self.world.try_component(entity, Transform)
         if entity is None or transform is None:
             return
@@ -86,7 +93,7 @@ class Hand:
 
     def drag(self, place: Any, paused: bool) -> None:
         """Bring what is held nearer to a place (d,) m; once in a frame. While time stands it is there at once."""
-        entity = self.picked
+        entity = self._whole()
         if not self.holding or entity is None:
             self.release()
             return
