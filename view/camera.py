@@ -97,7 +97,7 @@ class Camera:
     # -- motion -----------------------------------------------------------------------------------
 
     def fit(self, lower: Vector, upper: Vector) -> None:
-        """Show all between two corners (2,) m, with a margin. ValueError if they are no places."""
+        """Show all from the ``lower`` to the ``upper`` corner (2,) m, with a margin; ValueError if these are none."""
         low, high = place_of(lower, "Camera.fit: lower"), place_of(upper, "Camera.fit: upper")
         self.middle = (low + high) / 2
         self.scale = MARGIN * float(np.min(np.array(self._size) / np.maximum(high - low, 1e-3)))

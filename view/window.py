@@ -25,6 +25,7 @@ SLOWEST, FASTEST = 1 / 64, 8.0  # speed
 ZOOM = 1.2  # for one notch of the wheel
 PANNED = 400.0  # pixels per second, by the arrows
 NAMES = 400  # at most
+KERNELS = "collision", "geometry", "integrator", "sleeping", "broad_phase", "friction_mixing", "restitution_mixing"
 SHOWN = {"contacts": "c", "velocities": "v", "joints": "j", "sleepers": "z", "boxes": "b", "names": "n"}
 SHOWN |= {"times": "t", "outlines": "o"}
 HELP = (
@@ -64,6 +65,8 @@ class Window(ABC):
             real_time,
         )
         self.camera: Any = camera or camera_of(world)
+        if len(self.camera.middle) != world.dimensions:
+            raise ValueError(f"View: {world!r} has {world.dimensions} dimensions, the camera {len(self.camera.middle)}")
         self.camera.size = size
         self.open, self.paused, self.speed, self.following = True, False, 1.0, False
         self.show = {**dict.fromkeys(SHOWN, False), "joints": True, "outlines": outlines}
@@ -74,7 +77,8 @@ class Window(ABC):
         self._drawing, self._hand, self._stages = Drawing(world), Hand(world), Stages(world)
         self._rewind = Rewind(world, rewind_megabytes) if rewind_megabytes else None
         self._rewinding = 0
-        self._prepare, self._prepared_for = prepare, None
+        self._prepare = prepare
+        self._prepared_for: Any = None  # what of the settings
         self._costs = np.zeros(2)  # s of the process, smoothed: the list, and painting it
         if camera is None:
             self.fit()
@@ -168,12 +172,13 @@ class Window(ABC):
         self._shut()
 
     def say(self, text: str, seconds: float = 3.0) -> None:
-        """Show a line for so many ``seconds``."""
+        """Show a line of ``text`` for so many ``seconds``."""
         self.message, self._message_ends = text, time.monotonic() + seconds
 
     def _make_ready(self) -> None:
         """Compile what the world may need, and go on to hear keys."""
-        if not self._prepare or self._prepared_for is self.world.settings:
+        kernels = tuple(getattr(self.world.settings, name) for name in KERNELS)
+        if not self._prepare or self._prepared_for == kernels:
             return
         work = Preparation(self.world)
         try:
@@ -185,7 +190,7 @@ class Window(ABC):
                 self._shut()  # before the kernel that compiles now has come to its end
         finally:
             work.stop()
-        self._prepared_for: Any = self.world.settings
+        self._prepared_for = kernels
         if self.open and self.real_time:
             self._tick()
 

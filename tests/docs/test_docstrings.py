@@ -1,6 +1,6 @@
 """Public docstrings name the parameters of the signature and no others, and say shapes, units and errors.
 
-Public is what carom, joints and lab.testing list, with all methods and properties. An override may leave to what it
+Public is what carom, joints, view and lab.testing list, with all methods and properties. An override may leave to what it
 overrides what is said there; the functions of shapes, which kernels call, Plugin.shape describes.
 """
 
@@ -8,6 +8,7 @@ import inspect
 import re
 
 import carom
+from carom import view
 from carom.framework import Component, Plugin
 from carom.framework.plugins.checks import SHAPE_FUNCTIONS
 from carom.framework.world.world import Clock, Events
@@ -34,7 +35,7 @@ def text(value) -> str:
 
 def public():
     """(name, object, its own docstring, those of what it overrides) of all that is public."""
-    listed = {name: getattr(module, name) for module in (carom, joints, testing) for name in module.__all__}
+    listed = {name: getattr(module, name) for module in (carom, joints, testing, view) for name in module.__all__}
     for name, value in {**listed, "Clock": Clock, "Events": Events}.items():  # which World's properties return
         bases = [base for base in getattr(value, "__mro__", ()) if base.__module__.startswith("carom.")]
         if bases or inspect.isfunction(value):

@@ -26,7 +26,7 @@ from carom import (
 )
 from carom.framework.compilation import log
 from carom.plugins.parts import PartOf, Parts
-from carom.view import DisplayError, Sprites, View
+from carom.view import DisplayError, OrbitCamera, Sprites, View
 from carom.view.packages import MissingPackageError, package
 
 
@@ -396,6 +396,38 @@ def test_only_worlds_that_can_be_seen_have_a_window():
     world, _ = floor_and_ball()
     with pytest.raises(ValueError, match="rate must be"):
         View(world, rate=0.0)
+    with pytest.raises(ValueError, match="has 2 dimensions, the camera 3"):
+        View(world, camera=OrbitCamera())
+    world.close()
+
+
+def test_an_empty_world_has_a_window_too():
+    world = World(Physics(2))
+    player = Player(world)
+    for key in "cvjzbnto":
+        player.key(key)
+    player.key(pygame.K_TAB)
+    player.press((0.0, 0.0))
+    world.create_entity(Transform((0.0, 0.0)), SphereCollider(0.5))
+    player.key(pygame.K_HOME)
+    assert player.view.camera.scale > 200
+    player.view.close()
+    world.close()
+
+
+def test_only_other_kernels_are_prepared_for(monkeypatch):
+    world, _ = floor_and_ball()
+    prepared = []
+    monkeypatch.setattr(world, "prepare", lambda: prepared.append(world.settings), raising=False)
+    player = Player(world)
+    for k in range(1, 9):
+        world.settings = world.settings.replace(dt=1 / 60 / k)
+        player.frame()
+    assert len(prepared) == 1
+    world.settings = world.settings.replace(collision="continuous")
+    player.frame()
+    assert len(prepared) == 2
+    player.view.close()
     world.close()
 
 

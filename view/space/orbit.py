@@ -122,13 +122,13 @@ class OrbitCamera:
         return np.array(self._size) / 2 + flat * (1.0, -1.0)
 
     def ray(self, pixels: Vector) -> tuple[Floats, Floats]:
-        """Where the ray through a pixel (2,) begins, (3,) m, and its direction, a unit vector (3,)."""
+        """Where the ray through ``pixels`` (2,) begins, (3,) m, and its direction, a unit vector (3,)."""
         flat = (np.asarray(pixels, float) - np.array(self._size) / 2) * (1.0, -1.0) / (self.scale * self._distance)
         way = np.array((*flat, 1.0)) @ self.axes
         return self.place, way / np.linalg.norm(way)
 
     def to_world(self, pixels: Vector, at: Vector | None = None) -> Floats:
-        """The place (3,) m under a pixel (2,), as far away as ``at`` (3,) m, or as the middle."""
+        """The place (3,) m under ``pixels`` (2,), as far away as ``at`` (3,) m, or as the middle."""
         place, way = self.ray(pixels)
         ahead = self.axes[2]
         depth = ahead @ (np.asarray(self._middle if at is None else at, float) - place)
@@ -137,7 +137,7 @@ class OrbitCamera:
     # -- motion -----------------------------------------------------------------------------------
 
     def fit(self, lower: Vector, upper: Vector) -> None:
-        """Show all between two corners (3,) m."""
+        """Show all from the ``lower`` to the ``upper`` corner (3,) m."""
         low, high = place_of(lower, "OrbitCamera.fit: lower", 3), place_of(upper, "OrbitCamera.fit: upper", 3)
         self.middle = (low + high) / 2
         narrow = min(1.0, self._size[0] / self._size[1])
