@@ -1,7 +1,7 @@
 """Public docstrings name the parameters of the signature and no others, and say shapes, units and errors.
 
-Public is what carom, joints, view and lab.testing list, with all methods and properties. An override may leave to what it
-overrides what is said there; the functions of shapes, which kernels call, Plugin.shape describes.
+Public is what carom, joints, view and lab.testing list, with all methods and properties. An override may leave to what
+it overrides what is said there; the functions of shapes, which kernels call, Plugin.shape describes.
 """
 
 import inspect
