@@ -2,6 +2,7 @@
 
 import pygame
 
+from carom import AABBCollider, Physics, RigidBody, SphereCollider, Transform, World
 from carom.view import View
 
 
@@ -50,3 +51,12 @@ class Player:
 
     def release(self, place):
         return self.mouse(pygame.MOUSEBUTTONUP, self.pixel_of(place))
+
+
+def floor_and_ball(*plugins, settings=None):
+    """A ball on a floor, another that flies by; their ids."""
+    world = World(Physics(2, gravity=(0.0, -10.0)), *plugins, settings=settings)
+    world.create_entity(Transform((0.0, -0.5)), AABBCollider((8.0, 0.5), friction=0.5))
+    ball = world.create_entity(Transform((3.0, 0.5)), RigidBody(), SphereCollider(0.5, friction=0.5))
+    world.create_entity(Transform((-3.0, 4.0)), RigidBody(linear_velocity=(0.5, 0.0)), SphereCollider(0.3))
+    return world, ball
