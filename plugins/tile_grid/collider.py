@@ -48,7 +48,8 @@ class TileGridCollider(Collider):
     tile_size
         m, side length of a tile
     faces
-        ``"all"``; ``"floors"``: floors and ceilings only; ``"walls"``: walls only, see :meth:`floors_and_walls`
+        ``"all"``, but not those of one-way cells; ``"floors"``: floors and ceilings only; ``"walls"``: walls and slopes
+        only, see :meth:`floors_and_walls`; ``"one_way"``: the upper sides of one-way cells, see :meth:`with_one_way`
     lower
         (2,) m, the map's lower left corner relative to the Transform's position, in place of ``offset``: ValueError for
         both; None: the map's centre is at ``offset``
@@ -80,6 +81,10 @@ class TileGridCollider(Collider):
         **common: Unpack[ColliderFields],
     ) -> None:
         plain = materials is None and shapes is None
+        if faces == "one_way":
+            if shapes is None:
+                raise ValueError("TileGridCollider: faces='one_way' needs shapes, which say where one-way cells are")
+            common.setdefault("one_way", (0.0, 1.0))
         tiles = numbers_of(cells, plain=plain)
         if shapes is not None:
             tiles = with_shapes(tiles, shapes)
@@ -115,6 +120,21 @@ class TileGridCollider(Collider):
             for faces in ("floors", "walls")
         )
         return floors, walls
+
+    @classmethod
+    def with_one_way(
+        cls, cells: Any, tile_size: float, *, shapes: Any, walls: bool = True, **common: Any
+    ) -> tuple[Self, ...]:
+        """The map of ``cells``, ``tile_size`` and ``shapes`` as colliders for as many entities, the last one of its
+        one-way cells: bodies may stand on one of these and pass another, which one contact does not tell.
+
+        walls
+            whether floors and walls are two as well, see :meth:`floors_and_walls`
+        common
+            all other arguments, of each
+        """
+        faces = ("floors", "walls", "one_way") if walls else ("all", "one_way")
+        return tuple(cls(cells, tile_size, faces=each, shapes=shapes, **common) for each in faces)
 
     @classmethod
     def sample(cls, **common: Any) -> Self:

@@ -42,6 +42,36 @@ class TileShape(IntEnum):
     UPPER_HALF = 14
     ONE_WAY = 15
 
+    @property
+    def corners(self) -> tuple[tuple[float, float], ...]:
+        """Of what it fills, counter-clockwise, in tiles from the cell's lower left corner; none of a one-way cell."""
+        if self is TileShape.ONE_WAY:
+            return ()
+        square = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
+        if self is TileShape.FULL:
+            return square
+        x0, y0, x1, y1 = (0.5 * number for number in LINES[self])
+        below = [(x, y) for x, y in square if (x1 - x0) * (y - y0) < (y1 - y0) * (x - x0)]
+        below.sort(key=lambda point: (along_border(*point) - along_border(x0, y0)) % 4.0)
+        return ((x1, y1), (x0, y0), *below)
+
+
+LINES = (  # of each TileShape: from where to where the line across it goes, solid on its right, in half tiles
+    (0, 0, 0, 0), (0, 0, 2, 2), (0, 2, 2, 0), (2, 2, 0, 0), (2, 0, 0, 2),
+    (0, 0, 2, 1), (0, 1, 2, 2), (0, 2, 2, 1), (0, 1, 2, 0),
+    (2, 1, 0, 0), (2, 2, 0, 1), (2, 1, 0, 2), (2, 0, 0, 1),
+    (0, 1, 2, 1), (2, 1, 0, 1), (0, 0, 0, 0),
+)  # fmt: skip
+
+
+def along_border(x: float, y: float) -> float:
+    """How far a point of a cell's border is from its lower left corner, counter-clockwise."""
+    if y == 0.0:
+        return x
+    if x == 1.0:
+        return 1.0 + y
+    return 3.0 - x if y == 1.0 else 4.0 - y
+
 
 @dataclass(frozen=True)
 class TileMaterial:

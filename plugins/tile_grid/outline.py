@@ -17,29 +17,24 @@ import math
 from ...framework.compilation import part
 from .cells import SHAPE
 from .faces import plugin
-from .materials import TileShape
+from .materials import LINES, TileShape
 from .surface import code_of
 
 FULL, UPPER_HALF, ONE_WAY = int(TileShape.FULL), int(TileShape.UPPER_HALF), int(TileShape.ONE_WAY)
 NO_TILE = -1
 BOTTOM, RIGHT, TOP, LEFT, LINE, EDGES = range(6)
 LOWER, UPPER, WHOLE = 1, 2, 3  # halves of a side; of BOTTOM and TOP the left and the right one
-SIDES = (  # of each TileShape: which halves of BOTTOM, RIGHT, TOP, LEFT it fills,
+SIDES = (  # of each TileShape: which halves of BOTTOM, RIGHT, TOP, LEFT it fills
     (3, 3, 3, 3), (3, 3, 0, 0), (3, 0, 0, 3), (0, 0, 3, 3), (0, 3, 3, 0),
     (3, 1, 0, 0), (3, 3, 0, 1), (3, 1, 0, 3), (3, 0, 0, 1),
     (0, 2, 3, 3), (0, 0, 3, 2), (0, 2, 3, 0), (0, 3, 3, 2),
     (3, 1, 0, 1), (0, 2, 3, 2), (0, 0, 0, 0),
 )  # fmt: skip
-LINES = (  # and from where to where the line across it goes
-    (0, 0, 0, 0), (0, 0, 2, 2), (0, 2, 2, 0), (2, 2, 0, 0), (2, 0, 0, 2),
-    (0, 0, 2, 1), (0, 1, 2, 2), (0, 2, 2, 1), (0, 1, 2, 0),
-    (2, 1, 0, 0), (2, 2, 0, 1), (2, 1, 0, 2), (2, 0, 0, 1),
-    (0, 1, 2, 1), (2, 1, 0, 1), (0, 0, 0, 0),
-)  # fmt: skip
 FILLED = tuple(bottom | right << 2 | top << 4 | left << 6 for bottom, right, top, left in SIDES)
-ACROSS = tuple(x0 | y0 << 2 | x1 << 4 | y1 << 6 for x0, y0, x1, y1 in LINES)  # 0: none
+ACROSS = tuple(x0 | y0 << 2 | x1 << 4 | y1 << 6 for x0, y0, x1, y1 in LINES)  # lines; 0: none
 
-# The other corner beside a straight run is away from its end by these; 0, 0 where there is none.
+# The edges before and after, 0, 0 where there is none. short: it ends a little before that corner, since at the same
+# point there is another corner of the outline, whose bodies it must not reach.
 Run = collections.namedtuple("Run", "x0 y0 x1 y1 before_x before_y after_x after_y short_start short_end")
 
 
@@ -110,9 +105,9 @@ def turn_of(ux, uy, wx, wy):
 
 @part
 def joined(grid, x, y, ux, uy, forward):
-    """(turn, edge) of the edge that begins at a point where one with direction u ends; or, not forward, that ends where
-    one begins. Of several it is the leftmost; a turn below -2: there is none."""
-    best, best_x, best_y = -3.0, 0, 0
+    """(turn, edge, whether there are several) of the edge that begins at a point where one with direction u ends; or,
+    not forward, that ends where one begins. Of several it is the leftmost; a turn below -2: there is none."""
+    best, best_x, best_y, count = -3.0, 0, 0, 0
     for cell_x in range((x - 1) >> 1, (x >> 1) + 1):
         for cell_y in range((y - 1) >> 1, (y >> 1) + 1):
             if shape_at(grid, cell_x, cell_y) == NO_TILE:
@@ -121,11 +116,11 @@ def joined(grid, x, y, ux, uy, forward):
                 there, x0, y0, x1, y1 = edge_of(grid, cell_x, cell_y, k)
                 if not there or (x0 != x or y0 != y if forward else x1 != x or y1 != y):
                     continue
-                wx, wy = x1 - x0, y1 - y0
+                wx, wy, count = x1 - x0, y1 - y0, count + 1
                 turn = turn_of(ux, uy, wx, wy) if forward else turn_of(wx, wy, ux, uy)
                 if turn > best:
                     best, best_x, best_y = turn, wx, wy
-    return best, best_x, best_y
+    return best, best_x, best_y, count > 1
 
 
 @plugin.kernel
@@ -139,21 +134,25 @@ def run_from(grid, cells, start, end):
     """(whether it begins here, Run) of the run that an edge is part of, within a rectangle of cells."""
     (x0, y0), (x1, y1) = start, end
     ux, uy = x1 - x0, y1 - y0
-    turn, before_x, before_y = joined(grid, x0, y0, ux, uy, False)
+    turn, before_x, before_y, pinched = joined(grid, x0, y0, ux, uy, False)
+    short_start = pinched and turn > 1.0
     begins = not (turn == 0.0 and on_map(cells, x0 - before_x, y0 - before_y))
-    turn, after_x, after_y = joined(grid, x1, y1, ux, uy, True) if begins else (0.0, 0, 0)
+    turn, after_x, after_y, pinched = joined(grid, x1, y1, ux, uy, True) if begins else (0.0, 0, 0, False)
     while begins and turn == 0.0 and on_map(cells, x1 + after_x, y1 + after_y):
         x1, y1 = x1 + after_x, y1 + after_y
-        turn, after_x, after_y = joined(grid, x1, y1, ux, uy, True)
-    return begins, beside_one_way(grid, Run(x0, y0, x1, y1, before_x, before_y, after_x, after_y, False, False))
+        turn, after_x, after_y, pinched = joined(grid, x1, y1, ux, uy, True)
+    short_end = pinched and turn > 1.0
+    return begins, beside_one_way(
+        grid, Run(x0, y0, x1, y1, before_x, before_y, after_x, after_y, short_start, short_end)
+    )
 
 
 @part
 def beside_one_way(grid, run):
     """A run whose end is beside a one-way cell, at the height of its upper side: there a floor goes on, and a wall is
     shorter by what a body on that cell may have sunk in."""
-    x0, y0, x1, y1, before_x, before_y, after_x, after_y, _, _ = run
-    ux, uy, short_start, short_end = x1 - x0, y1 - y0, False, False
+    x0, y0, x1, y1, before_x, before_y, after_x, after_y, short_start, short_end = run
+    ux, uy = x1 - x0, y1 - y0
     if x0 & 1 == 0 and y0 & 1 == 0:
         if ux > 0 and before_x == 0 and before_y > 0 and is_one_way_cell(grid, (x0 >> 1) - 1, (y0 >> 1) - 1):
             before_x, before_y = 2, 0
@@ -177,11 +176,11 @@ def one_way_run(grid, cells, x, y):
     x0, x1, top = 2 * x, 2 * stop, 2 * y + 2
     before_x, before_y, after_x, after_y = 2, 0, 2, 0
     if not is_one_way_cell(grid, x - 1, y):
-        turn, before_x, before_y = joined(grid, x0, top, 2, 0, False)
+        turn, before_x, before_y, _ = joined(grid, x0, top, 2, 0, False)
         if turn <= -2.0 or before_x < 0:
             before_x, before_y = 0, 0
     if not is_one_way_cell(grid, stop, y):
-        turn, after_x, after_y = joined(grid, x1, top, 2, 0, True)
+        turn, after_x, after_y, _ = joined(grid, x1, top, 2, 0, True)
         if turn <= -2.0 or after_x < 0:
             after_x, after_y = 0, 0
     return begins, Run(x0, top, x1, top, before_x, before_y, after_x, after_y, False, False)

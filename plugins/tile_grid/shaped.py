@@ -107,8 +107,8 @@ def outline_contact(a, b, d, cells, support, rounding):
                 first = count
             count += 1
         better = deep > depth
-        if one_way and depth >= 0.0:
-            better = 0.0 <= deep < depth  # it stands on the highest of those that it has come down to
+        if one_way:
+            better = abs(deep) < abs(depth)  # of those one above the other that which it stands on
         if better:
             depth, normal, point = deep, n, p
     if depth >= 0.0:

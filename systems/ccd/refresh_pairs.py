@@ -9,6 +9,8 @@ What the queue holds of pairs that are candidates again stays: their paths are t
 
 from __future__ import annotations
 
+import math
+
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.schedule.stages import Rows
@@ -60,7 +62,7 @@ def add_pair(state, a, b, found, dt):
     forget_manifold(new, found)
     if new.is_solid[found] and (is_one_way(state, a) or is_one_way(state, b)):
         path, now = relative_path(state, a, b), state.impacts.until
-        if not one_way_holds(state, a, b, along(path, now), along(path, dt), False):
+        if not one_way_holds(state, a, b, along(path, now), along(path, dt), -math.inf):
             new.is_solid[found], new.disabled[found] = False, True
             new.disabled_count += 1
 

@@ -8,6 +8,8 @@ however deep a load presses it. Whether that is so is decided once in a step.
 
 from __future__ import annotations
 
+import math
+
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add_scaled, dot, length, negative, sub
@@ -46,15 +48,16 @@ def is_from_front(front, normal):
 @part
 def normal_ahead(state, a, b, start, end):
     """(depth where the step starts, normal where the two first touch on the straight way, else where they are nearest
-    to it), from a to b; of concave shapes the normal at the end, if they touch there."""
+    to it), from a to b; of concave shapes the normal at the end, if they touch there, and how deep they were behind
+    that plane where the step starts."""
     hit, first, normal, _ = evaluate_pair(state, a, b, start)
     travel, depth, share = sub(end, start), first, 0.0
     shape, near = state.bodies.shape, SAME_PLACE * (length(start) + length(end))
+    if not both_convex(state, shape[a], shape[b]):
+        hit, there, across, _ = evaluate_pair(state, a, b, end)
+        return (there + dot(travel, across), across) if hit else (first, normal)
     if first >= 0.0:
         return first, normal
-    if not both_convex(state, shape[a], shape[b]):
-        hit, _, there, _ = evaluate_pair(state, a, b, end)
-        return first, there if hit else normal
     for _ in range(ADVANCES):
         rate = dot(travel, normal)
         if not depth < -near or not rate < 0.0:
@@ -67,18 +70,22 @@ def normal_ahead(state, a, b, start, end):
 
 
 @part
-def one_way_holds(state, a, b, start, end, touched):
+def one_way_holds(state, a, b, start, end, pressed):
     """Whether a and b push each other, of which one is one-way or both are; start, end: from the centre of a's shape to
-    that of b's; touched: in the step before."""
+    that of b's; pressed: depth of their contact of the step before, -inf if there was none. Of a concave shape it may
+    have been elsewhere: there what it bore was no deeper."""
     bodies, holds = state.bodies, True
+    known = both_convex(state, bodies.shape[a], bodies.shape[b])
+    borne = pressed > -math.inf and known
+    more = 0.0 if known else max(pressed, 0.0)
     depth, normal = normal_ahead(state, a, b, start, end)
     if state.spinning:  # shapes stand as they are turned at the end
         depth -= way_of_turning(bodies, a, bodies.turn[a]) + way_of_turning(bodies, b, bodies.turn[b])
     if is_one_way(state, a):
-        holds = (touched or depth <= SLACK * bodies.min_extent[b]) and is_from_front(front_of(state, a), normal)
+        holds = (borne or depth <= SLACK * bodies.min_extent[b] + more) and is_from_front(front_of(state, a), normal)
     if is_one_way(state, b):
         back = negative(normal)
-        holds &= (touched or depth <= SLACK * bodies.min_extent[a]) and is_from_front(front_of(state, b), back)
+        holds &= (borne or depth <= SLACK * bodies.min_extent[a] + more) and is_from_front(front_of(state, b), back)
     return holds
 
 
@@ -98,9 +105,9 @@ def release_one_way(state, dt):
         ):
             k += 1
         touched = k < count and contacts.entity_a[now, k] == first and contacts.entity_b[now, k] == second
-        touched = touched and contacts.enabled[now, k]
+        pressed = contacts.depth[now, k] if touched and contacts.enabled[now, k] else -math.inf
         start, end = centre_offset_at_start(state.bodies, a, b), centre_offset(state.bodies, a, b)
-        if not one_way_holds(state, a, b, start if state.moved else end, end, touched):
+        if not one_way_holds(state, a, b, start if state.moved else end, end, pressed):
             pairs.is_solid[c], pairs.disabled[c] = False, True
             pairs.disabled_count += 1
     return OK
