@@ -193,11 +193,12 @@ class Bodies:
                     name = f"{kind.__name__}.{references[0].field}"
                     raise RefusedError(f"{name}: a field of a prefab cannot refer to an object")
                 continue
+            late = Late(kind, values, references)
             try:
-                trial = kind(**values, **{each.field: 0 for each in references})
+                trial = late.made(dict.fromkeys(each.field for each in references))
             except (ValueError, TypeError) as error:
                 raise RefusedError(str(error)) from error
-            made[kind] = Late(kind, values, references) if references else trial
+            made[kind] = late if references else trial
         return list(made.values())
 
     # -- shapes ----------------------------------------------------------------------------------------

@@ -28,6 +28,7 @@ class Pictures:
         except ImportError as error:
             raise ImportError(MISSING) from error
         self.level = level
+        self._sizes = np.array([each.size for each in level.pictures], float).reshape(-1, 2) * self._metres_per_pixel
         self._images: dict[Path, Any] = {}
         self._scaled: dict[Any, Any] = {}
 
@@ -66,12 +67,11 @@ class Pictures:
     def _tiles(
         self, layer: LevelLayer, camera: Any, shift: Any, low: Any, high: Any, seconds: float
     ) -> list[tuple[Any, tuple[int, int]]]:
-        tiles, scale = layer.tiles, self._metres_per_pixel
+        tiles = layer.tiles
         assert tiles is not None
         if not len(tiles.place):
             return []
-        sizes = np.array([self.level.pictures[k].size for k in range(len(self.level.pictures))]) * scale
-        size = sizes[tiles.picture]
+        size = self._sizes[tiles.picture]
         diagonal = (tiles.flips & DIAGONAL).astype(bool)
         size = np.where(diagonal[:, None], size[:, ::-1], size)
         seen = np.flatnonzero(((tiles.place + size >= low) & (tiles.place <= high)).all(axis=1))

@@ -36,6 +36,11 @@ class Late:
     values: dict[str, Any]
     references: list[Reference]
 
+    def made(self, entities: dict[str, int | None]) -> Component:
+        """With these entities; in place of those that are not there yet any others, no two of them the same."""
+        known = {name: k if entity is None else entity for k, (name, entity) in enumerate(entities.items(), 1)}
+        return self.kind(**self.values, **known)
+
 
 @dataclass
 class Planned:
@@ -148,7 +153,7 @@ class Maker:
         if not isinstance(given, Late):
             return given
         entities = {name: self.level.objects[id].entity for _, name, id in given.references}
-        component = given.kind(**given.values, **{name: 0 if each is None else each for name, each in entities.items()})
+        component = given.made(entities)
         self.unset += [(component, each) for each in given.references if entities[each.field] is None]
         return component
 

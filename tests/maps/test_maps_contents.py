@@ -29,6 +29,8 @@ from carom import (
     ChainSegmentCollider,
     Component,
     ConvexPolygonCollider,
+    Hinge,
+    Joints,
     Path,
     Prefab,
     RigidBody,
@@ -145,6 +147,19 @@ def test_references_are_entities_whatever_the_order(suffix, tmp_path, world):
     assert targets == {k: level.object(n).entity for k, n in ((1, 3), (2, 1), (3, 2), (4, 4))} | {6: 0}
     home = world.component_for_entity(level.object(1).entity, Enemy).home
     assert home.tolist() == [1.0, 3.0]
+
+
+def test_a_point_is_a_joint_of_two_objects(tmp_path):
+    world = world_for_maps(Joints())
+    drawn = [
+        thing(1, 48, 48, kind="Hinge", point=True, properties={"a": Ref(2), "b": Ref(3), "anchor": Ref(1)}),
+        thing(2, 40, 40, 8, 8), thing(3, 48, 46, 32, 4, properties={"spins": True}),
+    ]  # fmt: skip
+    level = load(write(tmp_path / "map.tmx", map_of(6, 6, objects_of(*drawn))), world)
+    hinge = world.component_for_entity(level.object(1).entity, Hinge)
+    assert (hinge.a, hinge.b) == (level.object(2).entity, level.object(3).entity)
+    assert np.array_equal(hinge.anchor, (3, 3))
+    world.close()
 
 
 def test_prefabs_are_placed_and_changed(tmp_path, world):
