@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from ..components import AABBCollider
 from ..plugins.tile_grid import TileGridCollider, TileMaterial, TileShape
 from .bodies import Bodies
 from .errors import Findings, RefusedError
@@ -18,20 +17,7 @@ from .plan import Chain, Planned, transform
 from .shapes import Shape, collider_of, is_convex, tile_shapes
 
 DIGITS = 6  # of a tile: corners that are nearer to those of a shape of the grid are these
-# By shape of the grid: how high its line is at its left and right end, in tiles, and whether it is solid above.
-LINES = {
-    TileShape.FULL: (1.0, 1.0, False), TileShape.SLOPE_UP: (0.0, 1.0, False), TileShape.SLOPE_DOWN: (1.0, 0.0, False),
-    TileShape.CEILING_UP: (0.0, 1.0, True), TileShape.CEILING_DOWN: (1.0, 0.0, True),
-    TileShape.GENTLE_UP_LOW: (0.0, 0.5, False), TileShape.GENTLE_UP_HIGH: (0.5, 1.0, False),
-    TileShape.GENTLE_DOWN_HIGH: (1.0, 0.5, False), TileShape.GENTLE_DOWN_LOW: (0.5, 0.0, False),
-    TileShape.GENTLE_CEILING_UP_LOW: (0.0, 0.5, True), TileShape.GENTLE_CEILING_UP_HIGH: (0.5, 1.0, True),
-    TileShape.GENTLE_CEILING_DOWN_HIGH: (1.0, 0.5, True), TileShape.GENTLE_CEILING_DOWN_LOW: (0.5, 0.0, True),
-    TileShape.LOWER_HALF: (0.5, 0.5, False), TileShape.UPPER_HALF: (0.5, 0.5, True),
-}  # fmt: skip
-CORNERS = {  # of each shape, in tiles
-    frozenset({(0.0, float(above)), (1.0, float(above)), (1.0, right), (0.0, left)}): shape
-    for shape, (left, right, above) in LINES.items()
-}
+CORNERS = {frozenset(shape.corners): shape for shape in TileShape if shape.corners}  # in tiles
 IN_CELLS = ("friction", "restitution", "surface_velocity")  # of a material; others are those of the whole grid
 MOST = 255  # materials of a grid
 
@@ -63,15 +49,20 @@ class Grid:
             raise RefusedError(f"more than {MOST} different materials in a layer")
         self.numbers[cells], self.shapes[cells] = number, shape
 
-    def colliders(self, metres: float) -> tuple[TileGridCollider, TileGridCollider]:
-        """Floors and walls; a plain grid if all cells are alike."""
+    def colliders(self, metres: float) -> list[TileGridCollider]:
+        """Floors, walls and one-way cells, as far as there are any; plain grids if all cells are alike."""
         given: dict[str, Any] = {"lower": (0, 0), **self.common}
         if len(self.materials) == 1 and not self.shapes.any():
             given |= dict(next(iter(self.materials)))
         else:
             given["materials"] = {number: TileMaterial(**dict(key)) for key, number in self.materials.items()}
             given["shapes"] = self.shapes
-        return TileGridCollider.floors_and_walls(self.numbers, metres, **given)
+        one_way = self.shapes == TileShape.ONE_WAY
+        wanted = {"floors": (self.numbers[~one_way] != 0).any(), "one_way": one_way.any()}
+        return [
+            TileGridCollider(self.numbers, metres, faces=faces, **given)
+            for faces, kind in (("floors", "floors"), ("walls", "floors"), ("one_way", "one_way")) if wanted[kind]
+        ]  # fmt: skip
 
 
 class Grids:
@@ -122,7 +113,7 @@ class TileLayers:
                 elif meaning.tile.shapes:
                     made += self._shaped(here, meaning, layer, out, lower, place, grids)
                 elif ONE_WAY in meaning.fields.marks:
-                    made += self._one_way(here, meaning.fields, base, out, lower, place)
+                    grids.add(here, meaning.fields.material, TileShape.ONE_WAY)
                 else:
                     grids.add(here, meaning.fields.material)
         for grid in grids.by_key.values():
@@ -223,21 +214,6 @@ class TileLayers:
     def corner(self, row: int, column: int) -> np.ndarray:
         """(2,) m, the lower left one of a cell."""
         return self.metres * np.array((column, self.data.rows - 1 - row), float)
-
-    def _one_way(
-        self, cells: np.ndarray, fields: Fields, base: Fields, out: LevelLayer, lower: np.ndarray, place: str
-    ) -> list[Planned]:
-        """A line for each run of one-way cells, on their upper side."""
-        made = []
-        for row in np.flatnonzero(cells.any(axis=1)).tolist():
-            ends = np.flatnonzero(np.diff(np.concatenate(((0,), cells[row].astype(np.int8), (0,)))))
-            for first, last in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True):
-                half = 0.5 * self.metres * (last - first)
-                middle = lower + self.corner(row, first) + (half, self.metres)
-                collider = AABBCollider((half, 0.0), **{"one_way": (0.0, 1.0), **fields.material})
-                body = [transform(middle), collider, *self._components(base)]
-                made.append(Planned(place, out, list(base.kinds), bodies=[body]))
-        return made
 
     # -- pictures --------------------------------------------------------------------------------------
 

@@ -293,6 +293,26 @@ def test_slopes_halves_and_materials_are_cells_of_one_grid(tmp_path, world):
     assert world.has_component(roof, ConvexPolygonCollider)
 
 
+def test_one_way_tiles_hold_from_above(tmp_path, world):
+    """Beside full tiles and alone; a ball stays on them, one from below passes and comes to rest there."""
+    cells = np.zeros((6, 6), int)
+    cells[3], cells[3, 0] = 2, 1
+    one_way = tileset(tile(0, "Solid"), tile(1, "OneWay", friction=0.3))
+    alone = tiles_of(np.where(cells == 2, 2, 0), "alone", offsetx=160)
+    level = load(write(tmp_path / "map.tmx", map_of(6, 6, tiles_of(cells), alone, tilesets=[one_way])), world)
+    faces = {name: [world.component_for_entity(each, TileGridCollider).faces for each in layer.entities]
+             for name, layer in level.layers.items()}  # fmt: skip
+    assert faces == {"ground": ["floors", "walls", "one_way"], "alone": ["one_way"]}
+    balls = [
+        world.create_entity(Transform((x, y)), RigidBody(linear_velocity=(0, speed)), SphereCollider(0.2))
+        for left in (2, 12) for x, y, speed in ((left, 3.5, 0), (left + 1, 2.3, 8))
+    ]  # fmt: skip
+    for _ in range(150):
+        world.step()
+    for each in balls:
+        assert world.component_for_entity(each, Transform).y == pytest.approx(3.2, abs=0.01)
+
+
 @FORMATS
 def test_templates_and_external_tilesets(suffix, tmp_path, world):
     """Of both formats, also mixed; an object's own fields and properties come first; a template brings its tileset."""
