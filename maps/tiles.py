@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..plugins.tile_grid import TileGridCollider, TileMaterial, TileShape
+from ..plugins.tile_grid.faces import Faces
 from .bodies import Bodies
 from .errors import Findings, RefusedError
 from .fields import ONE_WAY, Fields
@@ -58,11 +59,9 @@ class Grid:
             given["materials"] = {number: TileMaterial(**dict(key)) for key, number in self.materials.items()}
             given["shapes"] = self.shapes
         one_way = self.shapes == TileShape.ONE_WAY
-        wanted = {"floors": (self.numbers[~one_way] != 0).any(), "one_way": one_way.any()}
-        return [
-            TileGridCollider(self.numbers, metres, faces=faces, **given)
-            for faces, kind in (("floors", "floors"), ("walls", "floors"), ("one_way", "one_way")) if wanted[kind]
-        ]  # fmt: skip
+        walls: tuple[Faces, ...] = ("floors", "walls") if self.numbers[~one_way].any() else ()
+        wanted: tuple[Faces, ...] = (*walls, "one_way") if one_way.any() else walls
+        return [TileGridCollider(self.numbers, metres, faces=faces, **given) for faces in wanted]
 
 
 class Grids:
