@@ -36,6 +36,8 @@ class Rollback:
         frames that the world may be ahead of the inputs of the slowest player
     idle
         what is taken for an input before the first one of a player is known
+
+    ValueError without players, or with ``most`` below 1.
     """
 
     def __init__(
@@ -116,7 +118,8 @@ class Rollback:
         return frame, self._hashes.get(frame, "")
 
     def differs(self, frame: int, checksum: str) -> bool | None:
-        """Whether this world had another hash there than that of another player; None if that is not known here."""
+        """Whether another player's ``checksum`` of a ``frame`` is not the hash that this world had there; None if that
+        is not known here."""
         self.settle()
         if frame > self.confirmed or frame not in self._hashes:
             return None

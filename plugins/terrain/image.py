@@ -95,7 +95,7 @@ def _simplified(loop: np.ndarray, tolerance: float) -> np.ndarray:
     """Some of the points of a closed line; the others are at most so far from the line through these."""
     first = int(np.lexsort((loop[:, 1], loop[:, 0]))[0])
     points = np.roll(loop, -first, axis=0)
-    second = int(np.hypot(*(points - points[0]).T).argmax())
+    second = int(_squares(points - points[0]).argmax())
     closed = np.concatenate((points, points[:1]))
     kept = {0, second}
     parts = [(0, second), (second, len(points))]
@@ -104,14 +104,21 @@ def _simplified(loop: np.ndarray, tolerance: float) -> np.ndarray:
         if high - low < 2:
             continue
         way, rest = closed[high] - closed[low], closed[low + 1 : high] - closed[low]
-        along = np.clip(rest @ way / (way @ way), 0.0, 1.0) if way.any() else np.zeros(len(rest))
-        apart = np.hypot(*(rest - along[:, None] * way).T)
+        along = np.zeros(len(rest))
+        if way.any():
+            along = np.clip((rest * way).sum(axis=1) / _squares(way[None]), 0.0, 1.0)
+        apart = np.sqrt(_squares(rest - along[:, None] * way))
         worst = int(apart.argmax())
         if apart[worst] > tolerance + 1e-12:
             middle = low + 1 + worst
             kept.add(middle)
             parts += [(low, middle), (middle, high)]
     return points[sorted(kept)]
+
+
+def _squares(ways: np.ndarray) -> np.ndarray:
+    """Of the lengths of vectors (n, 2)."""
+    return ways[:, 0] * ways[:, 0] + ways[:, 1] * ways[:, 1]
 
 
 def _cross(loops: list[np.ndarray]) -> bool:

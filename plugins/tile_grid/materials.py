@@ -44,7 +44,8 @@ class TileShape(IntEnum):
 
     @property
     def corners(self) -> tuple[tuple[float, float], ...]:
-        """Of what it fills, counter-clockwise, in tiles from the cell's lower left corner; none of a one-way cell."""
+        """(k, 2) in units of a tile's side, of what it fills, counter-clockwise, from the cell's lower left corner; none of a
+        one-way cell."""
         if self is TileShape.ONE_WAY:
             return ()
         square = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
