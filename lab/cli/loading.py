@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ... import scenes
+from ... import maps, scenes
 from ...framework import Plugin, Settings, World
 from .options import Corners, apply, corners
 from .usage_errors import Problem, did_you_mean, one_line
@@ -132,12 +132,24 @@ def load(target: str) -> Loaded:
     if path.suffix == ".py":
         return _load_file(path)
     if path.suffix in MAPS:
-        from .maps import loaded_map  # only here: it needs this module
-
-        return loaded_map(path)
+        return _load_map(path)
     if path.exists() or path.parent != Path():
         raise Problem(f"{target!r} is no scene, and no Python file: its name ends in .py")
     raise Problem(f"no scene named {target!r}{did_you_mean(target, scenes.names())} (a file of one's own ends in .py)")
+
+
+def _load_map(path: Path) -> Loaded:
+    """A map, in a world with the plugins that it needs; of an LDtk project its first level."""
+
+    def build(settings: Settings | None = None, seed: int = 0) -> World:
+        return maps.world_of(path, settings=settings, level=level)[0]
+
+    try:
+        level = next(iter(maps.levels_of(path)), None)
+        size = maps.world_of(path, level=level)[1].size
+    except maps.MapError as error:
+        raise Problem(one_line(error)) from error
+    return Loaded(path.name, build, path.resolve(), view=((0.0, 0.0), size))
 
 
 def import_file(path: Path) -> ModuleType:

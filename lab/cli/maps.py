@@ -1,4 +1,4 @@
-"""``carom maps check``, and maps as what a command runs."""
+"""``carom maps check``."""
 
 from __future__ import annotations
 
@@ -11,13 +11,12 @@ import click
 
 from ... import maps
 from ...components import Prefab
-from ...framework import Component, Settings, World
+from ...framework import Component
 from ...maps.fields import Vocabulary
 from ...maps.loading import look_at
 from .group import Commands
-from .loading import Loaded, import_file
+from .loading import import_file
 from .options import traceback_option
-from .usage_errors import Problem, one_line
 
 FOUND = 1  # exit code of a check with findings
 
@@ -74,17 +73,3 @@ def names_of(file: Path) -> dict[str, Any]:
 
 def _is(value: Any, kind: type) -> bool:
     return isinstance(value, type) and issubclass(value, kind) and value is not kind
-
-
-def loaded_map(path: Path) -> Loaded:
-    """A map, in a world with the plugins that it needs; of an LDtk project its first level."""
-
-    def build(settings: Settings | None = None, seed: int = 0) -> World:
-        return maps.world_of(path, settings=settings, level=level)[0]
-
-    try:
-        level = next(iter(maps.levels_of(path)), None)
-        size = maps.world_of(path, level=level)[1].size
-    except maps.MapError as error:
-        raise Problem(one_line(error)) from error
-    return Loaded(path.name, build, path.resolve(), view=((0.0, 0.0), size))
