@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..components.spin import Spin
 from ..framework import World
 from .library import Library
-from .lists import DrawingList, Floats, Style
+from .lists import DrawingList, Style
 from .overlays import box_lines, contact_marks, joint_marks, velocity_lines
 from .shapes import Places, arrays_of, parts_of, shapes_at, watched_of
 
@@ -31,10 +31,10 @@ class Drawing:
         self._library = Library(self._physics.dimensions)
         self._version: Any = None
         self._moving: Any = None
-        self._moving_seen: dict[str, np.ndarray] = {}
+        self._moving_seen: dict[str, bytes] = {}
         self._fixed: Any = None
-        self._fixed_seen: dict[str, np.ndarray] = {}
-        self._arrays_seen: dict[str, np.ndarray] = {}
+        self._fixed_seen: dict[str, bytes] = {}
+        self._arrays_seen: dict[str, bytes] = {}
         self._fixed_version = 0
         self._statics: Any = None
 
@@ -80,19 +80,20 @@ class Drawing:
         """Make again what has changed since the last frame, but for where moving bodies are."""
         world, version = self.world, (table.version, table.members_version, self.world.registry.version)
         now = watched_of(world, rows)
-        if self._moving is None or version != self._version or not _same(now, self._moving_seen):
+        if self._moving is None or version != self._version or now != self._moving_seen:
             if len(self._library.outlines) > KNOWN + SPARE * table.count:
                 self._library = Library(table.dimensions)
-            self._moving = parts_of(world, self._library, rows)
-            self._moving_seen = {key: column.copy() for key, column in now.items()}
+            self._moving, self._moving_seen = parts_of(world, self._library, rows), now
         statics, arrays = (version, table.static_version, self._physics.state.statics_version), arrays_of(world, still)
-        if statics != self._statics or not _same(arrays, self._arrays_seen):
-            self._arrays_seen = {key: column.copy() for key, column in arrays.items()}
-            now = watched_of(world, still) | {name: table.column(name)[still] for name in ("position", "rotation")}
-            if self._fixed is None or not _same(now, self._fixed_seen):
+        if statics != self._statics or arrays != self._arrays_seen:
+            now = watched_of(world, still) | {
+                key: table.column(key)[still].tobytes() for key in ("position", "rotation")
+            }
+            if self._fixed is None or now != self._fixed_seen:
                 self._fixed = shapes_at(parts_of(world, self._library, still), self._places(still, False))
-                self._fixed_seen = {key: column.copy() for key, column in now.items()}
+                self._fixed_seen = now
                 self._fixed_version += 1
+            self._arrays_seen = arrays
         self._version, self._statics = version, statics
 
     def _places(self, rows: slice, interpolated: bool) -> Places:
@@ -112,14 +113,3 @@ class Drawing:
         style[: max(0, dynamic - rows.start)] = Style.DYNAMIC
         style[table.asleep(rows)] = Style.ASLEEP
         return style
-
-
-def _same(now: dict[str, Floats], before: dict[str, Floats]) -> bool:
-    """Whether these columns have the same bits."""
-    return now.keys() == before.keys() and all(_bits_same(now[key], before[key]) for key in now)
-
-
-def _bits_same(one: Floats, other: Floats) -> bool:
-    if one.shape != other.shape:
-        return False
-    return bool((np.ascontiguousarray(one).view(np.uint8) == other.view(np.uint8)).all())

@@ -70,24 +70,25 @@ def matrices(angle: Floats) -> Floats:
     return np.stack((c, -s, s, c), axis=1).reshape(-1, 2, 2)
 
 
-def watched_of(world: Any, rows: slice) -> dict[str, Any]:
-    """The columns that the shapes of these rows, and their places along their bodies, depend on; views."""
-    table, found = world.physics.table, {"entity": world.physics.table.column("entity")[rows]}
+def watched_of(world: Any, rows: slice) -> dict[str, bytes]:
+    """The bits of the columns that the shapes of these rows, and their places along their bodies, depend on."""
+    table = world.physics.table
+    found = {"entity": table.column("entity")[rows].tobytes()}
     for component, shape in world.registry.shapes.items():
         mask = table.mask_names.get(component)
         if mask:
             keys = (mask, *(component.columns[name].key for name in (*shape.columns, *ALL)))
-            found |= {key: table.arrays[key][rows] for key in keys if key in table.arrays}
+            found |= {key: table.arrays[key][rows].tobytes() for key in keys if key in table.arrays}
             if hasattr(component, "turned"):
-                found[mask + " turned"] = table.column("rotation")[rows][table.arrays[mask][rows]]
+                found[mask + " turned"] = table.column("rotation")[rows][table.arrays[mask][rows]].tobytes()
     return found
 
 
-def arrays_of(world: Any, rows: slice) -> dict[str, Any]:
+def arrays_of(world: Any, rows: slice) -> dict[str, bytes]:
     """Those of these columns that change with no version: a map has other cells."""
     table = world.physics.table
     return {
-        column.key: table.column(column.key)[rows]
+        column.key: table.column(column.key)[rows].tobytes()
         for component in world.registry.shapes if component in table.mask_names for column in component._pooled
     }  # fmt: skip
 
