@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from carom.plugins import Physics, tile_grid
 from carom.plugins.tile_grid import TileGridCollider, TileMaterial, TileShape, map_of_text
 
 G, DT = 10.0, 1 / 60
+WRONG: Any = ({1: 0.5}, [TileMaterial()], {"#": 0.5})
 MODES = ("discrete", "continuous", "event_driven")
 each_mode = pytest.mark.parametrize("mode", MODES)
 
@@ -164,8 +166,8 @@ def test_a_legend_reads_materials_and_shapes():
     [
         (lambda: TileGridCollider([[256]], 1.0, materials={}), r"1 to 255.*got 256 at row 0, column 0"),
         (lambda: TileGridCollider([[1]], 1.0, materials={0: TileMaterial()}), "numbers are 1 to 255, got 0"),
-        (lambda: TileGridCollider([[1]], 1.0, materials={1: 0.5}), "number 1 must be a TileMaterial, got 0.5"),
-        (lambda: TileGridCollider([[1]], 1.0, materials=[TileMaterial()]), "must be a dict of TileMaterial"),
+        (lambda: TileGridCollider([[1]], 1.0, materials=WRONG[0]), "number 1 must be a TileMaterial, got 0.5"),
+        (lambda: TileGridCollider([[1]], 1.0, materials=WRONG[1]), "must be a dict of TileMaterial"),
         (lambda: TileMaterial(friction=-1.0), "TileMaterial.friction must be at least 0"),
         (lambda: TileMaterial(surface_velocity=(1, 2, 3)), "TileMaterial.surface_velocity must be a number or 2"),
         (lambda: TileGridCollider([[1]], 1.0, shapes=[[16]]), "0 to 15, got 16 at row 0, column 0"),
@@ -174,7 +176,7 @@ def test_a_legend_reads_materials_and_shapes():
         (lambda: TileGridCollider([[1]], 1.0, materials={}).set((0, 0), 300), "1 to 255, got 300"),
         (lambda: TileGridCollider([[1]], 1.0, materials={}).set((0, 0), 1, 16), "must be a TileShape"),
         (lambda: TileGridCollider([[1]], 1.0).material_of(1, 0), "material_of: the map has 1 rows and 1 columns"),
-        (lambda: map_of_text("#", {"#": 0.5}), "legend"),
+        (lambda: map_of_text("#", WRONG[2]), "legend"),
     ],
 )  # fmt: skip
 def test_what_is_refused(make, match):
