@@ -182,6 +182,13 @@ class Level:
             raise KeyError(f"no object has the id {id!r}")
         return self.objects[id]
 
+    def object_of(self, entity: int) -> LevelObject:
+        """The object that this entity was made of; KeyError if it was made of none."""
+        found = next((each for each in self.objects.values() if entity in each.entities), None)
+        if found is None:
+            raise KeyError(f"entity {entity!r} was made of no object")
+        return found
+
     def draw(self, surface: Any, camera: Any, layers: Iterable[str] | None = None, seconds: float = 0.0) -> None:
         """Draw tiles, images, and objects without a body, on a pygame.Surface; ImportError without pygame.
 

@@ -119,7 +119,7 @@ def namespace(monkeypatch, tmp_path):
 # Each compiles for a quarter of a minute or more where the cache is empty, or is a study of many runs.
 SLOW = (
     "write-a-shape.md", "tile_grid.md", "capsule.md", "convex_hull.md", "convex_polygon.md",
-    "trade.md", "integrators.md", "collisions.md", "character.md", "platformer.md",
+    "trade.md", "integrators.md", "collisions.md", "character.md", "platformer.md", "maps.md",
 )  # fmt: skip
 RUN = [
     pytest.param(page, marks=pytest.mark.slow if page.name in SLOW else ())

@@ -357,6 +357,9 @@ def test_names_that_several_objects_have_are_told(tmp_path, world):
         level.entities["heros"]
     with pytest.raises(KeyError, match="no object has the id 9"):
         level.object(9)
+    with pytest.raises(KeyError, match="entity 99 was made of no object"):
+        level.object_of(99)
+    assert level.object_of(level.entities["hero"]).id == 4
     assert level.of_class["nothing"] == []
 
 
