@@ -272,7 +272,7 @@ class Bodies:
         if closed:
             values.setdefault("mode", "loop")
         if "speed" not in values:
-            raise RefusedError("its path needs a speed: property 'speed', m/s")
+            raise RefusedError("its path needs a speed: property 'speed' or 'Path.speed', m/s")
 
     def _start(self, values: dict[str, Any]) -> np.ndarray:
         """(2,) m, where a body on this path begins."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import binascii
-import gzip
 import zlib
 from pathlib import Path
 from typing import Any
@@ -169,7 +168,8 @@ class Reader:
         data, encoding = node.get("data", ""), word(node, "encoding")
         try:
             if encoding == "base64":
-                numbers = np.frombuffer(_unpacked(str(data), word(node, "compression")), "<u4")
+                unpacked = _unpacked(str(data), word(node, "compression"), 4 * rows * columns + 1)
+                numbers = np.frombuffer(unpacked, "<u4")
             elif isinstance(data, str):
                 texts = data.strip().rstrip(",").split(",")
                 numbers = np.array(texts if texts != [""] else [], np.uint32)
@@ -256,14 +256,13 @@ def _title(node: Node) -> str:
     return f"object {node.get('id', '?')}" + (f" {node['name']!r}" if node.get("name") else "")
 
 
-def _unpacked(data: str, compression: str) -> bytes:
-    raw = base64.b64decode(data.strip())
+def _unpacked(data: str, compression: str, most: int) -> bytes:
+    """The bytes, ``most`` of them at most, however many there are."""
     try:
-        if compression == "zlib":
-            return zlib.decompress(raw)
-        if compression == "gzip":
-            return gzip.decompress(raw)
-    except (zlib.error, OSError, EOFError, binascii.Error) as error:
+        raw = base64.b64decode(data.strip())
+        if compression in ("zlib", "gzip"):
+            return zlib.decompressobj(wbits=47).decompress(raw, most)  # either of the two
+    except (zlib.error, binascii.Error) as error:
         raise ValueError(str(error)) from error
     if compression:
         raise ValueError(f"compression {compression}; choose CSV or zlib as Map > Tile Layer Format in Tiled")
