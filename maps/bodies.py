@@ -15,10 +15,10 @@ from ..plugins.parts.outline import sound_corners
 from ..plugins.paths import MODES, Legs, Path
 from .errors import RefusedError
 from .fields import Fields, Sorter, checked
+from .formats.model import MapLayer, MapObject
+from .formats.reading import Property
 from .level import LevelLayer, LevelObject, LevelSprite
-from .model import MapLayer, MapObject
 from .plan import Chain, Late, Planned, transform
-from .reading import Property
 from .shapes import Shape, collider_of, is_convex, shape_of, tile_shapes, turned
 
 PATHS = ("path", "Path.points", "points")  # properties that make a path of the line they refer to

@@ -16,7 +16,7 @@ from ..framework.data.columns import Column
 from ..framework.names import did_you_mean
 from ..plugins.paths import Path
 from .errors import Findings, RefusedError
-from .reading import Property
+from .formats.reading import Property
 
 SOLID, ONE_WAY, DECORATION = "Solid", "OneWay", "Decoration"  # classes with a meaning of their own
 MATERIAL = tuple(name for name in Collider.columns if name != "offset")

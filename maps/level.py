@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..framework.names import did_you_mean
-from .model import Picture
+from .formats.model import Picture
 
 
 class Names(dict[str, Any]):

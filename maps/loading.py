@@ -16,12 +16,12 @@ from ..systems.shapes.geometry_levels import in_order
 from .bodies import Bodies
 from .errors import Finding, Findings, MapError, RefusedError
 from .fields import Sorter, Vocabulary
-from .ldtk import is_ldtk, level_names, read_ldtk
+from .formats.ldtk import is_ldtk, level_names, read_ldtk
+from .formats.model import MapData, MapLayer
+from .formats.reading import Property, document
+from .formats.tiled import read_tiled
 from .level import Level, LevelLayer
-from .model import MapData, MapLayer
 from .plan import Maker, Planned
-from .reading import Property, document
-from .tiled import read_tiled
 from .tiles import TileLayers
 
 

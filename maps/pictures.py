@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from .formats.model import DIAGONAL, HORIZONTAL, VERTICAL, Picture
 from .level import Level, LevelLayer, LevelSprite
-from .model import DIAGONAL, HORIZONTAL, VERTICAL, Picture
 
 MOST = 4096  # scaled pictures that are kept
 BOX, EDGE = (120, 120, 130, 160), (70, 70, 80, 255)  # of what has no image

@@ -13,7 +13,7 @@ from ..plugins.capsule import CapsuleCollider
 from ..plugins.convex_polygon import ConvexPolygonCollider
 from ..plugins.rotation import BoxCollider
 from .errors import RefusedError
-from .model import DIAGONAL, HORIZONTAL, VERTICAL, MapObject
+from .formats.model import DIAGONAL, HORIZONTAL, VERTICAL, MapObject
 
 CORNERS = 24  # of an ellipse
 FLAT = 1e-9  # of the square of its extent: a polygon of less area has none

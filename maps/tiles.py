@@ -12,8 +12,8 @@ from ..plugins.tile_grid.faces import Faces
 from .bodies import Bodies
 from .errors import Findings, RefusedError
 from .fields import ONE_WAY, Fields
+from .formats.model import DIAGONAL, MapData, MapLayer, MapObject, Tile
 from .level import LevelLayer, Tiles
-from .model import DIAGONAL, MapData, MapLayer, MapObject, Tile
 from .plan import Chain, Planned, transform
 from .shapes import Shape, collider_of, is_convex, tile_shapes
 

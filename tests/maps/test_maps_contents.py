@@ -396,8 +396,8 @@ def test_the_same_as_pytiled_parser_reads(tmp_path):
     """An independent reader, of random maps without what it cannot do."""
     pytiled_parser = pytest.importorskip("pytiled_parser")
     from carom.maps.errors import Findings
-    from carom.maps.reading import document
-    from carom.maps.tiled import read_tiled
+    from carom.maps.formats.reading import document
+    from carom.maps.formats.tiled import read_tiled
 
     random = np.random.default_rng(8)
     for seed in range(6):

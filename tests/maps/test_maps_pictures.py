@@ -140,6 +140,6 @@ def test_a_missing_image_is_told_once_and_drawn_as_a_box(tmp_path, world):
 
 def test_no_module_of_maps_imports_what_is_heavy():
     """pygame is imported when something is drawn, and nothing else is needed."""
-    roots = {name.partition(".")[0] for path in (ROOT / "maps").glob("*.py") for name in imported(path)}
+    roots = {name.partition(".")[0] for path in (ROOT / "maps").rglob("*.py") for name in imported(path)}
     outside = {name for name in roots if name not in sys.stdlib_module_names}
     assert outside == {"carom", "numpy"}

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .errors import Findings, RefusedError
+from ..errors import Findings, RefusedError
 from .model import DIAGONAL, HORIZONTAL, VERTICAL, MapData, MapLayer, MapObject, Picture, Tile
 from .reading import Node, above_0, document, flag, nodes, number, points, properties, whole, word
 

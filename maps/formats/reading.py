@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .errors import RefusedError
+from ..errors import RefusedError
 
 Node = dict[str, Any]
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .errors import Findings, RefusedError
+from ..errors import Findings, RefusedError
 from .model import HORIZONTAL, VERTICAL, MapData, MapLayer, MapObject, Picture, Tile
 from .reading import Node, Property, above_0, document, nodes, number, whole, word
 from .tiled import LARGEST
