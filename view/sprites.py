@@ -14,6 +14,7 @@ from .camera import Camera
 from .packages import package
 
 KEPT_GONE = 4096  # sprites of bodies that are gone: a restore may bring these back
+MOST_LOOKS = 1000  # surfaces that are kept, though no sprite has them
 MOST_ANGLES = 512  # pictures of a turn
 LARGEST = 4096  # pixels, that a picture is made high or wide
 
@@ -41,7 +42,8 @@ class Sprites:
             raise ValueError(f"Sprites are for worlds in 2D, {world!r} has {world.dimensions} dimensions")
         self.world, self.smooth = world, smooth
         self._most_bytes = int(cache_megabytes * 1e6)
-        self._looks: dict[tuple[int, float, bool], int] = {}
+        self._looks: dict[Any, int] = {}  # by surface, height and whether it is mirrored
+        self._most_looks = MOST_LOOKS
         self._pictures: list[tuple[Any, float, bool]] = []  # by look: the surface, its height in m, whether mirrored
         self._radii = np.zeros(0)  # m, by look, from the middle to a corner
         self._cached: OrderedDict[tuple[int, int, int], Any] = OrderedDict()
@@ -112,11 +114,23 @@ class Sprites:
     def _look_of(self, surface: Any, metres: float, flip: bool) -> int:
         key = id(surface), metres, flip  # the surface is kept, so no other gets its id
         if key not in self._looks:
+            if len(self._pictures) >= self._most_looks:
+                self._forget_looks()
             self._looks[key] = len(self._pictures)
             self._pictures.append((surface, metres, flip))
             width, height = surface.get_size()
             self._radii = np.append(self._radii, metres / height * math.hypot(width, height) / 2)
         return self._looks[key]
+
+    def _forget_looks(self) -> None:
+        """Those that no sprite has any more: games may draw a surface for each frame."""
+        used, self._look[: self._count] = np.unique(self._look[: self._count], return_inverse=True)
+        self._pictures = [self._pictures[look] for look in used.tolist()]
+        self._radii = self._radii[used]
+        self._looks = {(id(surface), *rest): look for look, (surface, *rest) in enumerate(self._pictures)}
+        self._cached.clear()
+        self._cached_bytes = 0
+        self._most_looks = 2 * len(used) + MOST_LOOKS
 
     def remove(self, entity: int) -> None:
         """Take away the sprite of ``entity``; nothing happens if it has none."""

@@ -98,6 +98,19 @@ def test_sprites_of_many_bodies_that_come_and_go_are_forgotten(world, monkeypatc
     assert len(sprites) <= 120
 
 
+def test_surfaces_that_no_sprite_has_any_more_are_forgotten(world, monkeypatch):
+    monkeypatch.setattr("carom.view.sprites.MOST_LOOKS", 20)
+    camera, sprites = Camera((200, 200), scale=40.0), Sprites(world)
+    first, second = ball(world, (-1.0, 0.0)), ball(world, (1.0, 0.0))
+    sprites.add(first, picture(RED, RED))
+    for k in range(300):
+        sprites.add(second, picture((0, k % 200, 255), (0, k % 200, 255)))
+        _, pixels = drawn(sprites, camera)
+        assert tuple(pixels[60, 100]) == RED
+        assert tuple(pixels[140, 100]) == (0, k % 200, 255)
+    assert len(sprites._pictures) <= 30
+
+
 def test_pictures_are_kept_within_a_bound_and_the_later_is_above(world):
     entity, other = ball(world), ball(world)
     camera = Camera((100, 100), scale=40.0)
