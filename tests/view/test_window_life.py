@@ -140,10 +140,15 @@ def test_a_missing_package_is_one_line(monkeypatch):
         package("pyglet", "this")
 
 
-def test_the_sound_card_is_never_opened(player):
+def test_the_sound_card_is_never_opened(monkeypatch):
+    monkeypatch.setenv("SDL_AUDIODRIVER", "dummy")  # else there is none to be opened
+    world, _ = floor_and_ball()
+    player = Player(world)
     player.frame(2)
     assert pygame.display.get_init()
     assert pygame.mixer.get_init() is None
+    player.view.close()
+    world.close()
 
 
 # -- compiling -------------------------------------------------------------------------------------
