@@ -34,6 +34,8 @@ from .faces import FACES, Faces, plugin
 from .materials import MOST, TileMaterial, TileShape, materials_of, table_of
 from .surface import material_touched
 
+ONE_WAY_STRIP = (0.0, 0.875), (1.0, 0.875), (1.0, 1.0), (0.0, 1.0)  # how pictures show a one-way cell, in tiles
+
 # Arguments, checked like fields.
 LOWER = Column(item="vector", owner="TileGridCollider", name="lower")
 
@@ -142,7 +144,19 @@ class TileGridCollider(Collider):
 
     @staticmethod
     def outline(shape, dimensions):
-        return runs_outline(tiles_of_packed(shape.packed), shape.tile_size)
+        cells = cells_of_packed(shape.packed)
+        kinds, one_ways = cells // SHAPE, shape.faces == FACES.index("one_way")
+        full = (cells != 0) & (kinds == TileShape.FULL) & (not one_ways)
+        corners, faces = runs_outline(full, shape.tile_size)
+        corners, faces = [corners], list(faces)
+        for kind in range(1, len(TileShape)):
+            part = np.array(TileShape(kind).corners or ONE_WAY_STRIP)
+            row, x = np.nonzero((kinds == kind) & (one_ways == (kind == TileShape.ONE_WAY)))
+            places = np.stack((x, len(cells) - 1 - row), axis=1) - np.array(cells.shape[::-1]) / 2
+            rows = sum(map(len, corners)) + np.arange(len(part) * len(places)).reshape(-1, len(part))
+            corners.append(shape.tile_size * (places[:, None] + part).reshape(-1, 2))
+            faces.extend(rows)
+        return np.concatenate(corners), faces
 
     @property
     def cells(self) -> np.ndarray:

@@ -44,8 +44,8 @@ class TileShape(IntEnum):
 
     @property
     def corners(self) -> tuple[tuple[float, float], ...]:
-        """(k, 2) in units of a tile's side, of what it fills, counter-clockwise, from the cell's lower left corner; none of a
-        one-way cell."""
+        """(k, 2) in units of a tile's side, from the cell's lower left corner, counter-clockwise around what it fills;
+        none of a one-way cell."""
         if self is TileShape.ONE_WAY:
             return ()
         square = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))

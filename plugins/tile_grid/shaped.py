@@ -160,8 +160,10 @@ def shaped_contact(a, b, d, support, rounding):
 
 
 @part
-def touch_of_segment(segment, b, d, v, times, tile, faces, support, rounding):
-    """(whether, when) a shape that moves by v from d on first touches a segment, between two times."""
+def touch_of_segment(segment, b, motion, times, grid, support, rounding):
+    """(whether, when) a shape that moves by v from d on first touches a segment, between two times. motion: (d, v);
+    grid: (side of a tile, faces)."""
+    (d, v), (tile, faces) = motion, grid
     (time, until), speed, before = times, length(v), times[0]
     for look in range(2 * LOOKS):
         at = add_scaled(d, v, time)
@@ -223,7 +225,7 @@ def shaped_touch(a, b, d, v, support, rounding):
             segment = segment_of(run, tile, middle, ON * tile)
             if not has_face(run, faces):
                 continue
-            hit, when = touch_of_segment(segment, b, d, v, (time, min(until, best)), tile, faces, support, rounding)
+            hit, when = touch_of_segment(segment, b, (d, v), (time, min(until, best)), (tile, faces), support, rounding)
             if hit:
                 best = min(best, when)
         if best <= 1.0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
 from carom.plugins import Physics, tile_grid
 from carom.plugins.tile_grid import TileGridCollider, TileMaterial, TileShape, map_of_text
+from carom.plugins.tile_grid.faces import FACES
 
 G, DT = 10.0, 1 / 60
 WRONG: Any = ({1: 0.5}, [TileMaterial()], {"#": 0.5})
@@ -182,3 +184,17 @@ def test_a_legend_reads_materials_and_shapes():
 def test_what_is_refused(make, match):
     with pytest.raises(ValueError, match=match):
         make()
+
+
+def test_pictures_show_what_each_cell_fills():
+    """A half, three quarters, a quarter of a tile; one-way cells as a strip, on their own collider."""
+    shapes = np.arange(16).reshape(2, 8)
+    areas = []
+    for grid in TileGridCollider.with_one_way(np.ones((2, 8), int), 0.5, shapes=shapes, walls=False):
+        fields = SimpleNamespace(packed=grid.packed, tile_size=0.5, faces=FACES.index(grid.faces))
+        corners, faces = TileGridCollider.outline(fields, 2)
+        rings = [corners[face] for face in faces]
+        areas.append([0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() for x, y in (ring.T for ring in rings)])
+    solid, one_way = (np.array(area) / 0.25 for area in areas)
+    assert np.allclose(solid, [1, *[0.5] * 4, 0.25, 0.75, 0.75, 0.25, 0.75, 0.25, 0.25, 0.75, 0.5, 0.5])
+    assert np.allclose(one_way, 0.125)
