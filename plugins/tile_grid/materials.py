@@ -44,8 +44,7 @@ class TileShape(IntEnum):
 
     @property
     def corners(self) -> tuple[tuple[float, float], ...]:
-        """(k, 2) in units of a tile's side, from the cell's lower left corner, counter-clockwise around what it fills;
-        none of a one-way cell."""
+        """Of what it fills, counter-clockwise, from the cell's lower left corner, of a tile of 1 m; none if ONE_WAY."""
         if self is TileShape.ONE_WAY:
             return ()
         square = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
