@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
+SHOWN = 6  # findings in a message
+
 
 class RefusedError(ValueError):
     """Something in a map that cannot be; whoever knows the place makes a finding of it."""
@@ -24,12 +26,12 @@ class Finding(NamedTuple):
 
 
 class MapError(ValueError):
-    """A map that was refused; ``findings`` has all that was found, the message the first of them."""
+    """A map that was refused; ``findings`` has all that was found, the message the first of them, a line each."""
 
     def __init__(self, findings: list[Finding]) -> None:
-        more = len(findings) - 1
-        others = f" (and {more} more: carom maps check {findings[0].file})" if more else ""
-        super().__init__(f"{findings[0]}{others}")
+        lines = [str(each) for each in findings[:SHOWN]]
+        more = len(findings) - len(lines)
+        super().__init__("\n".join([*lines, f"and {more} more"] if more else lines))
         self.findings = findings
 
 

@@ -207,9 +207,15 @@ def test_all_findings_are_told_at_once(tmp_path):
         "",
     ]
     assert "basic.png is missing" in found[-1].text
-    with pytest.raises(maps.MapError, match="and 4 more: carom maps check") as told:
+    with pytest.raises(maps.MapError) as told:
         maps.load(path, World(Physics(2)))
     assert told.value.findings == found[:-1]
+    assert str(told.value).splitlines() == list(map(str, found[:-1]))
+    many = [thing(k, 9, 9, 5, 5, properties={"mas": 1.0}) for k in range(1, 21)]
+    with pytest.raises(maps.MapError, match=r"and 14 more$"):
+        maps.load(write(path, map_of(6, 4, objects_of(*many))), World(Physics(2)))
+    first, *_ = maps.check(write(path, map_of(6, 4, objects_of())))
+    assert first.text == "nothing in it becomes an entity: give tiles the class Solid"
 
 
 def test_what_the_world_refuses_late_is_taken_back(tmp_path):
@@ -229,7 +235,7 @@ def test_what_the_world_refuses_late_is_taken_back(tmp_path):
 
 def test_plugins_that_are_missing_are_told(tmp_path):
     path = write(tmp_path / "map.tmx", with_object(polygon=U, properties={"mass": 1.0, "spins": True}))
-    with pytest.raises(maps.MapError, match=r"and \d more") as told:
+    with pytest.raises(maps.MapError) as told:
         maps.load(path, World(Physics(2)), (Enemy,))
     text = " ".join(each.text for each in told.value.findings)
     for cure in ("Rotation()", "Parts()", "tile_grid.plugin", "convex_polygon.plugin"):
