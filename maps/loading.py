@@ -81,8 +81,6 @@ def look_at(path: str | Path, known: Vocabulary, level: str | None = None) -> li
         plan = Plan.of(path, known, level)
     except MapError as error:
         return error.findings
-    if not plan.planned and not plan.findings.found:
-        plan.findings.add("nothing in it becomes an entity: give tiles the class Solid")
     for each in missing_images(plan.level):
         plan.findings.add(f"image {each} is missing; what it shows is drawn as boxes")
     return plan.findings.found
