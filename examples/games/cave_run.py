@@ -21,7 +21,7 @@ from carom.plugins.character import Character, Characters, Ladder
 from carom.plugins.parts import Parts
 from carom.plugins.paths import Paths
 from carom.plugins.rotation import Rotation
-from carom.plugins.zones import Water, Zones
+from carom.plugins.zones import Zones
 from carom.view import Camera, Sprites, View
 
 KEYS = ("left", "right", "up", "down", "space")
@@ -56,10 +56,9 @@ class Walker(Component):
 
 
 # What has only a name: of these the map says where they are, and touch() what they do.
-MARKS = "Coin Checkpoint Goal Spikes Drown Lift Crate Switch Door Raft Mill".split()
-Coin, Checkpoint, Goal, Spikes, Drown, Lift, Crate, Switch, Door, Raft, Mill = MARKED = tuple(
-    type(name, (Component,), {"__module__": __name__}) for name in MARKS
-)
+MARKS = ("Coin", "Checkpoint", "Goal", "Spikes", "Drown", "Lift", "Crate", "Switch", "Door", "Raft", "Mill")
+MARKED = [type(name, (Component,), {"__module__": __name__}) for name in MARKS]
+Coin, Checkpoint, Goal, Spikes, Drown, Lift, Crate, Switch, Door, Raft, Mill = MARKED
 COMPONENTS = (Hero, Walker, *MARKED)
 
 
@@ -88,7 +87,7 @@ class Act(System):
             if transform.y < 0.0:
                 die(world)
         for entity, (walker, me, transform) in world.get_components(Walker, Character, Transform):
-            edge = transform.position + (0.5 * walker.way, 0.0)
+            edge = transform.x + 0.5 * walker.way, transform.y
             if me.state == "floor" and (me.on_wall or not world.ray_cast(edge, (0, -1), 0.9, exclude=entity)):
                 walker.way = -walker.way
             me.move = 1.6 * walker.way
@@ -102,19 +101,12 @@ def touch(world, entity, other, normal, speed):
     hero, what = (entity, other) if world.has_component(entity, Hero) else (other, entity)
     if not world.has_component(hero, Hero) or not world.entity_exists(what):
         return
-    game, me = game_of(world), world.component_for_entity(hero, Character)
+    game = game_of(world)
     if world.has_component(what, Coin):
         game.coins += 1
         world.delete_entity(what)
         world.dispatch_event("sound", 900.0)
-    elif world.has_component(what, Walker):
-        if normal[1] * (1 if hero == entity else -1) > 0.6:  # from above
-            world.delete_entity(what)
-            me.velocity = me.velocity[0], 12.0
-            world.dispatch_event("sound", 300.0)
-        else:
-            die(world)
-    elif world.has_component(what, Spikes) or world.has_component(what, Drown):
+    elif any(world.has_component(what, mark) for mark in (Walker, Spikes, Drown)):
         die(world)
     elif world.has_component(what, Checkpoint):
         x, y = world.component_for_entity(what, Transform).position
@@ -124,6 +116,15 @@ def touch(world, entity, other, normal, speed):
             world.dispatch_event("sound", 600.0)
     elif world.has_component(what, Goal) and game.state == "play":
         game.state = "won"
+
+
+def land(world, entity, floor, speed):
+    """A walker dies of boots."""
+    if world.has_component(entity, Hero) and world.has_component(floor, Walker):
+        world.delete_entity(floor)
+        me = world.component_for_entity(entity, Character)
+        me.velocity = me.velocity[0], 12.0
+        world.dispatch_event("sound", 300.0)
 
 
 def die(world):
@@ -149,6 +150,7 @@ def with_rules(world, level, keys=None):
     for name in ("saved", "sound"):
         world.events.define(name)
     world.on("character_hit", lambda *what: touch(world, *what))
+    world.on("landed", lambda *what: land(world, *what))
     world.on("crushed", lambda entity, by: world.has_component(entity, Hero) and die(world))
     return world
 
@@ -163,7 +165,7 @@ def build(settings=None, seed=0, keys=RECORDED):
 
 
 def loaded(path, level):
-    """A world that was saved at a checkpoint; the level, with what is drawn of it, is that of another world of the map."""
+    """A world that was saved at a checkpoint; the level, for what is drawn, is that of another world of the map."""
     return with_rules(World.load(path, *plugins(), components=(*COMPONENTS, Game)), level)
 
 
@@ -193,7 +195,8 @@ class Pictures:
         import pygame
 
         self.world, self.level, self.sprites, self.save = world, world.get_processor(Act).level, Sprites(world), False
-        camera = Camera(scale=TILE, bounds=((0, 0), self.level.size))
+        ((_, (place, _)),) = world.get_components(Transform, Hero)
+        camera = Camera(middle=place.position, scale=TILE, bounds=((0, 0), self.level.size))
         how |= {"controls": False, "outlines": False, "rewind_megabytes": 0, "title": "Cave run"}
         self.view = View(world, camera=camera, sprites=self.sprites, below=self.below, above=self.above, **how)
         self.fonts, self.side = [pygame.font.Font(None, size) for size in (30, 120)], 1
@@ -201,9 +204,9 @@ class Pictures:
         self.tiles = [self.tile(number, step).convert_alpha() for step in range(4) for number in range(10)]
         self.walkers = [self.creature((196, 92, 84), side) for side in (-1, 1)]
         self.heroes = [self.creature((92, 168, 240), side) for side in (-1, 1)]
-        for mark, metres, colours in (
-            (Coin, 0.5, ((150, 110, 30), (250, 210, 80), 99)), (Lift, 0.5, ((70, 78, 92), (150, 162, 184), 4)),
-            (Crate, None, ((96, 62, 30), (176, 124, 68), 4)), (Raft, 0.6, ((84, 56, 30), (160, 112, 60), 6)),
+        for mark, colours in (
+            (Coin, ((150, 110, 30), (250, 210, 80), 99)), (Lift, ((70, 78, 92), (150, 162, 184), 4)),
+            (Crate, ((96, 62, 30), (176, 124, 68), 4)), (Raft, ((84, 56, 30), (160, 112, 60), 6)),
         ):  # fmt: skip
             for entity in self.level.of_class[mark.__name__]:
                 thing = next(each for each in self.level.objects.values() if each.entity == entity)
@@ -256,7 +259,7 @@ class Pictures:
     def below(self, view):
         world, screen, camera = self.world, view.screen, view.camera
         ((hero, (me, place, _)),) = world.get_components(Character, Transform, Hero)
-        camera.follow(place.interpolated_position + (0, 1.5), 1 / 60)
+        camera.follow(place.interpolated_position + np.array((0, 1.5)), 1 / 60)
         screen.fill((26, 22, 34))
         for k in range(40):  # far rocks, which move less
             x = (k * 331 - 0.4 * TILE * camera.middle[0]) % (screen.get_width() + 400) - 200
