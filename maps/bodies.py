@@ -13,11 +13,11 @@ from ..plugins.character import Character
 from ..plugins.parts import parts_from_outline
 from ..plugins.parts.outline import sound_corners
 from ..plugins.paths import MODES, Legs, Path
+from .contents import LevelLayer, LevelObject, LevelSprite
 from .errors import RefusedError
 from .fields import Fields, Sorter, checked
 from .formats.model import MapLayer, MapObject
 from .formats.reading import Property
-from .level import LevelLayer, LevelObject, LevelSprite
 from .plan import Chain, Late, Planned, transform
 from .shapes import Shape, collider_of, is_convex, shape_of, tile_shapes, turned
 

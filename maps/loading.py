@@ -14,13 +14,14 @@ from ..framework.plugins.discovery import find
 from ..plugins import Physics
 from ..systems.shapes.geometry_levels import in_order
 from .bodies import Bodies
+from .contents import LevelLayer
 from .errors import Finding, Findings, MapError, RefusedError
 from .fields import Sorter, Vocabulary
 from .formats.ldtk import is_ldtk, level_names, read_ldtk
 from .formats.model import MapData, MapLayer
 from .formats.reading import Property, document
 from .formats.tiled import read_tiled
-from .level import Level, LevelLayer
+from .level import Level
 from .plan import Maker, Planned
 from .tiles import TileLayers
 

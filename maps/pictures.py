@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from .contents import LevelLayer, LevelSprite
 from .formats.model import DIAGONAL, HORIZONTAL, VERTICAL, Picture
-from .level import Level, LevelLayer, LevelSprite
 
 MOST = 4096  # scaled pictures that are kept
 BOX, EDGE = (120, 120, 130, 160), (70, 70, 80, 255)  # of what has no image
@@ -20,26 +20,30 @@ MISSING = "pygame is missing; it comes with the extra: pip install 'carom[view]'
 
 
 class Pictures:
-    """Draws a level, and makes its sprites; images are read when they are first seen."""
+    """Draws the layers of a level of a ``size`` (width, height) in m, and makes its sprites; images are read when they
+    are first seen."""
 
-    def __init__(self, level: Level) -> None:
+    def __init__(
+        self, layers: dict[str, LevelLayer], pictures: list[Picture], size: tuple[float, float], metres_per_pixel: float
+    ) -> None:
         try:
             self.pygame: Any = importlib.import_module("pygame")
         except ImportError as error:
             raise ImportError(MISSING) from error
-        self.level = level
-        self._sizes = np.array([each.size for each in level.pictures], float).reshape(-1, 2) * self._metres_per_pixel
+        self._layers, self._pictures, self._size = layers, pictures, size
+        self._metres_per_pixel = metres_per_pixel
+        self._sizes = np.array([each.size for each in pictures], float).reshape(-1, 2) * metres_per_pixel
         self._images: dict[Path, Any] = {}
         self._scaled: dict[Any, Any] = {}
 
     def draw(self, surface: Any, camera: Any, layers: Iterable[str] | None, seconds: float) -> None:
-        for name in self.level.layers if layers is None else layers:
-            layer = self.level.layers[name]
+        for name in self._layers if layers is None else layers:
+            layer = self._layers[name]
             if layer.visible and layer.opacity > 0.0:
                 self._layer(layer, surface, camera, seconds)
 
     def add_sprites(self, sprites: Any, layers: Iterable[str] | None) -> None:
-        for z, (name, layer) in enumerate(self.level.layers.items()):
+        for z, (name, layer) in enumerate(self._layers.items()):
             for sprite in layer.sprites if layers is None or name in layers else ():
                 if sprite.entity is not None and sprite.visible:
                     picture, metres = self._sprite(sprite, layer)
@@ -48,7 +52,7 @@ class Pictures:
     # -- layers ----------------------------------------------------------------------------------------
 
     def _layer(self, layer: LevelLayer, surface: Any, camera: Any, seconds: float) -> None:
-        origin = np.array((0.0, self.level.size[1]))  # layers with parallax are at their place with the camera here
+        origin = np.array((0.0, self._size[1]))  # layers with parallax are at their place with the camera here
         shift = (np.asarray(camera.middle) - origin) * (1.0 - np.array(layer.parallax))
         low, high = (corner - shift for corner in camera.visible)
         blits: list[tuple[Any, tuple[int, int]]] = []
@@ -92,10 +96,10 @@ class Pictures:
     def _image(
         self, layer: LevelLayer, camera: Any, shift: Any, low: Any, high: Any
     ) -> list[tuple[Any, tuple[int, int]]]:
-        picture = self.level.pictures[layer.picture]
+        picture = self._pictures[layer.picture]
         width, height = picture.size if all(picture.size) else self._part(picture).get_size()
         size = np.array((width, height)) * self._metres_per_pixel
-        corner = np.array((layer.offset[0], self.level.size[1] + layer.offset[1] - size[1]))  # the lower left one
+        corner = np.array((layer.offset[0], self._size[1] + layer.offset[1] - size[1]))  # the lower left one
         counts = []
         for k, repeats in enumerate(layer.repeat):
             first, last = math.floor((low[k] - corner[k]) / size[k]), math.floor((high[k] - corner[k]) / size[k])
@@ -114,13 +118,9 @@ class Pictures:
 
     # -- pictures --------------------------------------------------------------------------------------
 
-    @property
-    def _metres_per_pixel(self) -> float:
-        return self.level.metres / self.level.tile_pixels
-
     def _frame(self, number: int, seconds: float) -> int:
         """The picture that an animation shows then."""
-        frames = self.level.pictures[number].frames
+        frames = self._pictures[number].frames
         if not frames:
             return number
         left = seconds % sum(each[0] for each in frames) if seconds else 0.0
@@ -135,7 +135,7 @@ class Pictures:
         key = "sprite", sprite.picture, sprite.flips, sprite.size, round(sprite.angle, 9), layer.opacity, layer.tint
 
         def made() -> Any:
-            own = self._part(self.level.pictures[sprite.picture]).get_size() if sprite.picture >= 0 else (16, 16)
+            own = self._part(self._pictures[sprite.picture]).get_size() if sprite.picture >= 0 else (16, 16)
             w, h = own[::-1] if sprite.flips & DIAGONAL else own
             w = max(1, round(h * sprite.size[0] / sprite.size[1]))
             look = self._look(sprite.picture, sprite.flips, (w, h), layer.opacity, layer.tint)
@@ -148,7 +148,7 @@ class Pictures:
         """A picture, flipped, of that many pixels."""
 
         def made() -> Any:
-            pygame, part = self.pygame, self._part(self.level.pictures[number] if number >= 0 else None)
+            pygame, part = self.pygame, self._part(self._pictures[number] if number >= 0 else None)
             if flips & DIAGONAL:
                 part = pygame.transform.flip(pygame.transform.rotate(part, 90), False, True)
             if flips & (HORIZONTAL | VERTICAL):

@@ -12,9 +12,10 @@ from ..components import Collider, Transform
 from ..framework import CaromError, Component, World
 from ..plugins.parts import PartOf
 from ..plugins.terrain import ChainSegmentCollider, create_chain
+from .contents import LevelLayer, LevelObject, LevelSprite
 from .errors import Finding, MapError
 from .fields import Reference
-from .level import Level, LevelLayer, LevelObject, LevelSprite
+from .level import Level
 
 
 @dataclass

@@ -10,10 +10,10 @@ import numpy as np
 from ..plugins.tile_grid import TileGridCollider, TileMaterial, TileShape
 from ..plugins.tile_grid.faces import Faces
 from .bodies import Bodies
+from .contents import LevelLayer, Tiles
 from .errors import Findings, RefusedError
 from .fields import ONE_WAY, Fields
 from .formats.model import DIAGONAL, MapData, MapLayer, MapObject, Tile
-from .level import LevelLayer, Tiles
 from .plan import Chain, Planned, transform
 from .shapes import Shape, collider_of, is_convex, tile_shapes
 
