@@ -1,8 +1,7 @@
-"""What shows a world, by its dimensions and by what is installed."""
+"""What shows a world, by its dimensions."""
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -30,15 +29,3 @@ def painter_of(world: World) -> Any:
     from .space.painter import SpacePainter
 
     return SpacePainter()
-
-
-def view_class(world: World, filmed: bool = False) -> Any:
-    """:class:`View`; where pygame-ce is missing and pyglet is there :class:`PygletView`, for worlds in 2D that are not
-    ``filmed``."""
-    if world.dimensions == 2 and not filmed and find_spec("pygame") is None and find_spec("pyglet") is not None:
-        from .pyglet_window import PygletView
-
-        return PygletView
-    from .pygame_window import View
-
-    return View

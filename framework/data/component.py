@@ -39,6 +39,7 @@ class Component:
     # What an entity that has it gets too, if it has none: their types, and what of their values in d dimensions.
     brings: ClassVar[Mapping[type[Component], Callable[[int], dict[str, Any]]]] = {}
     plugin: ClassVar[str] = ""  # the plugin without which it does nothing
+    plugin_class: ClassVar[str] = ""  # what games write for it, where that is not its name with a capital
     until_frame_ends: ClassVar[tuple[str, ...]] = ()  # columns of a push from outside, and of the frame that it is of
     _abstract: ClassVar[bool] = True
     _largest: ClassVar[float] = LARGEST  # magnitude of the numbers in its fields

@@ -181,8 +181,8 @@ class Registry:
         said = f"{'' if entity is None else f'entity {entity}: '}{component.__name__} does nothing without "
         holder = next((plugin for plugin in self.plugins if plugin.name == needed), None)
         if holder is None:
-            plugin = f"its plugin: World(Physics(...), {needed.capitalize()}()), from carom.plugins.{needed}"
-            raise ValueError(said + plugin)
+            written = component.plugin_class or needed.capitalize()
+            raise ValueError(f"{said}its plugin: World(Physics(...), {written}()), from carom.plugins.{needed}")
         if holder.components and component not in (*holder.components, *self.joints):
             raise ValueError(f"{said}the plugin that registers it with @plugin.joint: World(..., Joints(), plugin)")
 

@@ -33,6 +33,7 @@ class Loaded:
 
     seconds, view, settings: those that it recommends
     compared: compared(world) -> dict: what a game is judged by
+    level_of: level_of(world): of a map, which has pictures of its own
     """
 
     name: str
@@ -43,6 +44,7 @@ class Loaded:
     settings: Settings | None = None
     siblings: Siblings | None = None
     compared: Any = None
+    level_of: Any = None
 
     def build(
         self, settings: Settings | None, changes: Mapping[str, Any], seed: int, plugins: Sequence[Plugin] = ()
@@ -141,15 +143,18 @@ def load(target: str) -> Loaded:
 def _load_map(path: Path) -> Loaded:
     """A map, in a world with the plugins that it needs; of an LDtk project its first level."""
 
+    levels: weakref.WeakKeyDictionary[World, maps.Level] = weakref.WeakKeyDictionary()
+
     def build(settings: Settings | None = None, seed: int = 0) -> World:
-        return maps.world_of(path, settings=settings, level=level)[0]
+        world, levels[world] = maps.world_of(path, settings=settings, level=level)
+        return world
 
     try:
         level = next(iter(maps.levels_of(path)), None)
         size = maps.world_of(path, level=level)[1].size
     except maps.MapError as error:
         raise Problem(one_line(error)) from error
-    return Loaded(path.name, build, path.resolve(), view=((0.0, 0.0), size))
+    return Loaded(path.name, build, path.resolve(), view=((0.0, 0.0), size), level_of=levels.__getitem__)
 
 
 def import_file(path: Path) -> ModuleType:

@@ -27,7 +27,7 @@ DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
 
 
 @click.command("run", short_help="Run a scene or a file and show what happened.")
-@click.argument("target", metavar="SCENE|FILE.py")
+@click.argument("target", metavar="SCENE|FILE")
 @click.option("--steps", type=click.IntRange(min=0), help="How many steps to take.")
 @click.option("--seconds", type=NOT_NEGATIVE, help="How long to simulate (default: what the scene recommends).")
 @world_options
@@ -118,18 +118,35 @@ def _film_of(world: World, file: Path, view: Corners | None) -> Any:
         raise Problem(f"--record: {one_line(error)}") from error
 
 
+def _pictures_of(level: Any, world: World) -> Any:
+    """Paints the pictures of a map over the shapes in a window."""
+    from ...view import Sprites
+
+    sprites = Sprites(world)
+    level.add_sprites(sprites)
+
+    def paint(view: Any) -> None:
+        level.draw(view.screen, view.camera, seconds=world.time)
+        sprites.draw(view.screen, view.camera)
+
+    return paint
+
+
 def _show(world: World, loaded: Loaded, view: Corners | None, record: Path | None, seconds: float | None) -> None:
     """In a window, until it is closed or so many seconds are simulated."""
     try:
-        from ...view.choice import camera_of, view_class
+        from ...view.backends import view_class
+        from ...view.choice import camera_of
 
         camera = None
         if view is not None:
             camera = camera_of(world)
             camera.fit(*view)
         with loaded.attribute_errors(), stdout_kept_clean():
-            filmed = {} if record is None else {"record": record}
-            shown = view_class(world, bool(filmed))(world, camera=camera, title=f"carom: {loaded.name}", **filmed)
+            wanted = {} if record is None else {"record": record}
+            if loaded.level_of is not None:
+                wanted["above"] = _pictures_of(loaded.level_of(world), world)
+            shown = view_class(world, bool(wanted))(world, camera=camera, title=f"carom: {loaded.name}", **wanted)
             shown.run(math.inf if seconds is None else seconds)
     except CaromError as error:
         raise Problem(one_line(error)) from error

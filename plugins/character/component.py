@@ -51,6 +51,7 @@ class Ladder(Component):
 
     __slots__ = ()
     plugin: ClassVar[str] = "character"
+    plugin_class: ClassVar[str] = "Characters"
 
 
 class Character(Component):
@@ -123,6 +124,7 @@ class Character(Component):
 
     __slots__ = ()
     plugin: ClassVar[str] = "character"
+    plugin_class: ClassVar[str] = "Characters"
     needs: ClassVar[tuple[type[Component], ...]] = (RigidBody,)
 
     move: RotationField = column(0.0, item="angular", unit="m/s")

@@ -100,7 +100,10 @@ def test_3d_is_drawn_too(carom, tmp_path, ball):
     )
     box = "    world.create_entity(Transform((3, 5, 1)), RigidBody(), AABBCollider(half_extents=(1, 0.5, 2)))"
     ball.write_text(text.replace("    return world", f"{box}\n    return world"))
-    report = report_of(carom("run", "ball.py", "--steps", "30", "--record", "ball.webp", "--json"))
+    filmed = carom("run", "ball.py", "--steps", "30", "--record", "ball.webp", "--json")
+    if "drawn by OpenGL" in filmed.stderr:
+        pytest.skip(filmed.stderr)
+    report = report_of(filmed)
     assert report["dimensions"] == 3
     assert [Path(p).name for p in report["pictures"]] == ["ball-final.png", "ball-traces.png", "ball.webp"]
     assert all((tmp_path / p).is_file() for p in report["pictures"])

@@ -34,6 +34,7 @@ from carom import (
     create_height_field,
 )
 from carom.framework import StepError
+from carom.plugins import Physics
 from carom.plugins.character import Character, Ladder
 from carom.plugins.rotation import BoxCollider
 
@@ -1177,3 +1178,8 @@ def test_no_up_and_two_speeds_of_a_jump_are_refused():
         stage.me.up = 0.0, 0.0, 0.0
     with pytest.raises(ValueError, match="jump_speed or a jump_height"):
         stage.character(0.0, 9.0, jump_speed=9.0, jump_height=1.0)
+
+
+def test_a_forgotten_plugin_is_named_as_games_write_it():
+    with pytest.raises(ValueError, match=r"Character does nothing without its plugin: World\(.*, Characters\(\)\)"):
+        World(Physics(2)).create_entity(Transform((0, 0)), Character())

@@ -8,7 +8,7 @@ import pytest
 
 from carom import AABBCollider, Physics, RigidBody, Rotation, SphereCollider, Spin, Transform, World
 from carom.drawing import Drawing, Style
-from carom.view.choice import view_class
+from carom.view.backends import view_class
 from carom.view.plane.triangles import disc_corners, polygon_corners, polygon_edges
 
 
