@@ -23,6 +23,7 @@ from .surface import code_of
 FULL, UPPER_HALF, ONE_WAY = int(TileShape.FULL), int(TileShape.UPPER_HALF), int(TileShape.ONE_WAY)
 NO_TILE = -1
 BOTTOM, RIGHT, TOP, LEFT, LINE, EDGES = range(6)
+BEYOND, AT, BEFORE = range(3)  # where a run ends: at an inner corner it reaches into what follows
 LOWER, UPPER, WHOLE = 1, 2, 3  # halves of a side; of BOTTOM and TOP the left and the right one
 SIDES = (  # of each TileShape: which halves of BOTTOM, RIGHT, TOP, LEFT it fills
     (3, 3, 3, 3), (3, 3, 0, 0), (3, 0, 0, 3), (0, 0, 3, 3), (0, 3, 3, 0),
@@ -33,8 +34,8 @@ SIDES = (  # of each TileShape: which halves of BOTTOM, RIGHT, TOP, LEFT it fill
 FILLED = tuple(bottom | right << 2 | top << 4 | left << 6 for bottom, right, top, left in SIDES)
 ACROSS = tuple(x0 | y0 << 2 | x1 << 4 | y1 << 6 for x0, y0, x1, y1 in LINES)  # lines; 0: none
 
-# The edges before and after, 0, 0 where there is none. short: it ends a little before that corner, since at the same
-# point there is another corner of the outline, whose bodies it must not reach.
+# The edges before and after, 0, 0 where there is none. short: it ends AT that corner, or a little BEFORE it, since it
+# must not reach bodies that are at another corner of the outline in the same point, or on a one-way cell.
 Run = collections.namedtuple("Run", "x0 y0 x1 y1 before_x before_y after_x after_y short_start short_end")
 
 
@@ -124,6 +125,14 @@ def joined(grid, x, y, ux, uy, forward):
 
 
 @plugin.kernel
+def end_of(turn, pinched):
+    """Where a run ends at a corner that is one of several in that point."""
+    if not pinched or turn <= 0.0:
+        return BEYOND
+    return AT if turn <= 1.0 else BEFORE
+
+
+@plugin.kernel
 def on_map(cells, x, y):
     """Whether a point is in a rectangle of cells, or on its border."""
     return 2 * cells[0] <= x <= 2 * cells[2] and 2 * cells[1] <= y <= 2 * cells[3]
@@ -135,13 +144,13 @@ def run_from(grid, cells, start, end):
     (x0, y0), (x1, y1) = start, end
     ux, uy = x1 - x0, y1 - y0
     turn, before_x, before_y, pinched = joined(grid, x0, y0, ux, uy, False)
-    short_start = pinched and turn > 1.0
+    short_start = end_of(turn, pinched)
     begins = not (turn == 0.0 and on_map(cells, x0 - before_x, y0 - before_y))
     turn, after_x, after_y, pinched = joined(grid, x1, y1, ux, uy, True) if begins else (0.0, 0, 0, False)
     while begins and turn == 0.0 and on_map(cells, x1 + after_x, y1 + after_y):
         x1, y1 = x1 + after_x, y1 + after_y
         turn, after_x, after_y, pinched = joined(grid, x1, y1, ux, uy, True)
-    short_end = pinched and turn > 1.0
+    short_end = end_of(turn, pinched)
     return begins, beside_one_way(
         grid, Run(x0, y0, x1, y1, before_x, before_y, after_x, after_y, short_start, short_end)
     )
@@ -157,12 +166,12 @@ def beside_one_way(grid, run):
         if ux > 0 and before_x == 0 and before_y > 0 and is_one_way_cell(grid, (x0 >> 1) - 1, (y0 >> 1) - 1):
             before_x, before_y = 2, 0
         elif ux == 0 and uy < 0 and before_x > 0 and is_one_way_cell(grid, x0 >> 1, (y0 >> 1) - 1):
-            before_x, before_y, short_start = 0, -1, True
+            before_x, before_y, short_start = 0, -1, BEFORE
     if x1 & 1 == 0 and y1 & 1 == 0:
         if ux > 0 and after_x == 0 and after_y < 0 and is_one_way_cell(grid, x1 >> 1, (y1 >> 1) - 1):
             after_x, after_y = 2, 0
         elif ux == 0 and uy > 0 and after_x > 0 and is_one_way_cell(grid, (x1 >> 1) - 1, (y1 >> 1) - 1):
-            after_x, after_y, short_end = 0, 1, True
+            after_x, after_y, short_end = 0, 1, BEFORE
     return Run(x0, y0, x1, y1, before_x, before_y, after_x, after_y, short_start, short_end)
 
 
@@ -183,7 +192,7 @@ def one_way_run(grid, cells, x, y):
         turn, after_x, after_y, _ = joined(grid, x1, top, 2, 0, True)
         if turn <= -2.0 or after_x < 0:
             after_x, after_y = 0, 0
-    return begins, Run(x0, top, x1, top, before_x, before_y, after_x, after_y, False, False)
+    return begins, Run(x0, top, x1, top, before_x, before_y, after_x, after_y, BEYOND, BEYOND)
 
 
 @part
@@ -191,7 +200,7 @@ def next_run(grid, cells, one_way, at):
     """(the number of the next edge to look at, whether there is a run, Run): the next run within a rectangle of cells
     from edge number ``at`` on; of one-way cells alone, or of all others."""
     x0, y0, x1, y1 = cells
-    width, run = x1 - x0, Run(0, 0, 0, 0, 0, 0, 0, 0, False, False)
+    width, run = x1 - x0, Run(0, 0, 0, 0, 0, 0, 0, 0, BEYOND, BEYOND)
     count = width * (y1 - y0) * EDGES
     while at < count:
         cell, k = at // EDGES, at % EDGES

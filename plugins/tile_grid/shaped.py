@@ -15,19 +15,17 @@ from ..terrain.segment import BEHIND as SEGMENT_BEHIND
 from ..terrain.segment import FOLDED, contact_of_segment
 from .contact import around, box_on_map, cells_under, deepest_contact
 from .faces import ALL, FLOORS, ONE_WAYS, plugin
-from .outline import any_shaped, is_inside, next_run
+from .outline import AT, BEYOND, any_shaped, is_inside, next_run
 from .rectangles import grid_of
 from .shapes import core_of
 from .surface import first_code
 from .sweep import LOOKS, ROUNDING, first_touch
 
 RING = 1  # cells around a shape in which runs are looked for
-NEAR = 0.1  # of a tile: a face that is nearer is the contact, whatever else is near
-MISSED = 0.05  # of a tile: what is beside all faces counts as so far away, so that nothing rests on it
 BEHIND, ON = 0.1, 1e-6  # of a tile: how far the centre of a body in a tile, or of another, may be behind a face that
 # pushes it out
 SUNK = 0.02  # of a tile: by how much a body may have sunk into a one-way cell
-STRIDE = 0.01  # of a tile: the least way between two looks at a face that a shape is not over
+STRIDE, LONGEST = 0.01, 0.1  # of a tile: ways between two looks at a face that a shape is not over
 TOUCHED = 8  # faces that a shape touches at once
 PARALLEL = 1.0 - 1e-9  # cosine: faces that lean less from each other are one
 OPPOSED = -0.1  # cosine: between faces that lean more against each other nothing is pushed out aside
@@ -50,6 +48,14 @@ def is_shaped(packed):
     return start < grid[4] and packed[start + 1, 0] > 0.0
 
 
+@plugin.kernel
+def cut_of(short, sunk):
+    """The part of its length by which a run is cut at an end: a segment reaches beyond an inner corner by FOLDED."""
+    if short == BEYOND:
+        return 0.0
+    return min(0.45, FOLDED if short == AT else FOLDED + sunk)
+
+
 @part
 def segment_of(run, tile, middle, behind):
     """A run of the outline as a segment of a chain, relative to the map's middle; behind: how far behind it the centre
@@ -59,16 +65,14 @@ def segment_of(run, tile, middle, behind):
         (half * run.x0 - middle[0], half * run.y0 - middle[1]),
         (half * run.x1 - middle[0], half * run.y1 - middle[1]),
     )
-    if run.short_start or run.short_end:  # a body that has sunk into the cell beside it comes over it
-        way = sub(end, start)
-        cut = scale(way, min(0.5, FOLDED + SUNK * tile / length(way)))
-        start = add(start, cut) if run.short_start else start
-        end = sub(end, cut) if run.short_end else end
+    way, sunk = sub(end, start), SUNK * tile / length(sub(end, start))  # a body that has sunk in is not met
+    start = add_scaled(start, way, cut_of(run.short_start, sunk))
+    end = add_scaled(end, way, 0.0 - cut_of(run.short_end, sunk))
     before = sub(start, (half * run.before_x, half * run.before_y))
     after = add(end, (half * run.after_x, half * run.after_y))
-    if run.short_start:
+    if run.short_start != BEYOND:
         before = add_scaled(start, sub(start, end), 1e-3)
-    if run.short_end:
+    if run.short_end != BEYOND:
         after = add_scaled(end, sub(end, start), 1e-3)
     return Segment(start, end, before, after, behind - SEGMENT_BEHIND * length(sub(end, start)))
 
@@ -82,12 +86,12 @@ def reach_of_shape(b, at, tile, size, support, rounding):
 
 @part
 def outline_contact(a, b, d, cells, support, rounding):
-    """The contact with the runs within a rectangle of cells; a miss is by no more than a tile."""
+    """The contact with the runs within a rectangle of cells: with the deepest face, or the nearest, that the shape is
+    over; what it is not over is as far as a tile, so that nothing is held by what is beside its way."""
     grid, tile = grid_of(a.packed), a.tile_size
     middle = (0.5 * grid[1] * tile, 0.5 * grid[2] * tile)
     touched, count = stack_array(TOUCHED, (0.0, 0.0, 0.0, 0.0, 0.0)), 0
     depth, normal, point, first = -tile, (0.0, 1.0), d, -1  # of the best of the faces that it is over
-    beside, other = -tile, (0.0, 1.0)  # of the nearest of all others
     one_way, at = a.faces == ONE_WAYS, 0
     behind = (BEHIND if one_way or is_inside(grid, tile, add(d, middle)) else ON) * tile
     while True:
@@ -98,8 +102,6 @@ def outline_contact(a, b, d, cells, support, rounding):
             continue
         over, deep, n, p = contact_of_segment(segment_of(run, tile, middle, behind), b, d, support, rounding)
         if not over:
-            if deep > beside:
-                beside, other = deep, n
             continue
         if deep >= 0.0 and count < TOUCHED:
             touched[count, 0], touched[count, 1], touched[count, 2] = deep, n[0], n[1]
@@ -115,11 +117,7 @@ def outline_contact(a, b, d, cells, support, rounding):
         if count > 1 and not one_way:
             depth, normal = both_ways(touched, count, first)
         return True, depth, normal, point
-    if depth >= -NEAR * tile:
-        return False, depth, normal, point
-    if depth >= beside:
-        return False, depth, normal, point
-    return False, min(beside, -MISSED * tile), other, point
+    return False, depth, normal, point
 
 
 @part
@@ -170,7 +168,7 @@ def touch_of_segment(segment, b, motion, times, grid, support, rounding):
         over, deep, n, _ = contact_of_segment(segment, b, at, support, rounding)
         if not over:
             before = time
-            time += min(max(-deep, STRIDE * tile), NEAR * tile) / speed
+            time += min(max(-deep, STRIDE * tile), LONGEST * tile) / speed
         else:
             rate = -dot(v, n)
             if look == 0 and faces == ONE_WAYS and deep > SUNK * tile:
