@@ -47,7 +47,7 @@ class Pieces:
             self._radii = np.concatenate((self._radii, *(np.full(len(rings), radius) for rings, radius in self._new)))
             self._new = []
         known = np.minimum(outlines, len(self._first) - 1)
-        count = np.where(outlines < len(self._first), self._count[known], 0)
+        count = np.where(outlines < len(self._first), self._count[known], 0).astype(np.intp)  # as repeat wants it
         shape = np.repeat(np.arange(len(outlines)), count)
         piece = np.arange(len(shape)) + np.repeat(self._first[known] - np.cumsum(count) + count, count)
         return shape, self._rings[piece], self._radii[piece]

@@ -19,7 +19,7 @@ from .errors import BuildError
 from .kernels import collect
 from .linker import linker_for
 from .page import PLATFORM as WEB
-from .page import build_page, files_of
+from .page import build_page, files_added, files_of
 from .platforms import PLATFORMS
 
 
@@ -36,11 +36,16 @@ from .platforms import PLATFORMS
     "--web", type=click.Path(path_type=Path, file_okay=False), metavar="FOLDER",
     help="Make a page of the first file there, with all kernels that worlds of all files need.",
 )
+@click.option(
+    "--add", "added", multiple=True, type=click.Path(path_type=Path), metavar="PATH",
+    help="For a page: a file or a folder that the game reads, such as a map with its images; once each.",
+)  # fmt: skip
 @click.option("--pyodide", metavar="URL", help="Where the page finds Pyodide with numpy; else pyodide beside it.")
 @traceback_option
 def build_command(
-    games: tuple[str, ...], out: Path | None, names: tuple[str, ...], web: Path | None, pyodide: str | None
-) -> None:
+    games: tuple[str, ...], out: Path | None, names: tuple[str, ...], web: Path | None, added: tuple[Path, ...],
+    pyodide: str | None,
+) -> None:  # fmt: skip
     """Compile all kernels that worlds of these files may call and carom's own library lacks.
 
     Without files: all that ships with carom, into carom's own folder. In a checkout, what is not edited then compiles
@@ -52,9 +57,11 @@ def build_command(
         raise Problem("--web makes a page of a game: name its file, without --out and --platform")
     if pyodide is not None and web is None:
         raise Problem("--pyodide is for a page: --web FOLDER")
+    if added and web is None:
+        raise Problem("--add is for a page: --web FOLDER; a packed folder gets its files by the packer")
     if web is not None:
         with _told():
-            _page(games, web, pyodide or "pyodide")
+            _page(games, web, added, pyodide or "pyodide")
         return
     if not names and platform_name() not in PLATFORMS:
         raise Problem(f"carom builds for {', '.join(PLATFORMS)}; this machine is {platform_name()}")
@@ -72,9 +79,10 @@ def build_command(
             click.echo(f"{path}: {len(kernels)} kernels, {path.stat().st_size / 1e6:.2f} MB")
 
 
-def _page(games: tuple[str, ...], folder: Path, pyodide: str) -> None:
+def _page(games: tuple[str, ...], folder: Path, added: tuple[Path, ...], pyodide: str) -> None:
     linker_for(WEB)  # before anything compiles
     files = files_of(games)
+    files_added(added, next(iter(files.values())).resolve(), files)
     kernels = collect(games, "generic", everything=True)
     build_page(kernels, files, folder, pyodide)
     size = sum(file.stat().st_size for file in folder.iterdir() if file.is_file())

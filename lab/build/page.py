@@ -30,7 +30,8 @@ PLATFORM = PLATFORMS["wasm32"]
 ABIS = tuple(re.findall(r"\d{4}_\d", PLATFORM.wheel_tag))  # of Pyodide, one after the other
 
 _WEB, _PACKAGE = Path(__file__).with_name("web"), Path(carom.__file__).parent
-_ROOMS = ("framework", "components", "systems", "plugins", "scenes")  # the lab is no part of a game
+# The lab is no part of a game; cameras, lists to draw and maps need nothing that a page lacks.
+_ROOMS = ("framework", "components", "systems", "plugins", "drawing", "maps", "view", "scenes")
 
 
 def files_of(games: Sequence[str]) -> dict[str, Path]:
@@ -51,6 +52,21 @@ def files_of(games: Sequence[str]) -> dict[str, Path]:
             if files.setdefault(name.as_posix(), file) != file:
                 raise BuildError(f"{file} and {files[name.as_posix()]} cannot both be on a page; rename one")
     return files
+
+
+def files_added(added: Sequence[Path], game: Path, files: dict[str, Path]) -> None:
+    """Add what a game reads: files, and all that folders hold, under their names from the game's folder on.
+
+    BuildError for what is not there, or elsewhere.
+    """
+    for path in added:
+        if not path.exists():
+            raise BuildError(f"--add {path}: there is no such file or folder")
+        for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+            if not file.resolve().is_relative_to(game.parent):
+                raise BuildError(f"--add {file}: it is not in the game's folder, {game.parent}, or a folder in that")
+            if file.is_file():
+                files.setdefault(file.resolve().relative_to(game.parent).as_posix(), file)
 
 
 def build_page(kernels: Sequence[BuiltKernel], files: Mapping[str, Path], folder: Path, pyodide: str) -> None:

@@ -118,8 +118,27 @@ try:
     world.prepare()
 except Exception as error:
     print("capsule", type(error).__name__, error)
+from carom import maps
+from carom.drawing import Drawing
+from carom.view import Camera
+
+world, level = maps.world_of("/game/maps/level.tmj")
+shown = Drawing(world).update(interpolated=False)
+camera = Camera((320, 240))
+camera.fit((0, 0), level.size)
+print("map", level.size, shown.fixed[0].points[0].tolist(), camera.to_screen(level.points["start"]).tolist())
 print(len(log.compiled), "compiled")
 """
+
+LEVEL = {
+    "type": "map", "version": "1.10", "orientation": "orthogonal", "infinite": False, "width": 4, "height": 3,
+    "tilewidth": 16, "tileheight": 16, "tilesets": [], "layers": [{
+        "type": "objectgroup", "id": 1, "name": "things", "objects": [
+            {"id": 1, "name": "start", "point": True, "x": 16, "y": 16, "width": 0, "height": 0, "rotation": 0},
+            {"id": 2, "name": "floor", "x": 0, "y": 32, "width": 64, "height": 16, "rotation": 0},
+        ],
+    }],
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -159,6 +178,8 @@ def games(tmp_path_factory) -> Path:
     (folder / "jewels.py").write_text(game_of_the_page(), encoding="utf-8")
     (folder / "windy.py").write_text(WINDY, encoding="utf-8")
     (folder / "deep.py").write_text("from carom.scenes.rest.pile3d import build\n", encoding="utf-8")
+    (folder / "maps").mkdir()
+    (folder / "maps" / "level.tmj").write_text(json.dumps(LEVEL), encoding="utf-8")
     (folder / "play.py").write_text(PLAY, encoding="utf-8")
     (folder / "all.py").write_text(f"{WITHOUT}\n{PLAY}\n{MORE}", encoding="utf-8")
     return folder
@@ -167,7 +188,7 @@ def games(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def printed(node, pyodide, games) -> list[str]:
     """What these games print under node."""
-    done = run_carom("build", "--web", "page", "jewels.py", "windy.py", "deep.py", cwd=games)
+    done = run_carom("build", "--web", "page", "--add", "maps", "jewels.py", "windy.py", "deep.py", cwd=games)
     if "there is no linker" in done.stderr:
         pytest.skip(done.stderr)
     assert done.returncode == 0, done.stderr
@@ -201,6 +222,11 @@ def test_worlds_and_errors_of_kernels_are_those_of_a_machine(printed, games):
 def test_a_game_with_build_alone_runs(printed):
     (said,) = starting(printed, "frame")
     assert re.fullmatch(r"frame 0\.0 s, 2 steps, state [0-9a-f]{64}", said)
+
+
+def test_maps_that_were_added_cameras_and_lists_to_draw_are_on_a_page(printed):
+    (said,) = starting(printed, "map")
+    assert said == "map (4.0, 3.0) [[0.0, 0.0], [4.0, 0.0], [4.0, 1.0], [0.0, 1.0]] [84.0, 82.0]"
 
 
 def test_what_was_not_built_is_an_error_and_never_plain_python(printed):
@@ -244,6 +270,9 @@ def test_a_pyodide_that_will_not_do_is_told_in_a_line(node, tmp_path, abi, words
     (["--web", "page"], "--web makes a page of a game: name its file"),
     (["--web", "page", "--platform", "win-amd64", "game.py"], "without --out and --platform"),
     (["--pyodide", "there", "game.py"], "--pyodide is for a page: --web FOLDER"),
+    (["--add", "game.py", "game.py"], "--add is for a page: --web FOLDER"),
+    (["--web", "page", "--add", "no.tmx", "game.py"], "--add no.tmx: there is no such file or folder"),
+    (["--web", "page", "--add", "..", "game.py"], "it is not in the game's folder"),
     (["--web", "page", "pile2d"], "pile2d is a scene of carom's own: a page is made of a file"),
     (["--web", "page", "esper.py"], "a page has another module of that name; rename it"),
 ])  # fmt: skip

@@ -29,8 +29,12 @@ export async function load(page, place, indexURL, read, say, print) {
 // Where there is none it is older than any that is known here: then the version of Emscripten tells it.
 const ABI = 'import sysconfig, platform; sysconfig.get_config_var("PYODIDE_ABI_VERSION") or platform.release()';
 
-// What a player can tell the game's maker, in one line: of a traceback the error itself, with its notes.
+// What a player can tell the game's maker, in one line: of a traceback the error itself, with its notes, and the last
+// line of the game's own files that it came through.
 export function reason(error) {
   const lines = String(error.message ?? error).trim().split('\n');
-  return lines.slice(lines.findLastIndex((line) => line.startsWith('  ')) + 1).join('; ');
+  const own = /^ +File "\/game\/((?!carom\/|esper\/|carom_page)[^"]+)", line (\d+)/;
+  const where = lines.map((line) => line.match(own)).filter(Boolean).at(-1);
+  const said = lines.slice(lines.findLastIndex((line) => line.startsWith('  ')) + 1).join('; ');
+  return where ? `${where[1]}, line ${where[2]}: ${said}` : said;
 }
