@@ -10,12 +10,12 @@ import math
 
 from ...framework.compilation import part
 from ...framework.jit.stack_arrays import stack_array
-from ...framework.vectors import add, add_scaled, divided, dot, length, scale, sub
+from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
 from ..terrain.segment import BEHIND as SEGMENT_BEHIND
-from ..terrain.segment import FOLDED, contact_of_segment
+from ..terrain.segment import FOLDED, contact_of_segment, cross
 from .contact import around, box_on_map, cells_under, deepest_contact
 from .faces import ALL, FLOORS, ONE_WAYS, plugin
-from .outline import AT, BEYOND, any_shaped, is_inside, next_run
+from .outline import BEFORE, BEYOND, any_shaped, is_inside, next_run
 from .rectangles import grid_of
 from .shapes import core_of
 from .surface import first_code
@@ -24,6 +24,7 @@ from .sweep import LOOKS, ROUNDING, first_touch
 RING = 1  # cells around a shape in which runs are looked for
 BEHIND, ON = 0.1, 1e-6  # of a tile: how far the centre of a body in a tile, or of another, may be behind a face that
 # pushes it out
+REACH = 0.1  # of a tile: how far a face reaches into what follows an inner corner, if nothing is there
 SUNK = 0.02  # of a tile: by how much a body may have sunk into a one-way cell
 STRIDE, LONGEST = 0.01, 0.1  # of a tile: ways between two looks at a face that a shape is not over
 TOUCHED = 8  # faces that a shape touches at once
@@ -48,12 +49,22 @@ def is_shaped(packed):
     return start < grid[4] and packed[start + 1, 0] > 0.0
 
 
-@plugin.kernel
-def cut_of(short, sunk):
-    """The part of its length by which a run is cut at an end: a segment reaches beyond an inner corner by FOLDED."""
-    if short == BEYOND:
-        return 0.0
-    return min(0.45, FOLDED if short == AT else FOLDED + sunk)
+@part
+def end_of_segment(end, way, beyond, short, inner, tile):
+    """(end, point after it) of a run that leads by ``way`` to its end, and of the edge ``beyond``.
+
+    A segment reaches into what follows an inner corner, by FOLDED of its length or as far as that goes. Tiles may be
+    thin there: it must not come out on their other side, nor at all if it is ``short``.
+    """
+    size = length(way)
+    if short != BEYOND:
+        cut = min(0.45, FOLDED + (SUNK * tile / size if short == BEFORE else 0.0))
+        end = add_scaled(end, way, 0.0 - cut)
+        return end, add_scaled(end, way, 1e-3)
+    if inner:
+        end = add_scaled(end, way, min(0.0, REACH * tile / size - FOLDED))
+        beyond = scale(beyond, 0.5)
+    return end, add(end, beyond)
 
 
 @part
@@ -61,19 +72,12 @@ def segment_of(run, tile, middle, behind):
     """A run of the outline as a segment of a chain, relative to the map's middle; behind: how far behind it the centre
     of a body may be that it pushes out."""
     half = 0.5 * tile
-    start, end = (
-        (half * run.x0 - middle[0], half * run.y0 - middle[1]),
-        (half * run.x1 - middle[0], half * run.y1 - middle[1]),
-    )
-    way, sunk = sub(end, start), SUNK * tile / length(sub(end, start))  # a body that has sunk in is not met
-    start = add_scaled(start, way, cut_of(run.short_start, sunk))
-    end = add_scaled(end, way, 0.0 - cut_of(run.short_end, sunk))
-    before = sub(start, (half * run.before_x, half * run.before_y))
-    after = add(end, (half * run.after_x, half * run.after_y))
-    if run.short_start != BEYOND:
-        before = add_scaled(start, sub(start, end), 1e-3)
-    if run.short_end != BEYOND:
-        after = add_scaled(end, sub(end, start), 1e-3)
+    start = (half * run.x0 - middle[0], half * run.y0 - middle[1])
+    way = (half * (run.x1 - run.x0), half * (run.y1 - run.y0))
+    back, ahead = (half * run.before_x, half * run.before_y), (half * run.after_x, half * run.after_y)
+    end, after = end_of_segment(add(start, way), way, ahead, run.short_end, cross(way, ahead) > 0.0, tile)
+    inner = cross(back, way) > 0.0
+    start, before = end_of_segment(start, negative(way), negative(back), run.short_start, inner, tile)
     return Segment(start, end, before, after, behind - SEGMENT_BEHIND * length(sub(end, start)))
 
 

@@ -311,3 +311,31 @@ class BuildsAndFails(System):
 def test_what_is_refused():
     with pytest.raises(ValueError, match="faces='one_way' needs shapes"):
         TileGridCollider([[1]], 1.0, faces="one_way")
+
+
+@pytest.mark.long
+@each_mode
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("make", [single, TileGridCollider.floors_and_walls], ids=["one", "two"])
+def test_heaps_in_random_maps_come_to_rest_outside_of_tiles(mode, seed, make):
+    """Of all shapes, in a closed cave: nothing gets out, sinks in with its centre, or moves in the end."""
+    rng, size = np.random.default_rng(seed), (14, 24)
+    cells, shapes = rng.random(size) < 0.25, rng.integers(0, TileShape.ONE_WAY, size) * (rng.random(size) < 0.6)
+    for edge in (np.s_[0], np.s_[-1], np.s_[:, 0], np.s_[:, -1]):
+        cells[edge], shapes[edge] = True, TileShape.FULL
+    world = make_world(mode, *make(cells, 1.0, lower=(0, 0), shapes=shapes, friction=0.3))
+    bodies = []
+    while len(bodies) < 16:
+        place, kind = rng.uniform((1, 1), (23, 13)), list(BODIES)[len(bodies) % len(BODIES)]
+        if distance_to_polygons(place, polygons_of(cells, 0 * shapes)) > 0.5:
+            entity = world.create_entity(Transform(place), RigidBody(linear_velocity=rng.normal(0, 2, 2)))
+            world.add_component(entity, BODIES[kind][0].copy())
+            bodies.append(entity)
+    track(world, bodies[0], 600)
+    polygons = polygons_of(cells, shapes)
+    for body in bodies:
+        x, y = position(world, body)
+        assert 0 < x < 24
+        assert 0 < y < 14
+        assert distance_to_polygons(np.array((x, y)), polygons) > 0.1
+        assert np.linalg.norm(velocity(world, body)) < 0.5
