@@ -50,7 +50,7 @@ class TileGridCollider(Collider):
     tile_size
         m, side length of a tile
     faces
-        ``"all"``, but not those of one-way cells; ``"floors"``: floors and ceilings only; ``"walls"``: walls and slopes
+        ``"all"``; ``"floors"``: floors and ceilings only; ``"walls"``: walls and slopes
         only, see :meth:`floors_and_walls`; ``"one_way"``: the upper sides of one-way cells, see :meth:`with_one_way`
     lower
         (2,) m, the map's lower left corner relative to the Transform's position, in place of ``offset``: ValueError for
@@ -90,6 +90,9 @@ class TileGridCollider(Collider):
         tiles = numbers_of(cells, plain=plain)
         if shapes is not None:
             tiles = with_shapes(tiles, shapes)
+            if faces != "one_way" and (tiles // SHAPE == TileShape.ONE_WAY).any():
+                raise ValueError(f"TileGridCollider: one-way cells are none of faces={faces!r}, and need a collider of "
+                                 f"their own: TileGridCollider.with_one_way makes all of them")  # fmt: skip
         table = None if plain else table_of(materials or {}, common)  # type: ignore[arg-type]
         size = self.columns["tile_size"].checked(tile_size)
         if lower is not None:
@@ -135,8 +138,11 @@ class TileGridCollider(Collider):
         common
             all other arguments, of each
         """
-        faces = ("floors", "walls", "one_way") if walls else ("all", "one_way")
-        return tuple(cls(cells, tile_size, faces=each, shapes=shapes, **common) for each in faces)
+        one_way = cls(cells, tile_size, faces="one_way", shapes=shapes, **common)
+        solid = [one_way.copy() for _ in range(2 if walls else 1)]
+        for each, faces in zip(solid, ("floors", "walls") if walls else ("all",), strict=True):
+            each.faces, each.one_way = faces, 0.0
+        return (*solid, one_way)
 
     @classmethod
     def sample(cls, **common: Any) -> Self:

@@ -138,7 +138,8 @@ def test_numbers_and_shapes_are_kept(seed):
     rng = np.random.default_rng(seed)
     size = tuple(rng.integers(1, 45, 2))
     cells, shapes = rng.integers(0, 6, size), rng.integers(0, len(TileShape), size)
-    tiles = TileGridCollider(cells, 0.5, materials={5: TileMaterial(0.1, 0.2, 3.0)}, shapes=shapes)
+    fields: Any = {"materials": {5: TileMaterial(0.1, 0.2, 3.0)}, "faces": "one_way"}
+    tiles = TileGridCollider(cells, 0.5, shapes=shapes, **fields)
     for _ in range(30):
         at, number, shape = tuple(rng.integers(0, size)), *rng.integers(0, (256, len(TileShape))).tolist()
         tiles.set(at, number, shape)
@@ -147,7 +148,7 @@ def test_numbers_and_shapes_are_kept(seed):
     assert np.array_equal(tiles.cells, cells)
     assert np.array_equal(tiles.shapes, np.where(cells > 0, shapes, 0))
     assert tiles.materials == {5: TileMaterial(0.1, 0.2, (3.0, 0.0))}
-    again = TileGridCollider(tiles.cells, 0.5, materials=tiles.materials, shapes=tiles.shapes)
+    again = TileGridCollider(tiles.cells, 0.5, shapes=tiles.shapes, **fields)
     assert np.array_equal(again.packed, tiles.packed)
 
 

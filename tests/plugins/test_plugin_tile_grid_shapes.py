@@ -311,6 +311,8 @@ class BuildsAndFails(System):
 def test_what_is_refused():
     with pytest.raises(ValueError, match="faces='one_way' needs shapes"):
         TileGridCollider([[1]], 1.0, faces="one_way")
+    with pytest.raises(ValueError, match="with_one_way makes all of them"):
+        TileGridCollider([[1]], 1.0, shapes=[[TileShape.ONE_WAY]])
 
 
 @pytest.mark.long
