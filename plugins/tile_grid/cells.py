@@ -31,7 +31,8 @@ BLOCK = 1 << PER_BLOCK  # cells along each side of a block
 SHAPE = MOST + 1  # a cell is its material and this times its shape
 SHAPES = len(TileShape)
 CODES_HEAD = 2  # numbers before the table of materials: its rows, and how many cells have another shape than FULL
-CODE_BITS, PER_CODE_WORD = 12, 4  # a number that holds the codes of cells
+CODE_BITS, CODES_POWER = 12, 2  # of a number that holds the codes of cells, a power of two of them
+PER_CODE_WORD = 1 << CODES_POWER
 FEW = 64  # cells that change: more have one box around all
 MANY = 1000  # the same: more make the whole array again
 

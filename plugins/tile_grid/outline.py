@@ -21,7 +21,7 @@ from .materials import LINES, TileShape
 from .surface import code_of
 
 FULL, UPPER_HALF, ONE_WAY = int(TileShape.FULL), int(TileShape.UPPER_HALF), int(TileShape.ONE_WAY)
-NO_TILE = -1
+NO_TILE, SHAPE_BITS = -1, SHAPE.bit_length() - 1
 BOTTOM, RIGHT, TOP, LEFT, LINE, EDGES = range(6)
 BEYOND, AT, BEFORE = range(3)  # where a run ends: at an inner corner it reaches into what follows
 LOWER, UPPER, WHOLE = 1, 2, 3  # halves of a side; of BOTTOM and TOP the left and the right one
@@ -45,7 +45,7 @@ def shape_at(grid, x, y):
     if x < 0 or y < 0 or x >= grid[1] or y >= grid[2]:
         return NO_TILE
     code = code_of(grid, x, y)
-    return code // SHAPE if code > 0 else NO_TILE
+    return code >> SHAPE_BITS if code > 0 else NO_TILE
 
 
 @part
@@ -104,6 +104,18 @@ def turn_of(ux, uy, wx, wy):
     return turn if cross > 0 else -turn
 
 
+@plugin.kernel
+def is_on_side(side, x, y):
+    """Whether a point of a cell's border, in half tiles from its lower left corner, is on a side; on LINE it may be."""
+    if side == BOTTOM:
+        return y == 0
+    if side == RIGHT:
+        return x == 2
+    if side == TOP:
+        return y == 2
+    return side == LINE or x == 0
+
+
 @part
 def joined(grid, x, y, ux, uy, forward):
     """(turn, edge, whether there are several) of the edge that begins at a point where one with direction u ends; or,
@@ -114,6 +126,8 @@ def joined(grid, x, y, ux, uy, forward):
             if shape_at(grid, cell_x, cell_y) == NO_TILE:
                 continue
             for k in range(EDGES):
+                if not is_on_side(k, x - 2 * cell_x, y - 2 * cell_y):
+                    continue
                 there, x0, y0, x1, y1 = edge_of(grid, cell_x, cell_y, k)
                 if not there or (x0 != x or y0 != y if forward else x1 != x or y1 != y):
                     continue

@@ -13,7 +13,7 @@ from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
 from ..terrain.segment import BEHIND as SEGMENT_BEHIND
 from ..terrain.segment import FOLDED, contact_of_segment, cross
-from .contact import around, box_on_map, cells_under, deepest_contact
+from .contact import box_on_map, cells_under, deepest_contact
 from .faces import ALL, FLOORS, ONE_WAYS, plugin
 from .outline import BEFORE, BEYOND, any_shaped, is_inside, next_run
 from .rectangles import grid_of
@@ -21,7 +21,7 @@ from .shapes import core_of
 from .surface import first_code
 from .sweep import LOOKS, ROUNDING, first_touch
 
-RING = 1  # cells around a shape in which runs are looked for
+LOOKED = 0.25  # of a tile: how far around a shape faces are looked for
 BEHIND, ON = 0.1, 1e-6  # of a tile: how far the centre of a body in a tile, or of another, may be behind a face that
 # pushes it out
 REACH = 0.1  # of a tile: how far a face reaches into what follows an inner corner, if nothing is there
@@ -82,20 +82,19 @@ def segment_of(run, tile, middle, behind):
 
 
 @part
-def reach_of_shape(b, at, tile, size, support, rounding):
-    """The rectangle of cells that a shape may meet, a ring more than it touches."""
-    _, touched = cells_under(box_on_map(core_of(b, support), rounding(b), at), tile, size)
-    return around(touched, RING, size)
+def reach_of_shape(b, at, more, tile, size, support, rounding):
+    """The rectangle of cells that a shape touches, or has no farther than ``more``."""
+    return cells_under(box_on_map(core_of(b, support), rounding(b) + more, at), tile, size)[1]
 
 
 @part
 def outline_contact(a, b, d, cells, support, rounding):
     """The contact with the runs within a rectangle of cells: with the deepest face, or the nearest, that the shape is
-    over; what it is not over is as far as a tile, so that nothing is held by what is beside its way."""
+    over; what it is not over counts as LOOKED away, so that nothing is held by what is beside its way."""
     grid, tile = grid_of(a.packed), a.tile_size
     middle = (0.5 * grid[1] * tile, 0.5 * grid[2] * tile)
     touched, count = stack_array(TOUCHED, (0.0, 0.0, 0.0, 0.0, 0.0)), 0
-    depth, normal, point, first = -tile, (0.0, 1.0), d, -1  # of the best of the faces that it is over
+    depth, normal, point, first = -LOOKED * tile, (0.0, 1.0), d, -1  # of the best of the faces that it is over
     one_way, at = a.faces == ONE_WAYS, 0
     behind = (BEHIND if one_way or is_inside(grid, tile, add(d, middle)) else ON) * tile
     while True:
@@ -148,7 +147,7 @@ def shaped_contact(a, b, d, support, rounding):
     grid, tile = grid_of(a.packed), a.tile_size
     size = (grid[1], grid[2])
     place = add(d, (0.5 * size[0] * tile, 0.5 * size[1] * tile))
-    cells = reach_of_shape(b, place, tile, size, support, rounding)
+    cells = reach_of_shape(b, place, LOOKED * tile, tile, size, support, rounding)
     if a.faces == ONE_WAYS:
         if not is_shaped(a.packed):
             return False, -math.inf, d, d
@@ -206,14 +205,14 @@ def shaped_touch(a, b, d, v, support, rounding):
     time, window = 0.0, tile / speed
     while time <= 1.0:
         here = add_scaled(d, v, time)
-        cells = reach_of_shape(b, add(here, middle), tile, size, support, rounding)
+        cells = reach_of_shape(b, add(here, middle), tile, tile, size, support, rounding)
         shaped = any_shaped(grid, cells)
         if not shaped and faces == ALL:
             hit, share = first_touch(a, b, here, scale(v, 1.0 - time), support, rounding)
             if not hit:
                 return False, 0.0
             ahead = time + share * (1.0 - time)
-            cells = reach_of_shape(b, add(add_scaled(d, v, ahead), middle), tile, size, support, rounding)
+            cells = reach_of_shape(b, add(add_scaled(d, v, ahead), middle), tile, tile, size, support, rounding)
             if not any_shaped(grid, cells):
                 return True, min(ahead, 1.0)
             if ahead > time:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
-from .cells import CODE_BITS, CODES_HEAD, HEAD, PER_CODE_WORD
+from .cells import CODE_BITS, CODES_HEAD, CODES_POWER, HEAD, PER_CODE_WORD
 from .faces import plugin
 from .materials import FRICTION, MOST, OWN, RESTITUTION, RUN_X, RUN_Y, WIDTH
 from .rectangles import cell_at, grid_of
@@ -24,9 +24,9 @@ def first_code(grid):
 def code_of(grid, x, y):
     """The material and shape of a cell of a map that has such; 0 of an empty one."""
     packed, start = grid[0], first_code(grid)
-    words = (grid[1] + PER_CODE_WORD - 1) // PER_CODE_WORD
-    at = start + CODES_HEAD + int(packed[start, 0]) * WIDTH + y * words + x // PER_CODE_WORD
-    return (int(packed[at, 0]) >> (CODE_BITS * (x % PER_CODE_WORD))) & ((1 << CODE_BITS) - 1)
+    words = (grid[1] + PER_CODE_WORD - 1) >> CODES_POWER
+    at = start + CODES_HEAD + int(packed[start, 0]) * WIDTH + y * words + (x >> CODES_POWER)
+    return (int(packed[at, 0]) >> (CODE_BITS * (x & (PER_CODE_WORD - 1)))) & ((1 << CODE_BITS) - 1)
 
 
 @part
