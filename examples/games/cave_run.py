@@ -364,16 +364,16 @@ def tone(frequency, seconds=0.12, rate=22050):
 
 def run(world, sound):
     """Plays until the window is closed, or another world is to be played: that is returned."""
-    pictures, held = Pictures(world), set()
+    pictures = Pictures(world)
     world.on("saved", lambda: setattr(pictures, "save", True))
     if sound:
         pygame.mixer.init(22050, -16, 1)
         world.on("sound", lambda frequency: tone(frequency).play())
     gc.freeze()
     for passed in pictures.view:
-        keys = pictures.view.keys
-        held = {OTHERS.get(name, name) for name in (*KEYS, *OTHERS) if keys[pygame.key.key_code(name)]}
-        world.get_processor(Act).held = held
+        keys, tapped = pictures.view.keys, pygame.key.get_just_pressed()  # the second: also what is up again
+        codes = [(OTHERS.get(name, name), pygame.key.key_code(name)) for name in (*KEYS, *OTHERS)]
+        world.get_processor(Act).held = {name for name, code in codes if keys[code] or tapped[code]}
         world.advance(passed)
         if pictures.save:  # between two steps
             world.save(SAVED)

@@ -26,9 +26,8 @@ from carom.plugins.timers import Timer, Timers
 from carom.plugins.zones import Zones, explode
 from carom.view import Sprites, View
 
-KING = 1000.0  # N s
 KEYS = ("w", "s", "d", "a", "up", "down", "left", "right")  # aim up and down, throw, bomb: left player, right player
-PIVOT, ARM_LENGTH, SLING = 3.0, 4.0, 1.8  # m
+KING, PIVOT, ARM_LENGTH, SLING = 1000.0, 3.0, 4.0, 1.8  # N s that he bears, m
 REST = 1.22 * pi  # rad, from where an arm points to the enemy, over its top
 COLOURS = (150, 146, 138), (146, 100, 56), (128, 122, 114), (240, 190, 60), (104, 100, 98), (36, 36, 44)
 PLAYERS = ("BLUE", (70, 130, 230)), ("RED", (230, 80, 80))
@@ -379,7 +378,8 @@ def main(how="alone", host="localhost"):
     world = peer.world if peer else build(keys=None)
     pictures, start, late = Pictures(world), world.snapshot(), 0.0
     for passed in pictures.view:
-        held = {name for name in KEYS if pictures.view.keys[pygame.key.key_code(name)]}
+        down, tapped = pictures.view.keys, pygame.key.get_just_pressed()  # the second: also what is up again
+        held = {name for name in KEYS if down[pygame.key.key_code(name)] or tapped[pygame.key.key_code(name)]}
         if peer:
             peer.hear()
             late = min(late + passed, 0.1)
@@ -390,7 +390,7 @@ def main(how="alone", host="localhost"):
             pictures.line = "the worlds differ" if peer.differs else "" if peer.compared else "waiting for the other"
         else:
             pictures.line = "return: again" if game_of(world).state == "over" else ""
-            if pictures.line and pictures.view.keys[pygame.K_RETURN]:
+            if pictures.line and down[pygame.K_RETURN]:
                 world.restore(start)
             world.get_processor(Act).held = held
             world.advance(passed)

@@ -378,15 +378,15 @@ def main():
     world = build(seed=seed, keys=None)
     while not pygame.event.get((pygame.QUIT,)):
         pygame.event.clear()
-        down = pygame.key.get_pressed()
+        down, tapped = pygame.key.get_pressed(), pygame.key.get_just_pressed()  # the second: also what is up again
         if down[pygame.K_ESCAPE]:
             return
         if down[pygame.K_RETURN] and game_of(world).state in ENDS:
             world.close()
             seed += 1
             world = build(seed=seed, keys=None)
-        names = {name for name in (*KEYS, *OTHERS) if down[pygame.key.key_code(name)]}
-        world.get_processor(Act).held = {OTHERS.get(name, name) for name in names}
+        codes = [(OTHERS.get(name, name), pygame.key.key_code(name)) for name in (*KEYS, *OTHERS)]
+        world.get_processor(Act).held = {name for name, code in codes if down[code] or tapped[code]}
         seconds = clock.tick(60) / 1000
         world.advance(seconds)
         pictures.draw(world, seconds)
