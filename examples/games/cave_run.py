@@ -18,9 +18,8 @@ from carom import AABBCollider, Component, Phase, Physics, Settings, System, Tra
 from carom.lab import Inputs
 from carom.plugins import convex_polygon, terrain, tile_grid
 from carom.plugins.character import Character, Characters, Ladder
-from carom.plugins.parts import Parts
 from carom.plugins.paths import Paths
-from carom.plugins.rotation import Rotation
+from carom.plugins.rotation import BoxCollider, Rotation
 from carom.plugins.zones import Zones
 from carom.view import Camera, Sprites, View
 
@@ -141,7 +140,7 @@ def die(world):
 
 def plugins():
     shapes = convex_polygon.plugin, terrain.plugin, tile_grid.plugin
-    return Physics(dimensions=2, gravity=(0, -30)), Rotation(), Parts(), Paths(), Characters(), Zones(), *shapes
+    return Physics(dimensions=2, gravity=(0, -30)), Rotation(), Paths(), Characters(), Zones(), *shapes
 
 
 def with_rules(world, level, keys=None):
@@ -322,13 +321,12 @@ class Pictures:
 
     def above(self, view):
         world, screen, to_screen, game = self.world, view.screen, view.camera.to_screen, game_of(self.world)
-        for _, (_, place) in world.get_components(Mill, Transform):
+        for _, (_, place, box) in world.get_components(Mill, Transform, BoxCollider):
             c, s = np.cos(place.interpolated_rotation), np.sin(place.interpolated_rotation)
-            for long, wide in ((6.0, 0.35), (0.35, 6.0)):
-                corners = np.array([(long, wide), (-long, wide), (-long, -wide), (long, -wide)]) @ ((c, s), (-s, c))
-                points = to_screen(place.interpolated_position + corners).tolist()
-                pygame.draw.polygon(screen, (150, 106, 60), points)
-                pygame.draw.polygon(screen, (88, 60, 34), points, 4)
+            corners = box.half_extents * np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)]) @ ((c, s), (-s, c))
+            points = to_screen(place.interpolated_position + corners).tolist()
+            pygame.draw.polygon(screen, (150, 106, 60), points)
+            pygame.draw.polygon(screen, (88, 60, 34), points, 4)
             pygame.draw.circle(screen, (88, 60, 34), to_screen(place.interpolated_position), 22)
         for entity in self.level.of_class["Water"]:
             box = self.rect(entity)
