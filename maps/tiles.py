@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ..plugins.tile_grid import TileGridCollider, TileMaterial, TileShape
-from ..plugins.tile_grid.faces import Faces
 from .bodies import Bodies
 from .contents import LevelLayer, Tiles
 from .errors import Findings, RefusedError
@@ -59,9 +58,10 @@ class Grid:
             given["materials"] = {number: TileMaterial(**dict(key)) for key, number in self.materials.items()}
             given["shapes"] = self.shapes
         one_way = self.shapes == TileShape.ONE_WAY
-        walls: tuple[Faces, ...] = ("floors", "walls") if self.numbers[~one_way].any() else ()
-        wanted: tuple[Faces, ...] = (*walls, "one_way") if one_way.any() else walls
-        return [TileGridCollider(self.numbers, metres, faces=faces, **given) for faces in wanted]
+        if not one_way.any():
+            return [*TileGridCollider.floors_and_walls(self.numbers, metres, **given)]
+        made = TileGridCollider.with_one_way(self.numbers, metres, **given)
+        return [*made] if self.numbers[~one_way].any() else [made[-1]]
 
 
 class Grids:

@@ -57,13 +57,8 @@ class Window(ABC):
             raise NoPhysicsError(f"View: no physics in world {world.name!r}, so there is nothing to see")
         if not (rate > 0 and math.isfinite(rate)):
             raise ValueError(f"View: rate must be a finite number above 0, got {rate!r}")
-        self.world, self.title, self.controls, self.rate, self.real_time = (
-            world,
-            title,
-            controls,
-            float(rate),
-            real_time,
-        )
+        self._world, self.title, self.controls = world, title, controls
+        self.rate, self.real_time = float(rate), real_time
         self.camera: Any = camera or camera_of(world)
         if len(self.camera.middle) != world.dimensions:
             raise ValueError(f"View: {world!r} has {world.dimensions} dimensions, the camera {len(self.camera.middle)}")
@@ -82,6 +77,15 @@ class Window(ABC):
         self._costs = np.zeros(2)  # s of the process, smoothed: the list, and painting it
         if camera is None:
             self.fit()
+
+    @property
+    def world(self) -> World:
+        """The world that is shown; another one gets a view of its own, which takes over the window."""
+        return self._world
+
+    @world.setter
+    def world(self, world: World) -> None:
+        raise AttributeError("a view shows one world: for the next level end its loop, and make another View(world)")
 
     # -- what draws -------------------------------------------------------------------------------
 

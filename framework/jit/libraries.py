@@ -217,6 +217,8 @@ def missing(what: str) -> LibraryError:
     known = ", ".join(each.path for each in libraries()) or "none is loaded"
     on_page = sys.platform == "emscripten"
     cure = "build the page" if on_page else "pip install numba, or build the game"
+    if getattr(sys, "frozen", False) and not _own():
+        cure = f"pack {OWN} as well (PyInstaller: --hidden-import {OWN}), or build the game"
     return LibraryError(
         f"{what} is in no library of kernels ({known}) or was edited since, and numba, which would compile it, is not "
         f"installed: {cure} anew with all that it uses (carom build)"

@@ -18,6 +18,7 @@ from ..errors import RefusedError
 Node = dict[str, Any]
 
 LAYERS = {"layer": "tilelayer", "objectgroup": "objectgroup", "imagelayer": "imagelayer", "group": "group"}
+XML = (".tmx", ".tsx", ".tx")  # ends of names of files that are none of JSON
 MARKS = ("ellipse", "point", "capsule")
 REQUIRED: Any = object()
 LARGEST = 1e12  # pixels, and numbers of tiles
@@ -31,7 +32,7 @@ def document(path: Path) -> Node:
         what = "is missing" if isinstance(error, FileNotFoundError) else f"cannot be read: {error.strerror}"
         raise RefusedError(f"{path.name} {what}") from error
     try:
-        if data.lstrip().startswith((b"<", b"\xef\xbb\xbf<")):
+        if path.suffix.lower() in XML or data.lstrip().startswith((b"<", b"\xef\xbb\xbf<")):
             root = ElementTree.fromstring(data)
             return {"": root.tag, **_node(root)}
         found = json.loads(data)

@@ -40,11 +40,11 @@ def test_triangles_cover_the_shapes():
 
 
 def test_pyglet_is_taken_where_pygame_is_missing(monkeypatch):
-    from carom.view import choice
+    from carom.view import backends
 
     with World(Physics(2)) as world:
         assert view_class(world).__name__ == "View"
-        monkeypatch.setattr(choice, "find_spec", lambda name: None if name == "pygame" else object())
+        monkeypatch.setattr(backends, "find_spec", lambda name: None if name == "pygame" else object())
         assert view_class(world).__name__ == "PygletView"
         assert view_class(world, filmed=True).__name__ == "View"  # and says what to install
     world.close()

@@ -310,3 +310,8 @@ def test_stacks_of_one_colour_have_edges(player):
     column = brightness(view)[x, top:bottom].sum(axis=1)
     dark = column < 0.6 * column.max()
     assert (np.diff(dark.astype(int)) == 1).sum() == 2  # between three boxes
+
+
+def test_a_view_shows_one_world_and_says_what_to_do_for_the_next(player):
+    with pytest.raises(AttributeError, match=r"a view shows one world: .* make another View\(world\)"):
+        player.view.world = player.world
