@@ -161,7 +161,7 @@ class Harm(System):
         corners = half * np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)]) @ np.array(((c, s), (-s, c)))
         world.create_entities(
             4, Transform.many(transform.position + corners, rotation=transform.rotation), Spin.many(),
-            RigidBody.many(mass=body.mass / 4, linear_velocity=body.linear_velocity + corners * 4.0),
+            RigidBody.many(mass=body.mass / 4, ccd=True, linear_velocity=body.linear_velocity + corners * 4.0),
             BoxCollider.many(half_extents=0.94 * half, friction=0.6),
             Fades.many(until=world.time + 6.0),
         )  # fmt: skip
