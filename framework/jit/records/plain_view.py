@@ -51,7 +51,7 @@ class PlainColumn:
         self.array, self._field = array, field
 
     def __len__(self) -> int:
-        return self.array.shape[1] if self._field.stacked else len(self.array)
+        return self.array.shape[self._field.rows_axis]
 
     def _checked(self, index: Any) -> Any:
         parts = index if isinstance(index, tuple) else (index,)
@@ -59,15 +59,19 @@ class PlainColumn:
             raise IndexError(f"index {index} outside of a column of {len(self)} rows")
         return index
 
+    def _place(self, index: Any) -> Any:
+        """Where an item is in the array."""
+        return (slice(None), self._checked(index)) if self._field.apart else self._checked(index)
+
     def __getitem__(self, index: Any) -> Any:
         if not len(self) and self._field.default is not None:
             return self._default()
-        item = self.array[self._checked(index)]
+        item = self.array[self._place(index)]
         if not isinstance(item, np.ndarray):
             return item
         if self._field.item == "axes":
             return tuple(tuple(item[:, j]) for j in range(len(item)))
-        return tuple(item)
+        return (*item, *(0.0,) * (self._field.item == "vector" and 2 - len(item)))
 
     def _default(self) -> Any:
         """What every row of a column on demand reads as while it has none."""
@@ -75,4 +79,6 @@ class PlainColumn:
         return (number,) * self.array.shape[-1] if self._field.item == "vector" else number
 
     def __setitem__(self, index: Any, value: Any) -> None:
-        self.array[self._checked(index)] = value
+        if self._field.flat < 2 and self.array.ndim > self._field.stacked:
+            value = value[: self.array.shape[0 if self._field.apart else -1]]
+        self.array[self._place(index)] = value

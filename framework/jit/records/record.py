@@ -37,7 +37,7 @@ class Record:
             remember(self.address, self)
         for name, field in self.schema.fields.items():
             if isinstance(field, Column):
-                shape = (0, 0) if field.stacked else (0,)
+                shape = (field.numbers(self.dimensions) if field.apart else 0, 0)[-1 - field.rows_axis :]
                 setattr(self, name, np.empty((*shape, *field.item_shape(self.dimensions)), field.dtype))
             elif isinstance(field, Schema):
                 setattr(self, name, make_record(field, self.dimensions))
@@ -47,14 +47,14 @@ class Record:
 
     def rows_of(self, name: str) -> int:
         """How many rows a column has; each of them, if it is stacked."""
-        return getattr(self, name).shape[self.schema.fields[name].stacked]
+        return getattr(self, name).shape[self.schema.fields[name].rows_axis]
 
     def reserve(self, rows: int, *names: str) -> None:
         """Give these columns room for at least ``rows`` rows; what they hold stays."""
         for name in names:
             before, field, length = getattr(self, name), self.schema.fields[name], self.rows_of(name)
             if length < rows:
-                stacks = before.shape[: field.stacked]
+                stacks = before.shape[: field.rows_axis]
                 after = field.fresh((*stacks, rows), self.dimensions)
                 after[(*map(slice, stacks), slice(length))] = before
                 setattr(self, name, after)
@@ -132,7 +132,7 @@ def _inner(name: str, at: int) -> property:
 
 def _column(schema: Schema, name: str, field: Column, at: int, dimensions: int) -> property:
     record, dtype, item = schema.name, np.dtype(field.dtype), field.item_shape(dimensions)
-    leading, slot = 2 if field.stacked else 1, _slot(name)
+    leading, slot = 1 + field.rows_axis, _slot(name)
 
     def put(self: Record, array: np.ndarray) -> None:
         if array.dtype != dtype or array.shape[leading:] != item or array.ndim != leading + len(item):

@@ -31,6 +31,7 @@ from .schema import WORD, Column, Schema
 
 _BYTE_POINTER = ir.IntType(8).as_pointer()
 _WORD = ir.IntType(64)
+CACHE_LINE = 64
 
 
 _SCALARS = {"float64": types.float64, "int64": types.int64, "bool": types.boolean}
@@ -43,14 +44,14 @@ class ColumnType(types.Type):
     def __init__(self, field: Column, dimensions: int, label: str = "", unshared: bool = False) -> None:
         self.field, self.label, self.unshared = field, label, unshared
         self.dtype = from_dtype(np.dtype(field.dtype))
-        shape = field.item_shape(dimensions)
+        shape = (dimensions,) if field.item == "vector" else field.item_shape(dimensions)
         narrow = isinstance(self.dtype, types.Integer) and self.dtype.signed
         self.number: Any = types.int64 if narrow else self.dtype  # kernels see integers of one width
         self.item: Any = self.number
         for count in reversed(shape if field.item != "table" else ()):
             self.item = types.UniTuple(self.item, count)
-        self.width = 1
-        for count in shape:
+        self.width = 1  # numbers that are kept of an item
+        for count in (field.numbers(dimensions),) if field.item == "vector" else shape:
             self.width *= count
         self.dimensions = dimensions
         super().__init__(name=f"column({field!r},{dimensions},{label})")
@@ -120,6 +121,26 @@ class _ColumnModel(models.StructModel):
 register_model(RecordType)(models.OpaqueModel)
 
 
+class StackRecordType(types.Type):
+    """A record on the stack, see :mod:`stack_record`: where each of its columns begins."""
+
+    def __init__(self, schema: Schema, rows: int, dimensions: int) -> None:
+        self.rows = rows
+        self.members = {
+            name: ColumnType(field, dimensions, f"{schema.name}.{name}", schema.unshared)
+            for name, field in schema.fields.items()
+            if isinstance(field, Column)
+        }
+        super().__init__(name=f"{rows} rows of {_name_of(schema, dimensions)}")
+
+
+@register_model(StackRecordType)
+class _StackRecordModel(models.StructModel):
+    def __init__(self, manager: Any, record: StackRecordType) -> None:
+        members = [(name, types.CPointer(column.dtype)) for name, column in record.members.items()]
+        super().__init__(manager, record, members)
+
+
 # -- fields ---------------------------------------------------------------------------------------
 
 
@@ -129,6 +150,22 @@ class _FieldOf(AttributeTemplate):
 
     def generic_resolve(self, record: RecordType, name: str) -> Any:
         return record.members.get(name)
+
+
+@infer_getattr
+class _ColumnOnStack(AttributeTemplate):
+    key = StackRecordType
+
+    def generic_resolve(self, record: StackRecordType, name: str) -> Any:
+        return record.members.get(name)
+
+
+@lower_getattr_generic(StackRecordType)
+def _load_column(context: Any, builder: Any, record: StackRecordType, value: Any, name: str) -> Any:
+    column = cgutils.create_struct_proxy(record.members[name])(context, builder)
+    column.data = getattr(cgutils.create_struct_proxy(record)(context, builder, value), name)
+    column.length = _WORD(record.rows)
+    return column._getvalue()
 
 
 def _place(builder: Any, record: Any, offset: int, kind: Any) -> Any:
@@ -194,7 +231,7 @@ def _index_type(column: ColumnType, index: Any) -> Any:
     if isinstance(index, types.BaseTuple) and len(index) == 2 and all(isinstance(i, types.Integer) for i in index):  # pyright: ignore[reportGeneralTypeIssues]
         if column.field.stacked:
             return types.UniTuple(types.intp, 2), column.item
-        if column.field.item in ("table", "vector"):
+        if column.field.item == "table" or (column.field.item == "vector" and not column.field.apart):
             return types.UniTuple(types.intp, 2), column.number
     return None
 
@@ -249,24 +286,35 @@ def _item_place(context: Any, builder: Any, column: ColumnType, value: Any, inde
     else:
         if CHECKED:
             check(context, builder, column, index, made.length)
-        number = index if column.width == 1 else builder.mul(index, _WORD(column.width), flags=("nsw",))
+        in_step = column.width == 1 or column.field.apart
+        number = index if in_step else builder.mul(index, _WORD(column.width), flags=("nsw",))
     return builder.gep(made.data, [number], inbounds=True), one
 
 
-def _tagged(builder: Any, column: ColumnType, access: Any) -> Any:
-    """A load or store that meets none of another column, if no memory is shared (LLVM's "tbaa" metadata)."""
+def _tagged(builder: Any, column: ColumnType, access: Any, k: int = 0) -> Any:
+    """A load or store that meets none of another column, if no memory is shared (LLVM's "tbaa" metadata); of one whose
+    components are apart none of another of these."""
     if column.unshared:
         module = builder.module
         root = module.add_metadata([ir.MetaDataString(module, "column")])
-        kind = module.add_metadata([ir.MetaDataString(module, column.label), root, _WORD(0)])
+        label = f"{column.label} {k}" if column.field.apart else column.label
+        kind = module.add_metadata([ir.MetaDataString(module, label), root, _WORD(0)])
         access.set_metadata("tbaa", module.add_metadata([kind, kind, _WORD(0)]))
     return access
 
 
+def _number_place(context: Any, builder: Any, column: ColumnType, value: Any, place: Any, k: int) -> Any:
+    """Pointer to number k of an item, from that to its first one."""
+    if not k:
+        return place
+    step = _WORD(k)
+    if column.field.apart:
+        step = builder.mul(cgutils.create_struct_proxy(column)(context, builder, value).length, step, flags=("nsw",))
+    return builder.gep(place, [step], inbounds=True)
+
+
 def _load_number(context: Any, builder: Any, column: ColumnType, place: Any, k: int) -> Any:
-    if k:
-        place = builder.gep(place, [_WORD(k)], inbounds=True)
-    number = _tagged(builder, column, builder.load(place))
+    number = _tagged(builder, column, builder.load(place), k)
     value = context.data_model_manager[column.dtype].from_data(builder, number)
     return context.cast(builder, value, column.dtype, column.number)
 
@@ -281,7 +329,8 @@ def _load_numbers(context: Any, builder: Any, sig: Any, values: Any) -> list[Any
     column = sig.args[0]
     place, one = _item_place(context, builder, column, values[0], sig.args[1], values[1])
     count = 1 if one or column.item == column.number else column.width
-    return [_load_number(context, builder, column, place, k) for k in range(count)]
+    places = [_number_place(context, builder, column, values[0], place, k) for k in range(count)]
+    return [_load_number(context, builder, column, at, k) for k, at in enumerate(places)]
 
 
 def _load_or_default(context: Any, builder: Any, sig: Any, values: Any) -> list[Any]:
@@ -310,7 +359,8 @@ def _load_item(context: Any, builder: Any, sig: Any, values: Any) -> Any:
         return numbers[0]
     result = ir.Constant(context.get_value_type(column.item), ir.Undefined)
     if column.field.item == "vector":
-        for k, number in enumerate(numbers):
+        for k in range(column.dimensions):
+            number = numbers[k] if k < len(numbers) else context.get_constant(column.number, 0.0)
             result = builder.insert_value(result, number, k)
         return result
     count = column.item.count
@@ -330,8 +380,8 @@ def _set_item(context: Any, builder: Any, sig: Any, values: Any) -> Any:
         _tagged(builder, column, builder.store(model.as_data(builder, value), place))
     elif column.field.item == "vector":
         for k in range(column.width):
-            target = builder.gep(place, [_WORD(k)], inbounds=True) if k else place
-            _tagged(builder, column, builder.store(builder.extract_value(values[2], k), target))
+            target = _number_place(context, builder, column, values[0], place, k)
+            _tagged(builder, column, builder.store(builder.extract_value(values[2], k), target), k)
     else:
         raise TypeError(f"{column.label or column}: axes are read-only")
     return context.get_dummy_value()
@@ -342,7 +392,7 @@ def _set_item(context: Any, builder: Any, sig: Any, values: Any) -> Any:
 
 @intrinsic
 def compiled_rows(typing_context: Any, column: Any, start: Any, stop: Any) -> Any:
-    if not isinstance(column, ColumnType) or column.field.stacked:
+    if not isinstance(column, ColumnType) or column.field.rows_axis:
         return None
     dimensions = 1 if column.width == 1 and column.field.item != "table" else 2
     kind = types.Array(column.dtype, dimensions, "C", readonly=True)
@@ -367,7 +417,7 @@ def compiled_rows(typing_context: Any, column: Any, start: Any, stop: Any) -> An
 
 @intrinsic
 def compiled_request(typing_context: Any, column: Any, index: Any) -> Any:
-    if not isinstance(column, ColumnType) or column.field.stacked or not isinstance(index, types.Integer):
+    if not isinstance(column, ColumnType) or column.field.rows_axis or not isinstance(index, types.Integer):
         return None
 
     def emit(context: Any, builder: Any, sig: Any, values: Any) -> Any:
@@ -406,3 +456,26 @@ def compiled_zero(typing_context: Any, record: Any) -> Any:
         return cgutils.get_null_value(context.get_value_type(kind))
 
     return kind(record), emit
+
+
+def stack_record_of(schema: Schema, rows: int) -> Any:
+    """The function (zero vector) -> record on the stack."""
+
+    def typing(typing_context: Any, zero: Any) -> Any:
+        if not isinstance(zero, types.BaseTuple):
+            return None
+        kind = StackRecordType(schema, rows, len(zero))  # pyright: ignore[reportArgumentType]
+
+        def emit(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+            made = cgutils.create_struct_proxy(kind)(context, builder)
+            for name, column in kind.members.items():
+                data = context.get_data_type(column.dtype)
+                with builder.goto_entry_block():  # cgutils.alloca_once would clear it in each call
+                    memory = builder.alloca(ir.ArrayType(data, rows * column.width))
+                    memory.align = CACHE_LINE
+                setattr(made, name, builder.bitcast(memory, data.as_pointer()))
+            return made._getvalue()
+
+        return kind(zero), emit
+
+    return operation("rows", 1, typing)

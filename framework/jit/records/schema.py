@@ -43,6 +43,11 @@ class Column:
         of a table; a multiple of d if ``per_dimension``
     stacked
         several arrays of the same length behind each other, ``column[slot, row]``
+    apart
+        each component of its vectors is an array of its own, one behind the other, so that a loop over rows reads
+        several of them at once
+    flat
+        of vectors: how many numbers of one are kept in 2D, the others are 0: what turns there is one number
     default
         of a column on demand: what kernels read in every row, each number of it, while the column has no rows; None:
         it has to have rows
@@ -57,20 +62,33 @@ class Column:
     width: int = 0
     per_dimension: bool = False
     stacked: bool = False
+    apart: bool = False
+    flat: int = 2
     default: float | None = None
     numbered: bool = False
     unit: str = dataclasses.field(default="", repr=False)  # not in the digest: compiled code does not depend on it
     words = 2
 
+    @property
+    def rows_axis(self) -> int:
+        """Which axis of its array are the rows; what stands before is several arrays."""
+        return 1 if self.stacked or self.apart else 0
+
     def item_shape(self, dimensions: int) -> tuple[int, ...]:
         """Shape of one row's item in numpy."""
+        if self.apart:
+            return ()
         if self.item == "vector":
-            return (dimensions,)
+            return (self.numbers(dimensions),)
         if self.item == "axes":
             return (dimensions, dimensions)
         if self.item == "table":
             return (self.width * dimensions if self.per_dimension else self.width,)
         return ()
+
+    def numbers(self, dimensions: int) -> int:
+        """How many numbers of a vector are kept."""
+        return self.flat if dimensions == 2 else dimensions
 
     def fresh(self, rows: tuple[int, ...], dimensions: int) -> np.ndarray:
         """An array for that many rows, of what is stacked (stacks, rows)."""
