@@ -1,4 +1,4 @@
-"""Passes over many rows at once, where bodies spin.
+"""Many rows at once, where bodies spin.
 
 A chunk is some pairs of which no two share a body that moves: in any order they do the same. What their rows need of
 the bodies is brought side by side, so that one instruction works on several rows, and taken back after all points of
@@ -10,48 +10,103 @@ from __future__ import annotations
 import math
 
 from ....framework.compilation import inlined, part
+from ....framework.jit.records.schema import Schema, vectors
+from ....framework.jit.records.stack_record import stack_record
 from ....framework.vectors import add, add_scaled, dot, item, replace, scale, sub
 from ...integration.turning import cross_spin, symmetric, twist
+from .records import ROW_CHUNK
+
+FEW_ROWS = 6  # rows of a chunk: fewer are as fast one by one, with the same bits
+
+# What the rows of a chunk need of the bodies of its pairs.
+CHUNK = Schema(
+    "Chunk",
+    unshared=True,
+    velocity_a=vectors(apart=True, unit="m/s"),
+    velocity_b=vectors(apart=True, unit="m/s"),
+    spin_a=vectors(apart=True, flat=1, unit="rad/s"),
+    spin_b=vectors(apart=True, flat=1, unit="rad/s"),
+)
+make_chunk = stack_record(CHUNK, ROW_CHUNK)
 
 
 @part
 def find_chunks(solver, span):
-    """The chunks of a range, which are behind those of the one before, and the masses of their bodies."""
+    """The chunks of a range, which are behind those of the one before."""
     c = solver.end_chunk if span[0] > 0 else 0
-    solver.first_chunk, start = c, span[0]
+    solver.first_chunk = c
     while c < solver.chunks and solver.ends[c] <= span[1]:
+        c += 1
+    solver.end_chunk = c
+
+
+@inlined
+def has_chunks(solver, span):
+    """Whether the chunks of a range have many rows."""
+    return (solver.end_chunk - solver.first_chunk) * FEW_ROWS < span[1] - span[0]
+
+
+@part
+def load_masses(solver, span):
+    """The masses of the bodies of the pairs of a range, where its rows are solved by chunks."""
+    start = span[0]
+    for c in range(solver.first_chunk, solver.end_chunk if has_chunks(solver, span) else solver.first_chunk):
         for k in range(start, start + (solver.ends[c] - start) // solver.points[c]):
             a, b = solver.first[k], solver.second[k]
             solver.mass_a[k], solver.mass_b[k] = solver.inverse_mass[a], solver.inverse_mass[b]
             solver.inertia_a[k], solver.products_a[k] = solver.inverse_inertia[a], solver.inverse_products[a]
             solver.inertia_b[k], solver.products_b[k] = solver.inverse_inertia[b], solver.inverse_products[b]
-        start, c = solver.ends[c], c + 1
-    solver.end_chunk = c
-
-
-@part
-def gather_chunk(solver, start, end):
-    """Bring the motion of the bodies to the pairs of a chunk."""
-    for k in range(start, end):
-        a, b = solver.first[k], solver.second[k]
-        solver.velocity_a[k], solver.spin_a[k] = solver.velocity[a], solver.spin[a]
-        solver.velocity_b[k], solver.spin_b[k] = solver.velocity[b], solver.spin[b]
-
-
-@part
-def scatter_chunk(solver, start, end):
-    """Take it back to those that move."""
-    for k in range(start, end):
-        if solver.mass_a[k] > 0.0:
-            a = solver.first[k]
-            solver.velocity[a], solver.spin[a] = solver.velocity_a[k], solver.spin_a[k]
-        if solver.mass_b[k] > 0.0:
-            b = solver.second[k]
-            solver.velocity[b], solver.spin[b] = solver.velocity_b[k], solver.spin_b[k]
+        start = solver.ends[c]
 
 
 @inlined
-def is_chunk_held(old, slip, normal, mass, limit):
+def gather_motion(solver, chunk, start, pairs):
+    """Bring the velocities of the bodies to the pairs of a chunk."""
+    for q in range(pairs):
+        a, b = solver.first[start + q], solver.second[start + q]
+        chunk.velocity_a[q], chunk.spin_a[q] = solver.velocity[a], solver.spin[a]
+        chunk.velocity_b[q], chunk.spin_b[q] = solver.velocity[b], solver.spin[b]
+
+
+@inlined
+def scatter_motion(solver, chunk, start, pairs):
+    """Take them back to those that move."""
+    for q in range(pairs):
+        k = start + q
+        if solver.mass_a[k] > 0.0:
+            a = solver.first[k]
+            solver.velocity[a], solver.spin[a] = chunk.velocity_a[q], chunk.spin_a[q]
+        if solver.mass_b[k] > 0.0:
+            b = solver.second[k]
+            solver.velocity[b], solver.spin[b] = chunk.velocity_b[q], chunk.spin_b[q]
+
+
+@inlined
+def chunk_motion(chunk, q):
+    """Velocities and spins of the bodies of pair q."""
+    return chunk.velocity_a[q], chunk.spin_a[q], chunk.velocity_b[q], chunk.spin_b[q]
+
+
+@inlined
+def parting_at(motion, arm_a, arm_b):
+    """The velocity of the second body at a point, as the first one sees it there."""
+    v_a, s_a, v_b, s_b = motion
+    return sub(add(v_b, cross_spin(s_b, arm_b)), add(v_a, cross_spin(s_a, arm_a)))
+
+
+@inlined
+def pushed(solver, k, motion, arm_a, arm_b, push):
+    """The motion of the pair whose first row is k after an impulse at a point."""
+    v_a, s_a, v_b, s_b = motion
+    v_a = add_scaled(v_a, push, -solver.mass_a[k])
+    s_a = sub(s_a, symmetric(solver.inertia_a[k], solver.products_a[k], twist(arm_a, push)))
+    v_b = add_scaled(v_b, push, solver.mass_b[k])
+    s_b = add(s_b, symmetric(solver.inertia_b[k], solver.products_b[k], twist(arm_b, push)))
+    return v_a, s_a, v_b, s_b
+
+
+@inlined
+def pull_in_chunk(old, slip, normal, mass, limit):
     """The impulse along the surface that stops a slip, of at most ``limit``, where it is ``old`` so far."""
     if len(normal) == 2:  # a number along the one direction there is
         along = replace(replace(normal, 0, -item(normal, 1)), 1, item(normal, 0))
@@ -64,42 +119,36 @@ def is_chunk_held(old, slip, normal, mass, limit):
 
 
 @part
-def solve_rows(solver, bias, pushes, start, end, ahead):
+def solve_rows(solver, chunk, bias, pushes, start, pairs, ahead):
     """The rows of one point of the pairs of a chunk, ``ahead`` of those of the first one, without a branch for single
     ones: each along its normal, then along its surface."""
-    for q in range(start, end):
-        k = q + ahead
-        n, arm_a, arm_b = solver.normal[k], solver.arm_a[k], solver.arm_b[k]
-        w_a, w_b = solver.mass_a[q], solver.mass_b[q]
-        d_a, p_a, d_b, p_b = solver.inertia_a[q], solver.products_a[q], solver.inertia_b[q], solver.products_b[q]
-        v_a, s_a, v_b, s_b = solver.velocity_a[q], solver.spin_a[q], solver.velocity_b[q], solver.spin_b[q]
+    for q in range(pairs):
+        one = start + q
+        k = one + ahead
+        n, arm_a, arm_b, motion = solver.normal[k], solver.arm_a[k], solver.arm_b[k], chunk_motion(chunk, q)
         old, tangent = solver.impulse[k], solver.tangent[k]
-        parting = sub(add(v_b, cross_spin(s_b, arm_b)), add(v_a, cross_spin(s_a, arm_a)))
-        excess = solver.mass[k] * (-dot(parting, n) - bias[k])
+        excess = solver.mass[k] * (-dot(parting_at(motion, arm_a, arm_b), n) - bias[k])
         if pushes:
             excess -= solver.soft[k] * (excess + old)
         new = old + excess if old + excess > 0.0 else 0.0
-        solver.impulse[k], push = new, scale(n, new - old)
-        v_a, s_a = add_scaled(v_a, push, -w_a), sub(s_a, symmetric(d_a, p_a, twist(arm_a, push)))
-        v_b, s_b = add_scaled(v_b, push, w_b), add(s_b, symmetric(d_b, p_b, twist(arm_b, push)))
-        slip = sub(add(v_b, cross_spin(s_b, arm_b)), add(v_a, cross_spin(s_a, arm_a)))
-        pull = is_chunk_held(tangent, slip, n, solver.tangent_mass[k], solver.friction[k] * new)
-        solver.tangent[k], push = pull, sub(pull, tangent)
-        solver.velocity_a[q] = add_scaled(v_a, push, -w_a)
-        solver.spin_a[q] = sub(s_a, symmetric(d_a, p_a, twist(arm_a, push)))
-        solver.velocity_b[q] = add_scaled(v_b, push, w_b)
-        solver.spin_b[q] = add(s_b, symmetric(d_b, p_b, twist(arm_b, push)))
+        solver.impulse[k] = new
+        motion = pushed(solver, one, motion, arm_a, arm_b, scale(n, new - old))
+        slip = parting_at(motion, arm_a, arm_b)
+        pull = pull_in_chunk(tangent, slip, n, solver.tangent_mass[k], solver.friction[k] * new)
+        solver.tangent[k] = pull
+        v_a, s_a, v_b, s_b = pushed(solver, one, motion, arm_a, arm_b, sub(pull, tangent))
+        chunk.velocity_a[q], chunk.spin_a[q], chunk.velocity_b[q], chunk.spin_b[q] = v_a, s_a, v_b, s_b
 
 
 @part
 def solve_chunks(solver, bias, pushes, span):
     """One pass over the rows of a range. bias, pushes: see ``solve_normals``."""
-    start = span[0]
+    start, chunk = span[0], make_chunk(scale(solver.velocity[0], 0.0))
     for c in range(solver.first_chunk, solver.end_chunk):
         points = solver.points[c]
         pairs = (solver.ends[c] - start) // points
-        gather_chunk(solver, start, start + pairs)
+        gather_motion(solver, chunk, start, pairs)
         for e in range(points):
-            solve_rows(solver, bias, pushes, start, start + pairs, e * pairs)
-        scatter_chunk(solver, start, start + pairs)
+            solve_rows(solver, chunk, bias, pushes, start, pairs, e * pairs)
+        scatter_motion(solver, chunk, start, pairs)
         start = solver.ends[c]

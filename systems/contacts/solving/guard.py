@@ -45,7 +45,7 @@ def islands_of(solver, span):
 
 
 @part
-def open_all(solver, span):
+def open_all(solver, span, arms):
     """All islands of a range are open: further passes may go over them."""
     joints, islands, opened = solver.joints, islands_of(solver, span), 0
     for t in range(islands[0], islands[1]):
@@ -54,7 +54,7 @@ def open_all(solver, span):
         solver.open_body[opened] = q
         opened += solver.island[q] >= 0
     solver.opened = opened
-    if len(span[4]) > 1:
+    if len(arms) > 1:
         joints.opened = joints.end - joints.begin
         for e in range(joints.opened):
             joints.open_row[e] = joints.order[joints.begin + e]
@@ -124,10 +124,9 @@ def work_at_joint(solver, j):
 
 
 @part
-def measure_energy(solver, span, islands):
+def measure_energy(solver, span, arms, islands):
     """What contacts do to the energy of each open island if a share s of all that they have changed acts: E(s) =
     slope s + curvature s^2 / 2, which is exact. What moves by itself gives its work to the island, not the contacts."""
-    arms = span[4]
     slope, curvature, energy, island = solver.slope, solver.curvature, solver.energy, solver.island
     for t in range(islands[0], islands[1]):
         if solver.listed_of[t] > 0:
@@ -167,11 +166,11 @@ def exceeds_budget(solver, t):
 
 
 @part
-def energy_budget(solver, bias_rate, h, dt, span, islands):
+def energy_budget(solver, bias_rate, h, dt, span, arms, islands):
     """What each island may gain in a substep: what forces give from rest, more of that where it is pushed out, and a
     small share of its motion and of the energy at the speed of pushing. Joints would use such a share in each substep:
     where there are some, it may give back what it has taken, and no more."""
-    start, stop, begin, end, arms = span
+    start, stop, begin, end = span
     allowed, motion = solver.allowed, solver.momentum
     share, zero = h / dt, scale(solver.velocity[begin], 0.0)  # of what a step may give
     for t in range(islands[0], islands[1]):
@@ -199,7 +198,7 @@ def excess_scale(solver, t):
 
 
 @part
-def find_unsolved_rows(solver, turn, any_struck, dt, span, islands):
+def find_unsolved_rows(solver, turn, any_struck, dt, span, arms, islands):
     """The rows of struck islands that are not solved, and all of islands that gain, come first in ``listed``; returns
     how many. An island has as many passes as its own size allows: what is solved elsewhere changes none of its bits."""
     unsolved, struck, extent, used = solver.unsolved, solver.struck, solver.extent, solver.used
@@ -212,14 +211,14 @@ def find_unsolved_rows(solver, turn, any_struck, dt, span, islands):
     for k in range(span[0], span[1] if any_gain or any_struck else span[0]):
         if turn > 0 and not any_gain and used[solver.first[k]] != turn and used[solver.second[k]] != turn:
             continue  # no pass since the last look has changed what it asks
-        excess, least = excess_speed(solver, k, span[4]) * dt, STRUCK_EXCESS * extent[k]
+        excess, least = excess_speed(solver, k, arms) * dt, STRUCK_EXCESS * extent[k]
         if excess * finest > least or any_gain:  # seldom
             t = island_of(solver, k)
             if ((struck[t] and excess * excess_scale(solver, t) > least) or unsolved[t]) and turn < solver.passes[t]:
                 solver.listed[count] = k
                 solver.listed_of[t] += 1
                 count += 1
-    close_solved(solver, span[4])
+    close_solved(solver, arms)
     return count
 
 
@@ -236,10 +235,10 @@ def note_changed(solver, turn, count, arms):
 
 
 @part
-def limit_energy(solver, span, islands):
+def limit_energy(solver, span, arms, islands):
     """In islands that still gain only the share acts that takes the most energy: the least of E(s). Where there are
     joints the largest share acts that gives no more than is allowed."""
-    start, stop, begin, end, arms = span
+    start, stop, begin, end = span
     share, any_gain = solver.share, False
     for t in range(islands[0], islands[1]):
         share[t] = 1.0
@@ -295,27 +294,27 @@ def carry_budget(solver, islands):
 
 
 @part
-def finish_substep(solver, bias_rate, any_struck, h, dt, span):
+def finish_substep(solver, bias_rate, any_struck, h, dt, span, arms):
     """Further passes over the islands of a range that gain or are struck, then the bound on their energy."""
     islands, any_gain = islands_of(solver, span), False
-    measure_energy(solver, span, islands)
+    measure_energy(solver, span, arms, islands)
     for t in range(islands[0], islands[1]):
         solver.allowed[t], solver.share[t] = solver.credit[t], 1.0
         any_gain |= exceeds_budget(solver, t)
     if not (any_gain or any_struck):
         carry_budget(solver, islands)
         return
-    energy_budget(solver, bias_rate, h, dt, span, islands)
-    turn, count = 0, find_unsolved_rows(solver, 0, any_struck, dt, span, islands)
+    energy_budget(solver, bias_rate, h, dt, span, arms, islands)
+    turn, count = 0, find_unsolved_rows(solver, 0, any_struck, dt, span, arms, islands)
     while count > 0:
         for _ in range(SWEEPS_PER_LOOK):
-            if len(span[4]) > 1:
+            if len(arms) > 1:
                 relax_open(solver)
-            relax_listed(solver, count, span[4])
-        measure_energy(solver, span, islands)
+            relax_listed(solver, count, arms)
+        measure_energy(solver, span, arms, islands)
         turn += SWEEPS_PER_LOOK
-        note_changed(solver, turn, count, span[4])
-        count = find_unsolved_rows(solver, turn, any_struck, dt, span, islands)
-    limit_energy(solver, span, islands)
+        note_changed(solver, turn, count, arms)
+        count = find_unsolved_rows(solver, turn, any_struck, dt, span, arms, islands)
+    limit_energy(solver, span, arms, islands)
     carry_budget(solver, islands)
-    open_all(solver, span)
+    open_all(solver, span, arms)

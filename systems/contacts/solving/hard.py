@@ -91,10 +91,10 @@ def disable_out_of_reach(state):
 
 
 @part
-def defer_open_contacts(solver, h, span):
+def defer_open_contacts(solver, h, span, arms):
     """A hard contact that was open when the step began and is not overlapped when it ends is left to the next step if
     its body is held by another one: it slides on, and by then it may have passed the corner that it would stop at."""
-    start, stop, begin, end, arms = span
+    start, stop, begin, end = span
     first, second, held = solver.first, solver.second, solver.held
     for q in range(begin, end):
         held[q] = 0.0

@@ -43,10 +43,10 @@ from ..constants import (
     SUBSTEP_WORK,
 )  # fmt: skip
 from ..points import points_of
+from .records import ROW_CHUNK
 
 COLOURS = 62  # bits of a mask; pairs of a body beyond them share the last one
 STREAMS = 4  # of joints: more are no faster
-ROW_CHUNK = 64  # pairs at most: their columns stay in the processor's first cache
 
 
 @part

@@ -15,7 +15,7 @@ from .rows import compute_effective_mass, rotate_body
 
 
 @part
-def cap_mass_ratio(solver, t, dt, span):
+def cap_mass_ratio(solver, t, dt, span, arms):
     """Cap the masses of island t at what it can carry with MOST_SUBSTEPS."""
     least = solver.lightest[t] / solver.load_share[t]
     solver.mass_of[t] = solver.force_of[t] = 0.0
@@ -26,7 +26,7 @@ def cap_mass_ratio(solver, t, dt, span):
             if solver.overloaded == 0:
                 solver.overloaded_row = solver.body_row[q]
             solver.overloaded += 1
-            if len(span[4]) > 0:
+            if len(arms) > 0:
                 solver.inverse_inertia[q] = scale(solver.inverse_inertia[q], 1.0 / by)
                 solver.inverse_products[q] = scale(solver.inverse_products[q], 1.0 / by)
                 solver.inverse_moments[q] = scale(solver.inverse_moments[q], 1.0 / by)
@@ -34,11 +34,11 @@ def cap_mass_ratio(solver, t, dt, span):
         solver.mass_of[t] += solver.solver_mass[q]
         solver.force_of[t] += solver.solver_mass[q] * length(solver.acceleration[q]) * dt
     for k in range(span[0], span[1]):
-        compute_effective_mass(solver, k, span[4])
+        compute_effective_mass(solver, k, arms)
 
 
 @part
-def find_support(solver, span):
+def find_support(solver, span, arms):
     """What pushes an island from outside in a substep: (direction, speed of that along it, what the heavy bodies have
     of the momentum that it gives: 0 to 1)."""
     total = scale(solver.velocity[span[2]], 0.0)
@@ -54,8 +54,8 @@ def find_support(solver, span):
         if solver.mass_ratio[q] < 1.0:
             given += max(0.0, dot(way, sub(solver.velocity[q], solver.velocity_before[q]))) * solver.solver_mass[q]
     for e in range(solver.driven_rows):
-        work += work_of_mover(solver, solver.driven_row[e], span[4])
-    if len(span[4]) > 1 and solver.movers > 0:
+        work += work_of_mover(solver, solver.driven_row[e], arms)
+    if len(arms) > 1 and solver.movers > 0:
         for e in range(solver.joints.begin, solver.joints.end):
             work += work_at_joint(solver, solver.joints.order[e])
     return way, -work / size, size / max(size, given)
@@ -70,12 +70,12 @@ def braking_share(rest, held, motion, change):
 
 
 @part
-def restore_mass(solver, h, span):
+def restore_mass(solver, h, span, arms):
     """In the h of a substep bodies have moved as if they were light; where h is 0 velocities are as if they were.
 
     What is outside of the island stops them as if it were so: it can bear anything. It throws none.
     """
-    way, speed, held = find_support(solver, span)
+    way, speed, held = find_support(solver, span, arms)
     for q in range(span[2], span[3]):
         rest = 1.0 - solver.mass_ratio[q]
         if rest > 0.0:
@@ -87,7 +87,7 @@ def restore_mass(solver, h, span):
                 solver.shift[q] = add_scaled(solver.shift[q], change, h)
             else:
                 solver.velocity[q] = add(solver.velocity[q], change)
-        if rest > 0.0 and len(span[4]) > 0:
+        if rest > 0.0 and len(arms) > 0:
             change = sub(solver.spin[q], solver.spin_before[q])
             momentum = momentum_of_spin(solver, q, change)
             stop = braking_share(rest, held, dot(momentum, solver.spin[q]), dot(momentum, change))

@@ -7,24 +7,21 @@ import math
 from ....framework.compilation import part
 from ....framework.vectors import length
 from ..constants import CONVERGED_SHARE, CONVERGED_SPEED, HARD_PASSES, SUBSTEP_WORK
-from .chunks import solve_chunks
+from .chunks import has_chunks, solve_chunks
 from .rows import closing_speed, relax_listed, solve_friction, solve_normals, solve_rolling
-
-FEW_ROWS = 6  # rows of a chunk: fewer are as fast one by one, with the same bits
 
 
 @part
-def solve_pass(solver, bias, pushes, over, span):
+def solve_pass(solver, bias, pushes, over, span, arms):
     """One pass over the rows of a range, normals and friction. over: see FRICTION_OVERRELAXATION."""
-    if len(span[4]) > 0 and solver.has_rolling:
+    if len(arms) > 0 and solver.has_rolling:
         solve_rolling(solver, span)
-    chunked = (solver.end_chunk - solver.first_chunk) * FEW_ROWS < span[1] - span[0] and not solver.surfaces_run
-    if len(span[4]) > 0 and chunked:
+    if len(arms) > 0 and has_chunks(solver, span) and not solver.surfaces_run:
         solve_chunks(solver, bias, pushes, span)
     else:
-        solve_normals(solver, bias, pushes, span)
-        if len(span[4]) == 0 and solver.has_friction:
-            solve_friction(solver, over, span)
+        solve_normals(solver, bias, pushes, span, arms)
+        if len(arms) == 0 and solver.has_friction:
+            solve_friction(solver, over, span, arms)
     solver.visits += span[1] - span[0]
 
 
@@ -55,12 +52,12 @@ def agrees(solver, h, least, span):
 
 
 @part
-def converge(solver, pushes, h, span):
+def converge(solver, pushes, h, span, arms):
     """Passes over a hard island until they agree."""
     start, stop, least = span[0], span[1], least_change(solver, h, span)
     for _ in range(min(HARD_PASSES, SUBSTEP_WORK // (stop - start))):
         note_impulses(solver, span)
-        solve_pass(solver, solver.pushing if pushes else solver.target_speed, pushes, 1.0, span)
+        solve_pass(solver, solver.pushing if pushes else solver.target_speed, pushes, 1.0, span, arms)
         if agrees(solver, h, least, span):
             break
 
@@ -86,7 +83,7 @@ def list_by_gap(solver, span):
 
 
 @part
-def close_nearest_first(solver, h, span):
+def close_nearest_first(solver, h, span, arms):
     """For bodies that fall far in a substep: activate rows as they close, the nearest first, each once those before it
     agree.
 
@@ -98,9 +95,9 @@ def close_nearest_first(solver, h, span):
     work = SUBSTEP_WORK
     for e in range(count):
         k = solver.listed[e]
-        new = closing_speed(solver, k, span[4]) > solver.target_speed[k]
+        new = closing_speed(solver, k, arms) > solver.target_speed[k]
         while new and work > 0:
             note_impulses(solver, span)
-            relax_listed(solver, e + 1, span[4])
+            relax_listed(solver, e + 1, arms)
             work -= e + 1
             new = not agrees(solver, h, least, span)

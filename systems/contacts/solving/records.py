@@ -16,6 +16,8 @@ from ....framework.jit.records.schema import (
 )  # fmt: skip
 from ...joints.records import DIRECT, JOINTS
 
+ROW_CHUNK = 64  # pairs at most: their columns stay in the processor's first cache
+
 SOLVER = Schema(
     "Solver",
     unshared=True,
@@ -56,27 +58,23 @@ SOLVER = Schema(
     has_rolling=flag(),
     # where bodies spin:
     place=vectors(unit="m"),  # of the point, from the centre of the first shape
-    arm_a=vectors(unit="m"),  # from the centres of mass to the surfaces there,
-    arm_b=vectors(unit="m"),
-    core_a=vectors(unit="m"),  # and to what of the shapes turns: a rounding stays along the normal
-    core_b=vectors(unit="m"),
+    arm_a=vectors(apart=True, unit="m"),  # from the centres of mass to the surfaces there,
+    arm_b=vectors(apart=True, unit="m"),
+    core_a=vectors(apart=True, unit="m"),  # and to what of the shapes turns: a rounding stays along the normal
+    core_b=vectors(apart=True, unit="m"),
     tangent_mass=floats(unit="kg"),  # that an impulse along the surface moves
     rolling=floats(unit="m"),  # of rolling friction
     rolled=vectors(unit="N m s"),  # in a substep, by that
     # where surfaces run:
     surfaces_run=flag(),
     surface_slip=vectors(unit="m/s"),  # of the second body's surface, as the first one's sees it
-    # of the bodies of each pair while its chunk is solved, where the row of its first point is:
+    # of the bodies of each pair, where the row of its first point is:
     mass_a=floats(unit="1/kg"),  # inverse masses,
     mass_b=floats(unit="1/kg"),
-    inertia_a=vectors(unit="1/(kg m^2)"),  # inverse moments,
-    inertia_b=vectors(unit="1/(kg m^2)"),
-    products_a=vectors(unit="1/(kg m^2)"),
-    products_b=vectors(unit="1/(kg m^2)"),
-    velocity_a=vectors(unit="m/s"),  # and motions
-    velocity_b=vectors(unit="m/s"),
-    spin_a=vectors(unit="rad/s"),
-    spin_b=vectors(unit="rad/s"),
+    inertia_a=vectors(apart=True, flat=1, unit="1/(kg m^2)"),  # inverse moments,
+    inertia_b=vectors(apart=True, flat=1, unit="1/(kg m^2)"),
+    products_a=vectors(apart=True, flat=0, unit="1/(kg m^2)"),
+    products_b=vectors(apart=True, flat=0, unit="1/(kg m^2)"),
     ends=ints("int32"),  # where each chunk ends,
     points=ints("int8"),  # and how many rows each of its pairs has
     chunks=integer(),
@@ -98,13 +96,13 @@ SOLVER = Schema(
     inverse_mass=floats(unit="1/kg"),
     solver_mass=floats(unit="kg"),  # 0 for what cannot be moved
     mass_ratio=floats(unit="1"),  # solver mass / real mass
-    spin=vectors(unit="rad/s"),  # where bodies spin, as in the records of the bodies
-    spin_before=vectors(unit="rad/s"),  # of a substep
-    turn=vectors(unit="rad"),
+    spin=vectors(flat=1, unit="rad/s"),  # where bodies spin, as in the records of the bodies
+    spin_before=vectors(flat=1, unit="rad/s"),  # of a substep
+    turn=vectors(flat=1, unit="rad"),
     sine=floats(unit="1"),  # shares of that, see shares_of_turn
     versine=floats(unit="1"),
-    inverse_inertia=vectors(unit="1/(kg m^2)"),
-    inverse_products=vectors(unit="1/(kg m^2)"),
+    inverse_inertia=vectors(flat=1, unit="1/(kg m^2)"),
+    inverse_products=vectors(flat=0, unit="1/(kg m^2)"),
     frame=table("float64", 4, unit="1"),  # principal axes, a quaternion, with joints in space: see turning
     inverse_moments=vectors(unit="1/(kg m^2)"),  # about these
     reach=floats(unit="m"),  # of its shape from its centre of mass
@@ -172,8 +170,7 @@ SOLVER = Schema(
 
 ARM_COLUMNS = (
     "place", "arm_a", "arm_b", "core_a", "core_b", "tangent_mass", "rolling", "rolled", "mass_a", "mass_b", "inertia_a",
-    "inertia_b", "products_a", "products_b", "velocity_a", "velocity_b", "spin_a", "spin_b", "ends",
-    "points",
+    "inertia_b", "products_a", "products_b", "ends", "points",
 )  # fmt: skip
 TURN_COLUMNS = (
     "spin", "spin_before", "turn", "sine", "versine", "inverse_inertia", "inverse_products", "frame", "inverse_moments",

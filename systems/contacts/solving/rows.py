@@ -5,7 +5,8 @@ Where bodies spin, each row has an arm to each of its bodies. ``arms`` is ARMS o
 part is compiled as if there were no other, and a world without rotation pays nothing for it. Where bodies are joined
 it is JOINTED, one longer than ARMS: substeps solve the joints of their range, too.
 
-A range of rows is a span (first row, end of the rows, first body, end of the bodies, arms).
+A range of rows is a span (first row, end of the rows, first body, end of the bodies). ``arms`` is an argument by itself
+wherever it is asked for: then what is not meant is not even compiled.
 """
 
 from __future__ import annotations
@@ -189,13 +190,13 @@ def apply_impulse(solver, k, impulse, arms):
 
 
 @part
-def solve_normals(solver, bias, pushes, span):
+def solve_normals(solver, bias, pushes, span, arms):
     """One pass over the rows of a range, along their normals; where bodies spin each along its surface after that.
 
     bias: speed at which each row may close, below 0 at which it is to open; softly where this pass ``pushes``.
     """
     impulse, soft, runs = solver.impulse, solver.soft, solver.surfaces_run
-    start, stop, _, _, arms = span
+    start, stop, _, _ = span
     for k in range(start, stop):
         old = impulse[k]
         excess = solver.mass[k] * (closing_speed(solver, k, arms) - bias[k])
@@ -230,9 +231,9 @@ def solve_friction_of(solver, k, over, arms, runs):
 
 
 @part
-def solve_friction(solver, over, span):
+def solve_friction(solver, over, span, arms):
     """One pass along their surfaces, where nothing spins."""
-    start, stop, _, _, arms = span
+    start, stop, _, _ = span
     runs = solver.surfaces_run
     for k in range(start, stop):
         if solver.friction[k] != 0.0:

@@ -32,7 +32,7 @@ from ..constants import (
     TURNING_RELAX_PASSES,
     WARM_START_MAX,
 )  # fmt: skip
-from .chunks import find_chunks
+from .chunks import find_chunks, load_masses
 from .guard import finish_substep, island_of, islands_of, list_driven, open_all
 from .hard import defer_open_contacts, select_rigid
 from .overload import cap_mass_ratio, restore_mass
@@ -53,7 +53,7 @@ ORDINARY, REFINED, HARD = range(3)  # ranges: with the usual substeps, with more
 
 
 @part
-def measure(solver, h, springs, dt, stiff, ends, span):
+def measure(solver, h, springs, dt, stiff, ends, span, arms):
     """What each row asks of the speed along its normal, from where the bodies are now.
 
     opening: at most closing what is open within a substep, or, in the one that ``ends`` the step, within a usual one;
@@ -65,31 +65,31 @@ def measure(solver, h, springs, dt, stiff, ends, span):
     for t in range(islands[0], islands[1]):
         solver.struck[t] = False
     for k in range(span[0], span[1]):
-        any_struck |= update_targets(solver, k, span[4], asks)
+        any_struck |= update_targets(solver, k, arms, asks)
     for k in range(span[0], span[1] if any_struck else span[0]):
         if solver.wrong[k]:
             solver.struck[island_of(solver, k)] = True
-    if len(span[4]) > 1:
+    if len(arms) > 1:
         measure_joints(solver)
     return any_struck
 
 
 @part
-def apply_forces(solver, h, span):
+def apply_forces(solver, h, span, arms):
     """The forces of a substep act; ``velocity_before`` is what they make of the velocities without any contact."""
     for q in range(span[2], span[3]):
         v = add_scaled(solver.velocity[q], solver.acceleration[q], h)
         solver.velocity[q], solver.velocity_before[q] = v, v
-    for q in range(span[2], span[3] if len(span[4]) > 0 else span[2]):
+    for q in range(span[2], span[3] if len(arms) > 0 else span[2]):
         solver.spin_before[q] = solver.spin[q]
 
 
 @part
-def apply_warm_start(solver, most, span):
+def apply_warm_start(solver, most, span, arms):
     """The impulses of the last substep act again, no more than ``most`` of each: what is more was a blow."""
-    if len(span[4]) > 1:
+    if len(arms) > 1:
         warm_start_joints(solver)
-    for k in range(span[0], span[1] if len(span[4]) > 0 and solver.has_rolling else span[0]):
+    for k in range(span[0], span[1] if len(arms) > 0 and solver.has_rolling else span[0]):
         solver.rolled[k] = scale(solver.normal[k], 0.0)
     for k in range(span[0], span[1]):
         old = solver.impulse[k]
@@ -99,35 +99,35 @@ def apply_warm_start(solver, most, span):
             push = scale(solver.normal[k], solver.impulse[k])
             if solver.has_friction:
                 push = add(push, solver.tangent[k])
-            apply_impulse(solver, k, push, span[4])
+            apply_impulse(solver, k, push, arms)
 
 
 @part
-def integrate_positions(solver, h, span):
+def integrate_positions(solver, h, span, arms):
     """Bodies move for a substep; what moves by itself belongs to no special range, but moves with each of them."""
     for q in range(span[2], span[3]):
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], h)
     for m in range(solver.movers if span[2] > 0 else 0):
         q = solver.mover[m]
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], h)
-        if len(span[4]) > 0:
+        if len(arms) > 0:
             rotate_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], h))
-    integrate_rotations(solver, h, span)
+    integrate_rotations(solver, h, span, arms)
 
 
 @part
-def integrate_rotations(solver, h, span):
+def integrate_rotations(solver, h, span, arms):
     """Bodies go on turning for a time."""
-    if len(span[4]) > 1 and len(solver.velocity[solver.bodies]) == 3:  # of the world, where there are joints
+    if len(arms) > 1 and len(solver.velocity[solver.bodies]) == 3:  # of the world, where there are joints
         integrate_rotation_of_joined(solver, span[2], span[3], h)
-    elif len(span[4]) > 0:
+        load_masses(solver, span)
+    elif len(arms) > 0:
         integrate_rotation(solver, span[2], span[3], h)
 
 
 @part
-def relax_passes(solver, kind, ends, span):
+def relax_passes(solver, kind, ends, span, arms):
     """How many passes take back the speed that pushing has given: more would pull joints apart, which have one."""
-    arms = span[4]
     if kind != ORDINARY and not (len(arms) > 1 and solver.jointed[solver.island[span[2]]]):
         return REFINED_PASSES
     if len(arms) > 0:
@@ -136,50 +136,50 @@ def relax_passes(solver, kind, ends, span):
 
 
 @part
-def solve_substep(solver, springs, most, dt, h, kind, ends, span):
-    """One substep of a range. springs: see ``contact_spring``."""
-    start, stop = span[0], span[1]
+def solve_substep(solver, springs, most, times, kind, ends, span, arms):
+    """One substep of a range. springs: see ``contact_spring``; times: s, of a substep and of the step."""
+    (h, dt), start, stop = times, span[0], span[1]
     opening, stiff = solver.target_speed, kind == HARD
-    apply_forces(solver, h, span)
-    apply_warm_start(solver, most, span)
+    apply_forces(solver, h, span, arms)
+    apply_warm_start(solver, most, span, arms)
     if stiff:
-        close_nearest_first(solver, h, span)
-    if len(span[4]) > 1:
+        close_nearest_first(solver, h, span, arms)
+    if len(arms) > 1:
         solve_joints(solver, True)
-    solve_pass(solver, solver.pushing, True, 1.0, span)
+    solve_pass(solver, solver.pushing, True, 1.0, span, arms)
     if stiff:
-        converge(solver, True, h, span)
-    if len(span[4]) > 1 and solver.direct.begin < solver.direct.end and start < stop:
+        converge(solver, True, h, span, arms)
+    if len(arms) > 1 and solver.direct.begin < solver.direct.end and start < stop:
         solve_direct(solver, True)
-    integrate_positions(solver, h, span)
+    integrate_positions(solver, h, span, arms)
     if solver.lightened:
-        restore_mass(solver, h, span)
-    any_struck = measure(solver, h, springs, dt, stiff, ends, span)
+        restore_mass(solver, h, span, arms)
+    any_struck = measure(solver, h, springs, dt, stiff, ends, span, arms)
     if ends and solver.any_hard:
-        defer_open_contacts(solver, h, span)
-    if len(span[4]) > 1:  # once: more often, chains give way more
+        defer_open_contacts(solver, h, span, arms)
+    if len(arms) > 1:  # once: more often, chains give way more
         solve_joints(solver, False)
-    last = relax_passes(solver, kind, ends, span) - 1
+    last = relax_passes(solver, kind, ends, span, arms) - 1
     for one in range(last + 1):
-        solve_pass(solver, opening, False, FRICTION_OVERRELAXATION if one < last else 1.0, span)
+        solve_pass(solver, opening, False, FRICTION_OVERRELAXATION if one < last else 1.0, span, arms)
     if stiff:
-        converge(solver, False, h, span)
-    if len(span[4]) > 1 and solver.direct.begin < solver.direct.end and start < stop:
+        converge(solver, False, h, span, arms)
+    if len(arms) > 1 and solver.direct.begin < solver.direct.end and start < stop:
         solve_direct(solver, False)
-    finish_substep(solver, springs[0][1], any_struck, h, dt, span)
+    finish_substep(solver, springs[0][1], any_struck, h, dt, span, arms)
     if solver.lightened:
-        restore_mass(solver, 0.0, span)
+        restore_mass(solver, 0.0, span, arms)
     for k in range(start, stop):
         solver.total[k] += solver.impulse[k]
         solver.had_impulse[k] |= solver.impulse[k] > 0.0
-    if len(span[4]) > 1:
+    if len(arms) > 1:
         add_joints(solver)
 
 
 @part
-def is_still(solver, dt, span):
+def is_still(solver, dt, span, arms):
     """Whether an island rests, and its last substep has changed nothing that matters: those that follow would not."""
-    start, stop, begin, end, arms = span
+    start, stop, begin, end = span
     extent, fastest = math.inf, 0.0
     if len(arms) > 1 and solver.joints.begin < solver.joints.end:
         return False
@@ -199,13 +199,13 @@ def is_still(solver, dt, span):
 
 
 @part
-def repeat_substep(solver, left, h, span):
+def repeat_substep(solver, left, h, span, arms):
     """The substeps that are left of an island that rests do what the last one did."""
     for k in range(span[0], span[1]):
         solver.total[k] += left * solver.impulse[k]
     for q in range(span[2], span[3]):
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], left * h)
-    integrate_rotations(solver, left * h, span)
+    integrate_rotations(solver, left * h, span, arms)
 
 
 @part
@@ -238,32 +238,33 @@ def contact_spring(solver, stiffer, substeps, h):
 
 
 @part
-def solve_range(solver, substeps, kind, dt, span):
+def solve_range(solver, substeps, kind, dt, span, arms):
     """The substeps of a range."""
     h, stiff, special = dt / substeps, kind == HARD, kind != ORDINARY
     springs = contact_spring(solver, 1.0, substeps, h), contact_spring(solver, STATIC_STIFFNESS, substeps, h)
-    open_all(solver, span)
+    open_all(solver, span, arms)
     list_driven(solver, span)
-    if len(span[4]) > 0:
+    if len(arms) > 0:
         find_chunks(solver, span)
+        load_masses(solver, span)
     scale_impulses(solver, 1.0 / substeps, span)
     for k in range(span[0], span[1]):
         sag = LOAD_SAG_SHARE * solver.sag * solver.impulse[k] * h / solver.mass[k]
         solver.loaded[k] = 0.0 if stiff else min(sag, LOAD_SAG_MAX * solver.extent[k])
-    if len(span[4]) > 1:
+    if len(arms) > 1:
         start_joints(solver, h, dt / solver.usual)
-    measure(solver, h, springs, dt, stiff, False, span)
+    measure(solver, h, springs, dt, stiff, False, span, arms)
     most = most_impulse(solver, solver.island[span[2]], substeps) if special else math.inf
     for step in range(substeps):
         left = substeps - 1 - step
         if special:
             note_impulses(solver, span)
-        solve_substep(solver, springs, most, dt, h, kind, left == 0, span)
-        if special and left > 0 and is_still(solver, dt, span):
-            repeat_substep(solver, left, h, span)
+        solve_substep(solver, springs, most, (h, dt), kind, left == 0, span, arms)
+        if special and left > 0 and is_still(solver, dt, span, arms):
+            repeat_substep(solver, left, h, span, arms)
             break
     scale_impulses(solver, float(substeps), span)
-    if len(span[4]) > 1:
+    if len(arms) > 1:
         keep_joints(solver, dt)
 
 
@@ -299,7 +300,7 @@ def solve_substeps(state, dt, arms):
     select_rigid(state, dt, zero_of(state), arms)
     start, begin, solver.lightened = 0, 0, False
     for s in range(solver.ranges):
-        span = start, solver.row_ends[s], begin, solver.body_ends[s], arms
+        span = start, solver.row_ends[s], begin, solver.body_ends[s]
         t, special = solver.special[s], s > 0
         if special:
             for m in range(solver.movers):
@@ -309,7 +310,7 @@ def solve_substeps(state, dt, arms):
                     rotate_body(solver, q, scale(solver.spin[q], -dt))
             solver.lightened = solver.load_share[t] < 1.0
             if solver.lightened:
-                cap_mass_ratio(solver, t, dt, span)
+                cap_mass_ratio(solver, t, dt, span, arms)
         any_joint = False
         if len(arms) > 1:
             solver.joints.begin = solver.joints.end if special else 0
@@ -321,7 +322,7 @@ def solve_substeps(state, dt, arms):
             substeps, kind = state.substeps, ORDINARY
             if special:
                 substeps, kind = solver.substeps_of[t], HARD if solver.hard_of[t] else REFINED
-            solve_range(solver, substeps, kind, dt, span)
+            solve_range(solver, substeps, kind, dt, span, arms)
         start, begin = span[1], span[3]
     count_work(state, dt)
 
