@@ -18,12 +18,11 @@ from weakref import WeakKeyDictionary
 import numba
 from llvmlite.binding import Linkage
 from numba import _dynfunc  # pyright: ignore[reportAttributeAccessIssue]
-from numba.core import ir, typed_passes, types, untyped_passes
+from numba.core import typed_passes, types, untyped_passes
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
-from numba.core.compiler_machinery import FunctionPass, LoweringPass, PassManager, register_pass
+from numba.core.compiler_machinery import LoweringPass, PassManager, register_pass
 from numba.core.environment import lookup_environment
-from numba.core.ir_utils import find_const, get_definition, guard
 from numba.core.transforms import canonicalize_cfg
 from numba.core.typing.templates import Signature
 
@@ -47,48 +46,6 @@ class _Passes(PassManager):
         pss.run_finalizer(internal_state)
         if changed and not isinstance(pss, LoweringPass):
             internal_state.func_ir.blocks = canonicalize_cfg(internal_state.func_ir.blocks)
-
-
-@register_pass(mutates_CFG=False, analysis_only=False)
-class _TupleLengths(FunctionPass):
-    """``len`` of a tuple within an argument is a constant: numba leaves out branches that depend on constants before it
-    types them, but of tuples knows only the length of the arguments themselves."""
-
-    _name = "carom_tuple_lengths"
-
-    def __init__(self) -> None:  # numba asks for one
-        super().__init__()
-
-    def run_pass(self, state: Any) -> bool:
-        code = state.func_ir
-        for block in code.blocks.values():
-            for assigned in block.find_insts(ir.Assign):
-                call = assigned.value
-                if not (isinstance(call, ir.Expr) and call.op == "call" and len(call.args) == 1):
-                    continue
-                if getattr(guard(get_definition, code, call.func), "value", None) is not len:
-                    continue
-                kind = _type_within(code, call.args[0], state.args)
-                if isinstance(kind, types.BaseTuple):
-                    known = code._definitions[assigned.target.name]
-                    assigned.value = known[known.index(call)] = ir.Const(kind.count, assigned.loc)
-        return True
-
-
-def _type_within(code: Any, variable: Any, arguments: Any) -> Any:
-    """The type of an argument, or of what stands in a tuple there; None of all else."""
-    value = guard(get_definition, code, variable)
-    if isinstance(value, ir.Arg):
-        return arguments[value.index]
-    operation = getattr(value, "op", None)
-    if operation == "exhaust_iter":
-        return _type_within(code, value.value, arguments)
-    if operation in ("getitem", "static_getitem"):
-        kind = _type_within(code, value.value, arguments)
-        index = guard(find_const, code, value.index) if operation == "getitem" else value.index
-        if isinstance(kind, types.BaseTuple) and isinstance(index, int):
-            return kind[index]
-    return None
 
 
 class _TypingContext:
@@ -207,8 +164,6 @@ class _KernelCompiler(Compiler):
         if not self.state.flags.nrt:
             left_out |= _ARRAYS
         for step, description in whole.passes:
-            if step is untyped_passes.RewriteSemanticConstants:
-                passes.add_pass(_TupleLengths, "lengths of tuples in arguments")
             if step not in left_out:
                 passes.add_pass(self.lowering if step is _LOWERING else step, description)
         passes.finalize()
