@@ -16,7 +16,6 @@ from ..integration.trajectory import (
     ROUNDING,
     along,
     centre_at,
-    first_root,
     rate_along,
     relative_path,
     travel_of,
@@ -154,12 +153,9 @@ def bounce_threshold(state, a, b):
 def is_held_by_edge(state, a, b, path, touch, speed, dt):
     """Whether a supported body that slides or rolls has sunk in a little, and only meets the edge of the next thing in
     its row: it does not get deeper than it may."""
-    bodies, (t, normal, _, _) = state.bodies, touch
-    edge, curve = rest_edge(state, a, b, dt), dot(add_scaled(path[2], path[3], 3.0 * t), normal)
-    ahead = t + first_root(2.0 * edge, speed, curve, dot(path[3], normal), dt - t)
-    if not ahead <= dt:
-        return True
-    at = along(path, ahead)
+    bodies, (t, _, _, apart) = state.bodies, touch
+    edge = rest_edge(state, a, b, dt)
+    at = add_scaled(apart, rate_along(path, t), 2.0 * edge / -speed)
     return evaluate(state, bodies.shape[a], a, bodies.shape[b], b, at)[1] <= edge
 
 
