@@ -18,7 +18,7 @@ CLASSES = (
     pymunk.Space, pymunk.Body, pymunk.Shape, pymunk.Circle, pymunk.Poly, pymunk.Segment, pymunk.Arbiter,
     pymunk.ShapeFilter, constraints.Constraint, *constraints.Constraint.__subclasses__(),
 )  # fmt: skip
-WORDS = {"pymunk", "arcade", "gif", "py"}  # behind a point, and no name of carom
+WORDS = {"pymunk", "arcade", "gif", "py", "maps"}  # behind a point, and no name of carom
 
 
 def rows(page) -> list[list[str]]:

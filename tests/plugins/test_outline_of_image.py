@@ -8,6 +8,8 @@ import pytest
 from carom import Physics, RigidBody, SphereCollider, Transform, World, create_chain, outline_of_image
 from carom.plugins import terrain
 
+pytestmark = pytest.mark.plain
+
 
 def area_of(loop):
     x, y = loop.T

@@ -66,6 +66,7 @@ def test_late_and_lost_inputs_end_in_the_same_bits(late, lost, most):
         assert peer.replayed > 0
 
 
+@pytest.mark.plain
 def test_worlds_that_differ_are_found_out():
     peers = [Rollback(*game()) for _ in range(2)]
     for peer in peers:
@@ -83,6 +84,7 @@ def test_worlds_that_differ_are_found_out():
     assert peers[0].differs(90, hash_there) is None  # not played
 
 
+@pytest.mark.plain
 def test_it_waits_for_the_slowest_and_ignores_gaps():
     world, apply = game()
     rollback = Rollback(world, apply, most=3)
