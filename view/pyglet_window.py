@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from ..framework import CaromError, World
 from ..framework.typing import Vector
 from .camera import Camera
 from .colours import ACCENT, BACKGROUND
-from .packages import package
+from .packages import MissingPackageError, package
 from .plane.pyglet_painter import PygletPainter
 from .window import LONGEST, DisplayError, Window
 
@@ -52,7 +53,7 @@ class PygletView(Window):
         real_time: bool = True,
     ) -> None:
         self._pyglet = package("pyglet", "carom.view.PygletView")
-        self._symbols = package("pyglet", "carom.view.PygletView", "window").key
+        self._symbols = self._displayed(lambda: package("pyglet", "carom.view.PygletView", "window").key)
         super().__init__(world, size, camera, title, controls, outlines, rate, rewind_megabytes, prepare, real_time)
         if world.dimensions != 2:
             raise CaromError(f"PygletView shows worlds in 2D, {world!r} has {world.dimensions} dimensions")
@@ -71,8 +72,16 @@ class PygletView(Window):
 
     def _opened(self, title: str) -> Any:
         width, height = self.camera.size
+        make = self._pyglet.window.Window
+        return self._displayed(lambda: make(width, height, caption=title, resizable=True, vsync=False))
+
+    @staticmethod
+    def _displayed(make: Callable[[], Any]) -> Any:
+        """What ``make`` returns; the import of pyglet.window already looks for a display."""
         try:
-            return self._pyglet.window.Window(width, height, caption=title, resizable=True, vsync=False)
+            return make()
+        except MissingPackageError:
+            raise
         except Exception as error:  # pyglet's own of each platform have no common base
             raise DisplayError(
                 f"no display for a window: {error}; carom run SCENE --record FILE draws without one"

@@ -50,6 +50,21 @@ def test_pyglet_is_taken_where_pygame_is_missing(monkeypatch):
     world.close()
 
 
+def test_without_a_display_pyglet_has_one_line(monkeypatch):
+    """The import of pyglet.window looks for a display, before there is a window."""
+    from carom.view import pyglet_window
+    from carom.view.window import DisplayError
+
+    def package(name, what, part=""):
+        if part:
+            raise RuntimeError("cannot connect")
+
+    monkeypatch.setattr(pyglet_window, "package", package)
+    with World(Physics(2)) as world, pytest.raises(DisplayError, match=r"no display .* cannot connect; .*--record FILE"):
+        pyglet_window.PygletView(world)
+    world.close()
+
+
 PROGRAM = """
 import numpy as np, pyglet
 pyglet.options.headless = True
