@@ -18,7 +18,7 @@ from .contents import LevelLayer
 from .errors import Finding, Findings, MapError, RefusedError
 from .fields import Sorter, Vocabulary
 from .formats.ldtk import is_ldtk, level_names, read_ldtk
-from .formats.model import MapData, MapLayer
+from .formats.model import MapData, MapLayer, MapObject
 from .formats.reading import Property, document
 from .formats.tiled import read_tiled
 from .level import Level
@@ -133,7 +133,13 @@ class Plan:
         self.level = level = Level(file, (data.columns * metres, data.rows * metres), metres, data.tile)
         level.pictures, level.background = data.pictures, data.background
         level.properties = {name: each.value for name, each in data.properties.items()}
-        objects = {thing.id: (thing, layer) for layer in data.layers for thing in layer.objects}
+        objects: dict[Any, tuple[MapObject, MapLayer]] = {}
+        for layer in data.layers:
+            for thing in layer.objects:
+                if thing.id and thing.id in objects:
+                    findings.add(f"two objects have the id {thing.id}, in layers {objects[thing.id][1].name!r} and "
+                                 f"{layer.name!r}")  # fmt: skip
+                objects[thing.id] = thing, layer
         bodies = Bodies(objects, scale, data.rows * metres)
         bodies.sorter = Sorter(known, findings, bodies.points_of, bodies.place_of, bodies.to_world)
         tiles = TileLayers(data, metres, bodies, findings)
@@ -146,8 +152,8 @@ class Plan:
     @classmethod
     def of(cls, path: str | Path, known: Vocabulary, level: str | None, metres: float = 1.0) -> Plan:
         """Of a file; MapError if there is no way on after what is wrong."""
-        if not 0.0 < metres < np.inf:
-            raise ValueError(f"maps.load: metres must be above 0, got {metres!r}")
+        if isinstance(metres, str) or not 0.0 < metres < np.inf:
+            raise ValueError(f"maps.load: metres must be a finite number above 0, got {metres!r}")
         file = Path(path)
         findings = Findings(file)
         try:

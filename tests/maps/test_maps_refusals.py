@@ -111,6 +111,10 @@ BROKEN = {
         with_object(properties={"shape": "blob"}),
         [f"{IT}, property 'shape': it must be one of box, capsule"],
     ),
+    "two of one id": (
+        map_of(6, 4, objects_of(*copy.deepcopy(GOOD)), objects_of(thing(2, 9, 9, 8, 8), name="more")),
+        ["two objects have the id 2, in layers 'things' and 'more'"],
+    ),
     "no extent": (with_object(w=0), [f"{IT}: a rectangle of 0 x 16 pixels"]),
     "flat polygon": (with_object(polygon=((0, 0), (8, 8), (16, 16))), [f"{IT}: the polygon has no area"]),
     "two corners": (with_object(polygon=((0, 0), (8, 8))), [f"{IT}: a polygon of 2 points"]),
@@ -267,6 +271,7 @@ def test_wrong_arguments_are_told_before_a_file_is_read():
         ({"prefabs": {"a": 3}}, r"prefabs\['a'\] must be a Prefab"),
         ({"materials": {"Ice": {"frction": 1}}}, "no field 'frction' .did you mean 'friction'"),
         ({"metres": 0}, "above 0"),
+        ({"metres": "1"}, "a finite number above 0, got '1'"),
     ):
         with pytest.raises((ValueError, TypeError), match=told):
             maps.load("none.tmx", world, **bad)
