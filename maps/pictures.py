@@ -196,7 +196,8 @@ class Pictures:
                 self._images[path] = alpha
             except (OSError, self.pygame.error) as error:
                 self._images[path] = None
-                warnings.warn(f"{path}: {error}; what it shows is drawn as boxes", stacklevel=2)
+                what = f"cannot be read: {error}" if path.exists() else "is missing"
+                warnings.warn(f"image {path} {what}; what it shows is drawn as boxes", stacklevel=2)
         return self._images[path]
 
 

@@ -128,7 +128,7 @@ def test_a_missing_image_is_told_once_and_drawn_as_a_box(tmp_path, world):
     level = maps.load(path, world)
     screen = pygame.Surface((32, 16))
     camera = camera_of(32, 16, 16.0, (1.0, 0.5))
-    with pytest.warns(UserWarning, match=r"basic\.png.*drawn as boxes"):
+    with pytest.warns(UserWarning, match=r"basic\.png is missing; what it shows is drawn as boxes"):
         level.draw(screen, camera)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
