@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -128,17 +128,22 @@ class Recording:
 
     view
         (lower corner, upper corner), m, of what is shown; None: all there is
+    above
+        is called with the recording, to paint on its ``screen`` what is before the world
     """
 
-    def __init__(self, world: World, path: Path, view: tuple[Vector, Vector] | None = None) -> None:
+    def __init__(
+        self, world: World, path: Path, view: tuple[Vector, Vector] | None = None,
+        above: Callable[[Any], object] | None = None,
+    ) -> None:  # fmt: skip
         self.film = Film(path)
         self._world, self._drawing, self._painter = world, Drawing(world), painter_of(world)
         self.camera: Any = camera_of(world, SIZES[self.film.kind])
         view = view or corners_of(self._drawing.update(), np.asarray(world.bodies.position))
         if view is not None:
             self.camera.fit(*view)
-        self.surface = package("pygame", "a film").Surface(self.camera.size)
-        self._shown = 0
+        self.screen = package("pygame", "a film").Surface(self.camera.size)
+        self._shown, self._above = 0, above
         self._show(0.0)
 
     def after_step(self, done: int) -> None:
@@ -153,5 +158,7 @@ class Recording:
         self.film.close()
 
     def _show(self, seconds: float) -> None:
-        self._painter.paint(self.surface, self._drawing.update(interpolated=False), self.camera)
-        self.film.add(self.surface, seconds)
+        self._painter.paint(self.screen, self._drawing.update(interpolated=False), self.camera)
+        if self._above is not None:
+            self._above(self)
+        self.film.add(self.screen, seconds)

@@ -72,7 +72,7 @@ def run_command(
     _check_view(view, world, loaded)
     if steps is None:
         steps = round((loaded.seconds or DEFAULT_SECONDS if seconds is None else seconds) / world.settings.dt)
-    film = None if record is None else _film_of(world, record, view)
+    film = None if record is None else _film_of(world, loaded, record, view)
 
     def after_step(done: int) -> None:
         bar.advance(1)
@@ -108,12 +108,13 @@ def _check_view(view: Corners | None, world: World, loaded: Loaded) -> None:
         raise Problem(f"{loaded.name}: view has {len(view[0])} dimensions, the world {world.dimensions}")
 
 
-def _film_of(world: World, file: Path, view: Corners | None) -> Any:
+def _film_of(world: World, loaded: Loaded, file: Path, view: Corners | None) -> Any:
     """What records it; Problem if it cannot be written, or a package is missing."""
     from ...view.film import Recording
 
     try:
-        return Recording(world, file, view)
+        above = None if loaded.level_of is None else _pictures_of(loaded.level_of(world), world)
+        return Recording(world, file, view, above)
     except CaromError as error:
         raise Problem(f"--record: {one_line(error)}") from error
 

@@ -85,7 +85,7 @@ def test_a_window_a_film_and_a_surface_show_the_list(world, tmp_path):
     check(player.view.screen, Drawing(world).update(), player.view.camera)
     player.view.close()
     film = Recording(world, tmp_path / "film.gif")
-    check(film.surface, Drawing(world).update(interpolated=False), film.camera)
+    check(film.screen, Drawing(world).update(interpolated=False), film.camera)
     camera, surface = Camera((300, 300), (3, 0.2), 60), pygame.Surface((300, 300))
     painter = Painter()
     for _ in range(2):
