@@ -119,8 +119,8 @@ class Rollback:
 
     def differs(self, frame: int, checksum: str) -> bool | None:
         """Whether another player's ``checksum`` of a ``frame`` is not the hash that this world had there; None if that
-        is not known here."""
+        is not known here, or the other has not begun."""
         self.settle()
-        if frame > self.confirmed or frame not in self._hashes:
+        if not checksum or frame > self.confirmed or frame not in self._hashes:
             return None
         return self._hashes[frame] != checksum

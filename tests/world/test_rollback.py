@@ -77,6 +77,7 @@ def test_worlds_that_differ_are_found_out():
     for peer in peers:
         while peer.frame < 70:
             assert peer.step()
+            assert peer.differs(0, "") is None  # of one that has not begun
     frame, hash_there = peers[0].checksum()
     assert frame == 60
     assert peers[1].differs(frame, hash_there) is True
