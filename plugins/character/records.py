@@ -21,7 +21,6 @@ CRUSHED, LANDED, HIT = range(3)
 # Columns by row of the table, by number of a push, an event, a hit or a plane: all have as many rows.
 WORK = Schema(
     "CharacterWork",
-    statics_version=integer(),  # of the state, when characters were moved last
     place=vectors(unit="m"),  # where row i will be,
     velocity=vectors(unit="m/s"),  # and its own velocity: all look at those of the start
     push=vectors(unit="m/s"),  # what characters have changed the velocity of row i by

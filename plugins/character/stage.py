@@ -49,7 +49,6 @@ def move_characters(state, dt, character, near, work, ladder):
             character.place[i] = work.place[i]
             character.pushed[i] = scale(work.place[i], 0.0)
     limit_pushes(state, character, work)
-    work.statics_version = state.statics_version
     return rows
 
 

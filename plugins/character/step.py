@@ -160,22 +160,17 @@ def stands_nowhere(character, i):
 
 
 @part
-def carried(walker, ride, floor, left, put, rising):
+def carried(walker, ride, floor, left, rising):
     """(place, row of what crushes it) after the ride on its floor, and out of what has moved into it.
 
     left
         the row of a floor that it jumps off
     """
-    state, near, work = walker.state, walker.near, walker.work
-    at, crusher = walker.start, -1
+    at = walker.start
     if dot(ride, ride) > 0.0 and left < 0:
         at = slide(walker, at, ride, False, True, floor)
-    disturbed = put or work.hits > 0 or state.statics_version != work.statics_version
-    for k in range(walker.found):  # beside what rests nothing can have moved into it
-        disturbed |= state.dynamic <= near.row[k] < state.moving
-    if disturbed:
-        at, crusher = part_out(walker, at, rising, left)
-    if crusher >= 0 and deepest(walker, at, state.moving, 1e-6)[0] >= 0:
+    at, crusher = part_out(walker, at, rising, left)
+    if crusher >= 0 and deepest(walker, at, walker.state.moving, 1e-6)[0] >= 0:
         at = walker.start
     return at, crusher
 
@@ -378,7 +373,7 @@ def move_one(state, near, character, ladder, work, i, dt):
         cos(character.max_slope[i]), dropping, gravity, wish, look_around(state, near, i, start, extents, reach),
     )  # fmt: skip
     work.hits, work.inside = 0, False
-    at, crusher = carried(walker, ride, floor, left, put, rising)
+    at, crusher = carried(walker, ride, floor, left, rising)
     begin, first = at, work.hits
     # jumps, and how fast it wants to be
     climbing = is_on_ladder(walker, ladder, at, before, standing)

@@ -539,9 +539,7 @@ def test_its_weight_presses_on_what_it_stands_on(figure):
     for weight in (0.0, 100.0):
         stage = Stage(figure, y=0.0, weight=weight)
         shape = AABBCollider(vector(figure.d, 3.0, 0.5, 3.0))
-        slab = stage.world.create_entity(
-            Transform(stage.at(0.0, -0.5)), RigidBody(mass=10.0, gravity_scale=0.0), shape
-        )
+        slab = stage.world.create_entity(Transform(stage.at(0.0, -0.5)), RigidBody(mass=10.0, gravity_scale=0.0), shape)
         stage.run(20)
         before = stage.velocity_of(slab)[1]
         stage.run(30)
@@ -745,13 +743,28 @@ def test_a_press_crushes_it_and_it_stays_out_of_the_floor(figure):
     assert step - 2 == crushed[0]  # two steps were taken before
 
 
+def test_in_a_wall_it_is_crushed_in_every_step_as_after_a_restore():
+    """What it does follows from where it is: not from whether anything has changed since the last step."""
+    world = world_of(2)
+    wall = world.create_entity(Transform((0, -1)), AABBCollider(1.0))
+    entity = world.create_entity(Transform((0.95, -1)), RigidBody(kind="kinematic"), FIGURES["capsule 2D"].collider(),
+                                 Character())  # fmt: skip
+    for _ in range(3):
+        snapshot = world.snapshot()
+        world.step()
+        after = world.state_hash()
+        assert world.component_for_entity(entity, Character).crushed == wall
+        world.restore(snapshot)
+        world.step()
+        assert world.state_hash() == after
+    world.close()
+
+
 @each_figure
 def test_between_a_platform_and_a_wall_it_is_crushed(figure):
     stage = Stage(figure)
     stage.box((3, 0), (4, 5))
-    pusher = stage.box(
-        (-4.5, 0.1), (-3.5, 1.9), RigidBody(kind="kinematic", linear_velocity=vector(figure.d, 2.0))
-    )
+    pusher = stage.box((-4.5, 0.1), (-3.5, 1.9), RigidBody(kind="kinematic", linear_velocity=vector(figure.d, 2.0)))
     track = stage.run(220)
     crushed = [step for step, by in enumerate(track.crushed) if by >= 0]
     assert crushed[0] == pytest.approx((3.0 + 3.5 - 0.8) / 2.0 * 60, abs=3)
@@ -901,9 +914,7 @@ def test_it_walks_round_a_planet(name):
     assert (track.position @ up).max() - 10.0 - stage.stands == pytest.approx(TOP, abs=0.01)
 
 
-@pytest.mark.parametrize(
-    ("d", "up"), [(2, (1, 0)), (2, (0, -1)), (3, (1, 0, 0)), (3, (0, -1, 0)), (3, (0, 0, 1))]
-)
+@pytest.mark.parametrize(("d", "up"), [(2, (1, 0)), (2, (0, -1)), (3, (1, 0, 0)), (3, (0, -1, 0)), (3, (0, 0, 1))])
 def test_any_way_may_be_up(d, up):
     """A fall, a walk and a jump in a world on its side: as upright, seen that way."""
     tracks = []
