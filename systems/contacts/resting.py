@@ -265,6 +265,8 @@ def linearise(state, dt):
             if not far or parting != STATIONARY:
                 gap, normal = entry(state, a, b, d, sub(end, d), parting != STATIONARY, slop)
             forget_manifold(pairs, c)
+        if gap == math.inf:  # deep in a map that has no face there, at neither end: one that it does not reach
+            gap = extent + length(sub(end, d))
         if pairs.impulse[c] > 0.0 and dot(normal, struck_along) <= 0.0:
             normal = struck_along  # coincident centres have parted: not back again
             forget_manifold(pairs, c)

@@ -11,9 +11,11 @@ import pytest
 from helpers_tiles import boxes_of, distances
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import World
+from carom.framework import Settings, World
 from carom.plugins import Physics, convex_polygon, tile_grid
 from carom.plugins.convex_polygon import ConvexPolygonCollider
+from carom.plugins.joints import Hinge, Joints
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
 from carom.plugins.tile_grid import TileGridCollider, cells_of_text
 
 pytestmark = pytest.mark.slow  # its scenes compile for long
@@ -293,3 +295,31 @@ def test_the_example_runs_to_the_end_of_the_map(capsys):
     assert np.diff(path[:, 0]).min() > -0.02  # it is never thrown back
     assert path[:, 1].min() > 1.4
     assert len(capsys.readouterr().out.splitlines()) == 12
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("mode", ["discrete", "continuous"])
+def test_a_chain_of_boxes_put_into_rock_stays_finite(mode):
+    """Deep in a map there is no face of a kind at either end of a box's way: no contact then, and no infinite gap."""
+    for seed in (59001,):
+        rng, rows = np.random.default_rng([seed, 5]), []
+        rng.choice(("a", "b", "c"))
+        for _ in range(8):
+            rows.append("#" + "".join(rng.choice(list("....#="), 18)) + "#")
+        text = "\n".join(["#" * 20, *rows, "#" * 20])
+        cells, shapes = tile_grid.map_of_text(text, {"=": tile_grid.TileShape.ONE_WAY})
+        plugins = Rotation(), Joints(), convex_polygon.plugin, tile_grid.plugin
+        world = World(Physics(2, gravity=(0, -20)), *plugins, settings=Settings(collision=mode, on_fault="ignore"))
+        for each in TileGridCollider.with_one_way(cells, 1.0, lower=(0, 0), shapes=shapes):
+            world.create_entity(Transform((0, 0)), each)
+        last = None
+        for k in range(5):
+            collider = BoxCollider((0.3, 0.3), friction=0.5)
+            box = world.create_entity(Transform((2.5 + k, 7.5)), RigidBody(), collider, Spin())
+            if last is not None:
+                world.create_entity(Hinge(last, box, anchor=(2.0 + k, 7.5)))
+            last = box
+        for _ in range(30):
+            world.step()
+        assert np.isfinite(world.bodies.position).all()
+        world.close()
