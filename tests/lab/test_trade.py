@@ -89,7 +89,9 @@ def test_the_apex_of_the_jump_arc():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("method", "meets", "fails"), [("velocity_verlet", 800, 400), ("yoshida4", 400, 200)])
+@pytest.mark.parametrize(("method", "meets", "fails"), [
+    ("velocity_verlet", 800, 400), pytest.param("yoshida4", 400, 200, marks=pytest.mark.long),
+])
 def test_the_steps_that_keep_the_energy_of_an_orbit_within_a_hundredth(method, meets, fails):
     """Known for Kepler's orbit, e = 0.6, four periods, steps halved until |E - E0| / |E0| < 1e-2, the norm here."""
     seconds = 8 * math.pi
