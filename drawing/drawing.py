@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ..components.spin import Spin
 from ..framework import World
-from .library import Library
 from .lists import DrawingList, Style
+from .outline_cache import OutlineCache
 from .overlays import box_lines, contact_marks, joint_marks, velocity_lines
 from .shapes import Places, arrays_of, parts_of, shapes_at, watched_of
 
@@ -28,7 +28,7 @@ class Drawing:
         self.world = world
         world.bodies  # noqa: B018 - raises without physics
         self._physics: Any = world.physics
-        self._library = Library(self._physics.dimensions)
+        self._cache = OutlineCache(self._physics.dimensions)
         self._version: Any = None
         self._moving: Any = None
         self._moving_seen: dict[str, bytes] = {}
@@ -72,7 +72,7 @@ class Drawing:
         if boxes:
             lines.append(box_lines(world, moving))
         return DrawingList(
-            self._library.dimensions, polygons, circles, capsules, lines, points,
+            self._cache.dimensions, polygons, circles, capsules, lines, points,
             fixed, fixed_circles, fixed_capsules, fixed_lines, self._fixed_version,
         )  # fmt: skip
 
@@ -81,16 +81,16 @@ class Drawing:
         world, version = self.world, (table.version, table.members_version, self.world.registry.version)
         now = watched_of(world, rows)
         if self._moving is None or version != self._version or now != self._moving_seen:
-            if len(self._library.outlines) > KNOWN + SPARE * table.count:
-                self._library = Library(table.dimensions)
-            self._moving, self._moving_seen = parts_of(world, self._library, rows), now
+            if len(self._cache.outlines) > KNOWN + SPARE * table.count:
+                self._cache = OutlineCache(table.dimensions)
+            self._moving, self._moving_seen = parts_of(world, self._cache, rows), now
         statics, arrays = (version, table.static_version, self._physics.state.statics_version), arrays_of(world, still)
         if statics != self._statics or arrays != self._arrays_seen:
             now = watched_of(world, still) | {
                 key: table.column(key)[still].tobytes() for key in ("position", "rotation")
             }
             if self._fixed is None or now != self._fixed_seen:
-                self._fixed = shapes_at(parts_of(world, self._library, still), self._places(still, False))
+                self._fixed = shapes_at(parts_of(world, self._cache, still), self._places(still, False))
                 self._fixed_seen = now
                 self._fixed_version += 1
             self._arrays_seen = arrays

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ..components import SphereCollider
 from ..framework.plugins.registry import Shape
 from ..systems.shapes.rotation import axes_of
-from .library import Kind, Library, Rows
 from .lists import Capsules, Circles, Floats, Lines, Polygons, Style, no_capsules, no_circles
+from .outline_cache import Kind, OutlineCache, Rows
 from .outlines import fields_of
 
 PLAIN = -1  # neither a sensor nor one-way
@@ -23,11 +23,11 @@ class Colliders(NamedTuple):
     """S colliders."""
 
     row: Rows  # of the table
-    outline: Rows  # its number in the library
+    outline: Rows  # its number in the cache
     offset: Floats  # (S, d)
     turns: NDArray[np.bool_]  # whether the shape turns with its body
     special: NDArray[np.int8]  # its style, PLAIN: that of its body
-    radius: Floats  # of a sphere, whose outline is the same for all; NaN: as the library says
+    radius: Floats  # of a sphere, whose outline is the same for all; NaN: as the cache says
 
 
 @dataclass
@@ -93,9 +93,9 @@ def arrays_of(world: Any, rows: slice) -> dict[str, bytes]:
     }  # fmt: skip
 
 
-def colliders_of(world: Any, library: Library, rows: slice) -> Colliders:
+def colliders_of(world: Any, cache: OutlineCache, rows: slice) -> Colliders:
     """Those of the bodies of these rows, one shape after the other."""
-    table, d = world.physics.table, library.dimensions
+    table, d = world.physics.table, cache.dimensions
     none = np.zeros(0, np.int64)
     found = [(none, none, np.zeros((0, d)), np.zeros(0, bool), np.zeros(0, np.int8), np.zeros(0))]
     for component, shape in world.registry.shapes.items():
@@ -106,21 +106,21 @@ def colliders_of(world: Any, library: Library, rows: slice) -> Colliders:
             offset, sensor, one_way = (table.values(component.columns[name].key, row) for name in ALL)
             if component is SphereCollider:  # often thousands, each of another size, which grow and shrink
                 radius = own["radius"]
-                outline = np.repeat(library.numbers_of(shape, {"radius": np.zeros(1)}, 1), len(row))
+                outline = np.repeat(cache.numbers_of(shape, {"radius": np.zeros(1)}, 1), len(row))
             else:
-                radius, outline = np.full(len(row), np.nan), library.numbers_of(shape, own, len(row))
+                radius, outline = np.full(len(row), np.nan), cache.numbers_of(shape, own, len(row))
             if hasattr(component, "turned"):
-                _follow_turns(table, library, shape, row, own, outline)
+                _follow_turns(table, cache, shape, row, own, outline)
             special = np.where(sensor, Style.SENSOR, np.where(one_way.any(axis=1), Style.ONE_WAY, PLAIN))
             found.append((row, outline, offset, np.full(len(row), component.rotates), special.astype(np.int8), radius))
     return Colliders(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
 
 
-def parts_of(world: Any, library: Library, rows: slice) -> list[Part]:
+def parts_of(world: Any, cache: OutlineCache, rows: slice) -> list[Part]:
     """What the bodies of these rows look like."""
-    row, outline, offset, turns, special, own = colliders_of(world, library, rows)
+    row, outline, offset, turns, special, own = colliders_of(world, cache, rows)
     parts = []
-    for kind, pieces in sorted(library.pieces.items()):
+    for kind, pieces in sorted(cache.pieces.items()):
         shape, ring, radius = pieces.of(outline)
         if len(shape):
             if kind.corners == 1:
@@ -132,15 +132,15 @@ def parts_of(world: Any, library: Library, rows: slice) -> list[Part]:
     return parts
 
 
-def _follow_turns(table: Any, library: Library, shape: Shape, row: Rows, own: Any, outline: Rows) -> None:
+def _follow_turns(table: Any, cache: OutlineCache, shape: Shape, row: Rows, own: Any, outline: Rows) -> None:
     """The outlines of those whose fields are others on a body that is turned."""
     component: Any = shape.component
     rotation = table.values("rotation", row)
     turned = np.flatnonzero(rotation if rotation.ndim == 1 else rotation[:, 1:].any(axis=1))
-    for k, axes in zip(turned.tolist(), axes_of(rotation[turned], library.dimensions), strict=True):
-        values = component.turned(fields_of(component, own, k, library.dimensions), axes)
+    for k, axes in zip(turned.tolist(), axes_of(rotation[turned], cache.dimensions), strict=True):
+        values = component.turned(fields_of(component, own, k, cache.dimensions), axes)
         columns = {name: np.array(value)[None] for name, value in zip(own, values, strict=True)}
-        outline[k] = library.numbers_of(shape, columns, 1)[0]
+        outline[k] = cache.numbers_of(shape, columns, 1)[0]
 
 
 def shapes_at(parts: list[Part], places: Places) -> tuple[list[Polygons], Circles, Capsules, list[Lines]]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...drawing import Drawing
-from ...drawing.library import Library
+from ...drawing.outline_cache import OutlineCache
 from ...drawing.shapes import colliders_of
 from ...framework import World
 from ...framework.outlines import Outline
@@ -25,9 +25,9 @@ def dimensions_of(world: World) -> int:
 
 def sizes_of(world: World) -> dict[int, float]:
     """The smallest extent of each entity that has a shape, m."""
-    library = Library(dimensions_of(world))
-    found = colliders_of(world, library, world.bodies.rows)
-    sizes = smallest_extents(library.outlines)[found.outline]
+    cache = OutlineCache(dimensions_of(world))
+    found = colliders_of(world, cache, world.bodies.rows)
+    sizes = smallest_extents(cache.outlines)[found.outline]
     sizes = np.where(np.isnan(found.radius), sizes, 2 * found.radius)
     order = np.argsort(-sizes, kind="stable")  # of several shapes of an entity the smallest
     return dict(zip(world.bodies.entity[found.row[order]].tolist(), sizes[order].tolist(), strict=True))

@@ -53,7 +53,7 @@ class Pieces:
         return shape, self._rings[piece], self._radii[piece]
 
 
-class Library:
+class OutlineCache:
     """``outlines``: of each number, with its rounding. ``pieces``: of each kind."""
 
     def __init__(self, dimensions: int) -> None:
