@@ -64,7 +64,8 @@ def test_no_kernel_leaves_its_arrays(folder):
     assert run_checked(folder, POISON, 8, "2D") == ""
 
 
-@pytest.mark.parametrize("names", [EXTREMES, pytest.param(LAWS, marks=pytest.mark.long)], ids=["extremes", "laws"])
+@pytest.mark.long
+@pytest.mark.parametrize("names", [EXTREMES, LAWS], ids=["extremes", "laws"])
 def test_extremes_and_random_worlds_stay_in_their_arrays(folder, names):
     """Gravity, masses, sizes and speeds far apart, caught bodies, bodies that come and go, scattered shapes."""
     files = [Path(__file__).parents[1] / name for name in names]

@@ -88,10 +88,8 @@ def test_the_apex_of_the_jump_arc():
         assert error == pytest.approx(missed, rel=1e-9, abs=1e-12)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("method", "meets", "fails"), [
-    ("velocity_verlet", 800, 400), pytest.param("yoshida4", 400, 200, marks=pytest.mark.long),
-])
+@pytest.mark.long
+@pytest.mark.parametrize(("method", "meets", "fails"), [("velocity_verlet", 800, 400), ("yoshida4", 400, 200)])
 def test_the_steps_that_keep_the_energy_of_an_orbit_within_a_hundredth(method, meets, fails):
     """Known for Kepler's orbit, e = 0.6, four periods, steps halved until |E - E0| / |E0| < 1e-2, the norm here."""
     seconds = 8 * math.pi
@@ -214,7 +212,7 @@ def stack_error(settings: Settings) -> float:
 @pytest.mark.parametrize(("name", "wanted", "verify"), [
     ("jump", {"norms": ("apex",), "max_error": 0.1, "absolute": True, "seconds": 1.0}, apex_error),  # pixels
     ("spring", {"max_error": 1e-3}, spring_error),
-    ("stack", {"max_error": 1e-3}, stack_error),
+    pytest.param("stack", {"max_error": 1e-3}, stack_error, marks=pytest.mark.long),
 ])  # fmt: skip
 def test_the_choice_keeps_the_error_in_runs_that_share_nothing_with_the_lab(name, wanted, verify):
     case = case_of(name, **wanted)
