@@ -148,9 +148,8 @@ class Column:
         kind, (low, high) = type(value), self.limits
         if kind is int:
             if self.dtype is np.int64:
-                bounded = self.positive or self.minimum is not None
-                refused = bounded or (self.nonzero and value == 0)
-                return value if abs(value) < 2**63 and not refused else None
+                fits = low <= value <= high and -(2**63) < value < 2**63
+                return value if fits and (value or not self.nonzero) else None
             if low <= value <= high:
                 return float(value)
         elif self.item == "vector" and (kind is tuple or kind is list) and len(value) in (2, 3):

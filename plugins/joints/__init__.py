@@ -29,7 +29,7 @@ from .joint import Row as Row
 from .kinds import KINDS as KINDS
 from .kinds import Ball, Cone, Distance, Hinge, Motor, MousePull, Slider, Weld, Wheel
 from .measures import Holds, anchors, holds, measure, moving
-from .rows import KEPT, KEY, OF_PLUGINS, JointRows, by_row, put_kept
+from .rows import KEPT, KEY, OF_PLUGINS, JointRows, by_row
 
 BREAKING = "breaking_force", "breaking_torque"
 
@@ -79,7 +79,8 @@ class Joints(Plugin):
         self._record: Any = self._physics.record(JOINTS)
         self._contents = world._contents()
         self._rows = JointRows(self._record, self._physics.dimensions, world.registry)
-        self._joints: dict[int, Joint] = {}  # those that have rows, by entity, which ascend
+        self._joints: dict[int, Joint] = {}  # those that have rows, by entity, which ascend,
+        self._made_of: dict[int, tuple[Any, ...]] = {}  # and the fields of which these were made
         self._holds: list[Holds] | None = None  # what columns() measures, once they are asked for
         self._anchors: np.ndarray | None = None  # (n, 2, d) along the axes of both bodies, the same of anchors()
         # Entities that came, went or changed, and joints of which a field was set, since the last step.
@@ -209,29 +210,34 @@ class Joints(Plugin):
 
     def take_back(self, world: Any, saved: Any) -> None:
         """The rows are those of the joints that there are now, with that; what no step has taken waits for the next."""
-        contents, record = self._contents, self._record
+        contents, dimensions = self._contents, self._physics.dimensions
         for joint in self._joints.values():
             joint._taken = None
-        self._joints, self._holds, self._anchors, self._given_away, self._table_version = {}, None, None, {}, -1
+        self._holds, self._anchors, self._given_away, self._table_version = None, None, {}, -1
         self._touched.clear()
         self._set.clear()
-        self._rows.clear()
         found = {e: contents.components_of(e)[c] for c in (*KINDS, *self._own) for e in contents.members.get(c, ())}
-        had = by_row(saved)
+        kept = {*saved["joint"].tolist(), *(entity for entity, joint in found.items() if joint.attached)}
+        self._drop({entity for entity in self._joints if entity not in found or entity not in kept})
         for entity, joint in sorted(found.items()):
             joint._contents = contents
-            if joint.attached:
-                joint.fit(self._physics.dimensions, entity)
+            if joint.attached and self._made_of.get(entity) == _fields_of(joint):  # most are as they were
+                joint._version, joint._entity, joint._taken = -dimensions, entity, self
+                self._joints[entity] = joint
+            elif joint.attached:
+                joint.fit(dimensions, entity)
                 self._take(entity, joint)
-            elif rows := [key[1:5] for key in had if key[0] == entity]:  # it takes hold anew with the next step
-                joint.fit(self._physics.dimensions, entity)
-                self._rows.lay(joint, rows)
+            elif entity in kept:  # it takes hold anew with the next step
+                joint.fit(dimensions, entity)
+                self._rows.lay(joint, [key[1:5] for key in by_row(saved) if key[0] == entity])
+                self._made_of.pop(entity, None)
                 self._joints[entity], joint._taken = joint, self
             if joint.changed:
                 self._touched.add(entity)
                 self._set.add(entity)
-        now = put_kept(record, slice(0, record.count), had)
-        self._released = {*saved.get("released", ()), *(body for key in had.keys() ^ now for body in key[3:5])}
+        self._joints = dict(sorted(self._joints.items()))
+        self._released = {*saved.get("released", ()), *self._rows.put_back(saved)}
+        record = self._record
         for name in BEFORE_STEP:
             getattr(record, f"old_{name}")[:] = getattr(record, name)
 
@@ -302,6 +308,7 @@ class Joints(Plugin):
         joint._taken = self._anchors = None
         rows = joint.rows(self._physics.dimensions)
         bodies, other = self._rows.put(joint, rows, fresh)
+        self._made_of[entity] = _fields_of(joint)
         joint._taken = self
         self._breaking = self._breaking or not (joint.breaking_force is joint.breaking_torque is None)
         if entity not in self._joints:
@@ -330,6 +337,8 @@ class Joints(Plugin):
             return set()
         self._rows.remove(sorted(entities))
         joints = [self._joints.pop(entity) for entity in sorted(entities)]
+        for entity in entities:
+            self._made_of.pop(entity, None)
         for joint in joints:
             joint._taken = None
         self._given_away = {key: value for key, value in self._given_away.items() if key[0] not in entities}
@@ -444,6 +453,13 @@ class Joints(Plugin):
             for entity, joint in joints:
                 self.world.events.dispatch(event, entity, joint)
             self._contents.delete([entity for entity, _ in joints])
+
+
+def _fields_of(joint: Joint) -> tuple[Any, ...]:
+    """What tells whether rows would be the same."""
+    values = (joint._values.get(name) for name in joint.columns if name not in ("attached", "changed"))
+    plain = (value.tobytes() if type(value) is np.ndarray else value for value in values)
+    return type(joint), *(value if value == value else None for value in plain)  # one that is not given is NaN
 
 
 def _matrix(q: Any) -> np.ndarray:

@@ -44,11 +44,6 @@ class JointRows:
         start = bisect.bisect_left(joints, entity, 0, count)
         return slice(start, bisect.bisect_right(joints, entity, start, count))
 
-    def clear(self) -> None:
-        self._changed(0)
-        self._record.apart = 0
-        self._pairs, self._places, self._free = {}, {}, []
-
     def put(self, joint: Joint, rows: list[Row], fresh: bool) -> tuple[set[int], bool]:
         """The rows of a joint as it is now; those that it has had, of the same two bodies, go on from there, and its
         angle unless it has just taken hold. Returns the bodies that it holds, or has held, and whether these are other
@@ -87,6 +82,18 @@ class JointRows:
             record.joint[j], (record.kind[j], record.rule[j], record.entity_a[j], record.entity_b[j]) = entity, key
             record.breaking_force[j] = record.breaking_torque[j] = math.inf
         return span
+
+    def put_back(self, saved: dict[str, Any]) -> list[int]:
+        """The rows go on from what was ``saved`` of them; the bodies of those that were others then."""
+        record = self._record
+        self._changed(count := record.count)
+        if all(np.array_equal(getattr(record, name)[:count], saved[name]) for name in KEY):
+            for name in (*KEPT, *OF_PLUGINS):
+                getattr(record, name)[:count] = saved.get(name, 0.0)
+            return []
+        had = by_row(saved)
+        now = put_kept(record, slice(0, count), had)
+        return [body for key in had.keys() ^ now for body in key[3:5]]
 
     def remove(self, entities: list[int]) -> None:
         """These joints have no rows any more."""
