@@ -18,6 +18,7 @@ from ..integration.turning import change_of_spin, cross_spin, symmetric, twist
 from .records import CUSTOM, HOLD, POINT, SPRING, TURN
 
 MOST_ANSWERS = 6  # rows that hold, in space, and each a number
+BOTH_ANSWERS = 2 * MOST_ANSWERS  # as they are, and behind these as if they gave way
 MOST_LEVER = 16.0  # times as much as the masses alone: what more is moved at the end of an arm gives way no more
 NOTHING = 1e-9  # of what an impulse moves: less is held by rows before
 
@@ -86,13 +87,13 @@ def response_at(joints, j, k, soft):
 
 
 @inlined
-def compliance_of(solver, first):
-    """By how much of what an impulse moves at it a joint gives way. Where that is the end of a long arm of a body which
-    turns easily it may have to bear the body itself, and gives way less."""
+def compliance_of(solver, first, usual):
+    """By how much of what an impulse moves at it a joint gives way: the ``usual`` part, 1 / stiffness, but where that is
+    the end of a long arm of a body which turns easily. It may have to bear the body itself, and gives way less."""
     joints = solver.joints
     w = solver.inverse_mass[joints.first[first]] + solver.inverse_mass[joints.second[first]]
     share = MOST_LEVER * w * joints.mass[first] if joints.kind[first] < TURN else 1.0
-    return min(1.0, share) / joints.stiffness
+    return share / joints.stiffness if share < 1.0 else usual
 
 
 @part
@@ -100,56 +101,57 @@ def couple(solver, first, gives):
     """The masses of the rows of a joint behind its first one, and the answers to them of those before that hold.
 
     Each row is made orthogonal to these, in the measure of kinetic energy and of what goes into the joint where that
-    gives way (Gram and Schmidt). gives: by so much of what an impulse at it moves, or 0; then of rows that hold alone.
+    gives way (Gram and Schmidt): by so much of what an impulse at it moves. Once as it is, then, but for springs, as if
+    it gave way.
     """
     joints, zero = solver.joints, scale(solver.joints.normal[first], 0.0)
-    n = MOST_ANSWERS
+    n = BOTH_ANSWERS
     force, spins_a, spins_b = stack_array(n, zero), stack_array(n, zero), stack_array(n, zero)
     answers, furthers, masses = stack_array(n, zero), stack_array(n, zero), stack_array(n, 0.0)
     a, b, d, held = joints.first[first], joints.second[first], len(zero), 0
     w, point = solver.inverse_mass[a] + solver.inverse_mass[b], joints.kind[first] == POINT
     arm_a, arm_b = joints.arm_a[first], joints.arm_b[first]
     for j in range(first + 1 if point else first, end_of(joints, first)):
-        if gives > 0.0 and is_soft_spring(joints, j):
-            continue
         along, turn_a, turn_b = row_directions(joints, j)
-        push, spin_a, spin_b = along, change_of_spin(solver, a, turn_a), change_of_spin(solver, b, turn_b)
-        whole = w * dot(along, along) + dot(turn_a, spin_a) + dot(turn_b, spin_b)
-        answer = further = zero
-        if point:
-            apart = add(scale(along, w), add(cross_spin(spin_a, arm_a), cross_spin(spin_b, arm_b)))
-            answer = symmetric_product(joints.inverse[first], joints.inverse_products[first], apart)
-            answer = scale(answer, -1.0 / (1.0 + gives))
-            push = add(push, answer)
-            spin_a = add(spin_a, change_of_spin(solver, a, twist(arm_a, answer)))
-            spin_b = add(spin_b, change_of_spin(solver, b, twist(arm_b, answer)))
-        for i in range(held):
-            moved = w * dot(along, row(force, i, zero)) + dot(turn_a, row(spins_a, i, zero))
-            share = -(moved + dot(turn_b, row(spins_b, i, zero))) * masses[i]
-            push = add_scaled(push, row(force, i, zero), share)
-            spin_a = add_scaled(spin_a, row(spins_a, i, zero), share)
-            spin_b = add_scaled(spin_b, row(spins_b, i, zero), share)
-            answer = add_scaled(answer, row(answers, i, zero), share)
-            further = add_scaled(further, row(furthers, i, zero), share)
-            k = i + d if point else i
-            if k < d:
-                answer = replace(answer, k, item(answer, k) + share)
+        turned_a, turned_b = change_of_spin(solver, a, turn_a), change_of_spin(solver, b, turn_b)
+        whole, holds = w * dot(along, along) + dot(turn_a, turned_a) + dot(turn_b, turned_b), is_holding(joints, j)
+        for soft in range(1 if is_soft_spring(joints, j) else 2):
+            push, spin_a, spin_b, begin = along, turned_a, turned_b, MOST_ANSWERS * soft
+            answer = further = zero
+            if point:
+                apart = add(scale(along, w), add(cross_spin(spin_a, arm_a), cross_spin(spin_b, arm_b)))
+                answer = symmetric_product(joints.inverse[first], joints.inverse_products[first], apart)
+                answer = scale(answer, -1.0 / (1.0 + gives) if soft else -1.0)
+                push = add(push, answer)
+                spin_a = add(spin_a, change_of_spin(solver, a, twist(arm_a, answer)))
+                spin_b = add(spin_b, change_of_spin(solver, b, twist(arm_b, answer)))
+            for i in range(begin, begin + held):
+                moved = w * dot(along, row(force, i, zero)) + dot(turn_a, row(spins_a, i, zero))
+                share = -(moved + dot(turn_b, row(spins_b, i, zero))) * masses[i]
+                push = add_scaled(push, row(force, i, zero), share)
+                spin_a = add_scaled(spin_a, row(spins_a, i, zero), share)
+                spin_b = add_scaled(spin_b, row(spins_b, i, zero), share)
+                answer = add_scaled(answer, row(answers, i, zero), share)
+                further = add_scaled(further, row(furthers, i, zero), share)
+                k = i - begin + d if point else i - begin
+                if k < d:
+                    answer = replace(answer, k, item(answer, k) + share)
+                else:
+                    further = replace(further, k - d, item(further, k - d) + share)
+            left = w * dot(along, push) + dot(turn_a, spin_a) + dot(turn_b, spin_b)
+            gives_way = gives * whole if holds and soft else 0.0
+            mass = 1.0 / (left + gives_way) if left > NOTHING * whole else 0.0
+            if soft:
+                joints.soft_answer[j], joints.soft_further[j] = answer, further
+                joints.mass_scale[j] = mass / joints.mass[j] if joints.mass[j] > 0.0 else 0.0
+                joints.impulse_scale[j] = gives_way * mass
             else:
-                further = replace(further, k - d, item(further, k - d) + share)
-        left = w * dot(along, push) + dot(turn_a, spin_a) + dot(turn_b, spin_b)
-        gives_way = gives * whole if is_holding(joints, j) else 0.0
-        mass = 1.0 / (left + gives_way) if left > NOTHING * whole else 0.0
-        if gives > 0.0:
-            joints.soft_answer[j], joints.soft_further[j] = answer, further
-            joints.mass_scale[j] = mass / joints.mass[j] if joints.mass[j] > 0.0 else 0.0
-            joints.impulse_scale[j] = gives_way * mass
-        else:
-            joints.mass[j], joints.answer[j], joints.further[j] = mass, answer, further
-        if is_holding(joints, j):
-            store(force, held, push)
-            store(spins_a, held, spin_a)
-            store(spins_b, held, spin_b)
-            store(answers, held, answer)
-            store(furthers, held, further)
-            masses[held] = mass
-            held += 1
+                joints.mass[j], joints.answer[j], joints.further[j] = mass, answer, further
+            if holds:
+                store(force, begin + held, push)
+                store(spins_a, begin + held, spin_a)
+                store(spins_b, begin + held, spin_b)
+                store(answers, begin + held, answer)
+                store(furthers, begin + held, further)
+                masses[begin + held] = mass
+        held += holds

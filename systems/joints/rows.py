@@ -90,23 +90,22 @@ def start_joints(solver, h, period):
     ``period``, whatever contacts ask for: changes of it would give energy to what is stretched."""
     joints = solver.joints
     joints.step, joints.moved_for, joints.fastest = h, 0.0, SPRING_FREQUENCY / period
+    omega = 2.0 * math.pi * JOINT_FREQUENCY / period
+    damping = 2.0 * JOINT_DAMPING_RATIO + h * omega
+    joints.stiffness = stiffness = h * omega * damping
+    rate, kept, back = omega / damping, stiffness / (1.0 + stiffness), 1.0 / (1.0 + stiffness)
     count_springs(solver)
     for e in range(joints.begin, joints.end):
         j = joints.order[e]
         joints.impulse[j], joints.push[j] = joints.load[j] * h, scale(joints.pull[j], h)
         if is_soft_spring(joints, j):
-            omega = 2.0 * math.pi * joints.frequency[j]
+            swing = 2.0 * math.pi * joints.frequency[j]
             together = max(solver.used[joints.first[j]], solver.used[joints.second[j]])
-            rate, mass_scale = joint_spring(omega * h, joints.damping_ratio[j], together)
-            joints.push_rate[j], joints.mass_scale[j], joints.impulse_scale[j] = rate / h, mass_scale, 1.0 - mass_scale
+            away, mass_scale = joint_spring(swing * h, joints.damping_ratio[j], together)
+            joints.push_rate[j], joints.mass_scale[j], joints.impulse_scale[j] = away / h, mass_scale, 1.0 - mass_scale
             continue
-        omega = 2.0 * math.pi * JOINT_FREQUENCY / period
-        damping = 2.0 * JOINT_DAMPING_RATIO + h * omega
-        stiffness = joints.stiffness = h * omega * damping
-        joints.push_rate[j] = omega / damping
-        holding = is_holding(joints, j)
-        joints.mass_scale[j] = stiffness / (1.0 + stiffness) if holding else 1.0
-        joints.impulse_scale[j] = 1.0 / (1.0 + stiffness) if holding else 0.0
+        joints.push_rate[j], holding = rate, is_holding(joints, j)
+        joints.mass_scale[j], joints.impulse_scale[j] = kept if holding else 1.0, back if holding else 0.0
 
 
 # -- in a substep ------------------------------------------------------------------------------------------------------
@@ -231,6 +230,8 @@ def measure_joints(solver):
     joints, shift, order = solver.joints, solver.shift, solver.joints.order
     kinds, first, second, base_a, base_b = joints.kind, joints.first, joints.second, joints.base_a, joints.base_b
     between, arms_a, arms_b, gap = joints.between, joints.arm_a, joints.arm_b, joints.gap
+    usual = 1.0 / joints.stiffness
+    usual_mass, usual_impulse = 1.0 / (1.0 + usual), usual / (1.0 + usual)  # divisions cost more than all else of a row
     for e in range(joints.begin, joints.end):
         j = order[e]
         kind, a, b = kinds[j], first[j], second[j]
@@ -251,8 +252,10 @@ def measure_joints(solver):
             arms_a[j], arms_b[j], gap[j] = arm_a, arm_b, way
             compute_point_mass(solver, j, scale(way, 0.0))
             if is_holding(joints, j):
-                gives = compliance_of(solver, j)
-                joints.mass_scale[j], joints.impulse_scale[j] = 1.0 / (1.0 + gives), gives / (1.0 + gives)
+                joints.mass_scale[j], joints.impulse_scale[j] = usual_mass, usual_impulse
+                gives = compliance_of(solver, j, usual)
+                if gives < usual:
+                    joints.mass_scale[j], joints.impulse_scale[j] = 1.0 / (1.0 + gives), gives / (1.0 + gives)
             continue
         normal, value = joints.normal[j], length(way)
         if kind == SLIDE:
@@ -267,9 +270,7 @@ def measure_joints(solver):
     for e in range(joints.begin, joints.end):  # now that all rows are measured: those of a joint may come in any order
         j = order[e]
         if has_coupling(joints, j) and not has_coupling(joints, j - 1):
-            gives = compliance_of(solver, j - 1)
-            couple(solver, j - 1, 0.0)
-            couple(solver, j - 1, gives)
+            couple(solver, j - 1, compliance_of(solver, j - 1, usual))
     for e in range(joints.begin, joints.end):
         if joints.rule[order[e]] == SERVO:
             servo_speed(joints, order[e])
