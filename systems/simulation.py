@@ -301,7 +301,7 @@ class Simulation:
 
     def closing_stages(self) -> list[Any]:
         """The parts of a step after all systems."""
-        return [self.program.segment(CLOSING[0].name, CLOSING[-1].name), *self.contact_events.closing_stages()]
+        return [self.program.segment(CLOSING[0].name, CLOSING[-1].name)]
 
     def abandon_step(self) -> None:
         """The step failed: put everything back to its start."""

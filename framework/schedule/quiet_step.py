@@ -9,30 +9,27 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from ..compilation import log
 from ..data import esper_bridge
-from .stages import Check, Segment
+from .stages import Segment
 
 
 def make_quiet_step(pipeline: Any, physics: Any) -> Callable[[], bool] | None:
     """A function that takes a step and returns True, or False, and nothing has happened, if there is more to do.
 
-    None if the parts of a step are others than the stages and what follows them.
+    None if other parts of a step than the stages are Python.
     """
     parts = pipeline.parts
-    if [type(part) for part in parts] != [Segment, Check] or pipeline.order.foreign:
+    if [type(part) for part in parts] != [Segment] or pipeline.order.foreign:
         return None
-    (stages, after), order, processors, events = parts, pipeline.order, pipeline.processors, pipeline.world.events
+    (stages,), order, processors, events = parts, pipeline.order, pipeline.processors, pipeline.world.events
     program, start, stop, call = stages.program, stages.start, stages.stop, stages.program.call
     contents, clock, faults, profiler = pipeline.contents, pipeline.clock, pipeline.faults, pipeline.profiler
-    changes, dead, registry, name = contents.log, contents.dead, pipeline.world.registry, pipeline.world.name
+    changes, dead, registry = contents.log, contents.dead, pipeline.world.registry
     table, scene, links, sleepers = physics.table, physics.scene, physics.links, physics.sleepers
-    unsettled = physics.plugin_stages.unsettled
-    contacts, copies, words, alarm = physics.contacts, physics.copies, program.state.words, program.alarm
-    number, others_write, found, pushed = map(
-        program.state.word_of, ("step_number", "others_write", "found_current", "pushed")
-    )
-    acquire, release, running = esper_bridge.stepping.acquire, esper_bridge.stepping.release, esper_bridge.running
+    unsettled, contacts, open_window = physics.plugin_stages.unsettled, physics.contacts, physics.contacts.open_window
+    words, alarm = program.state.words, program.alarm
+    number, found, pushed = map(program.state.word_of, ("step_number", "found_current", "pushed"))
+    acquire, release = esper_bridge.stepping.acquire, esper_bridge.stepping.release
     order_version, parts_version = order.version, physics.parts_version
 
     def step() -> bool:
@@ -40,41 +37,32 @@ def make_quiet_step(pipeline: Any, physics: Any) -> Callable[[], bool] | None:
             changes.dirty or dead or processors.changed or order.version != order_version or table.kind_changed
             or table.version + table.members_version + registry.version != scene.structure
             or table.static_version != scene.static_version or physics.parts_version != parts_version
-            or links.version != scene.version or physics.must_check or unsettled() or sleepers.on or words[others_write]
-            or table.driven or events.of_esper or (events.handlers and events.any_handlers()) or pipeline.in_step
+            or links.version != scene.version or physics.must_check or unsettled() or sleepers.on
+            or table.driven or events.of_esper or (events.handlers and events.any_handlers())
         ):  # fmt: skip
             return False
         if not acquire(False):
             return False  # where it is said why
         try:
-            waited, count, dt = log.waited, clock.step_count, clock.dt
+            count, dt = clock.step_count, clock.dt
             table.frame += 1
-            contacts.window, contacts.deferred = count, None
-            if contacts.recorded:
-                contacts.open_window(count)
+            open_window(count)
             words[number] = count
             physics.contacts_before = contacts.columns_now() if words[found] else None
-            pipeline.in_step = table.in_step = True
-            running.add(name)
             try:
                 code = call(start, stop, dt)
                 if code or words[alarm]:
-                    program.resume(code, stop, dt)
-                if words[after.index]:
-                    pipeline.run_python(after.part, dt)
+                    pipeline.resume(program, code, stop, dt)
             except BaseException as error:
+                pipeline.mark_running(True)  # for what goes back to its start
                 pipeline.fail_at_work(error)
                 raise
-            table.in_step = copies.kept = pipeline.in_step = False
-            running.discard(name)
             if words[found]:
                 contacts.columns_now()
             if words[pushed] or table.frames_applied:
                 physics.end_window()
             clock.step_count = count + 1
             profiler.steps += 1
-            if log.waited != waited:
-                profiler.wait(log.waited - waited)
             if faults.pending:
                 pipeline.tell_faults()
         finally:

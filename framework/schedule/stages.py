@@ -151,7 +151,7 @@ class Program:
     def __init__(
         self, state: Record, stages: Sequence[Stage], handlers: dict[int, Callable[[float], None]], afterwards: int
     ) -> None:
-        self.state = state
+        self.state, self._address = state, state.address
         self.handlers, self._afterwards = handlers, afterwards
         self._words, self._stage = state.words, state.word_of("stage")
         self._clock: TickClock | None = None  # from the first link on
@@ -207,7 +207,7 @@ class Program:
     def call(self, start: int, stop: int, dt: float) -> int:
         """Run the stages start..stop-1 up to one that asks for something; its code, 0 if none does."""
         try:
-            return self._run_stages(self.state.address, start, stop, dt)
+            return self._run_stages(self._address, start, stop, dt)
         except Exception as error:
             stage = self.stages[self._words[self._stage]]
             if stage.plugin:

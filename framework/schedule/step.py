@@ -166,8 +166,7 @@ class Pipeline(esper.Processor):
         except BaseException as error:
             self.fail("closing the step", error)
             raise
-        self.in_step = False
-        esper_bridge.running.discard(self.world.name)
+        self.mark_running(False)
         self.clock.step_count += 1
         self.profiler.steps += 1
         if log.waited != waited:
@@ -241,9 +240,24 @@ class Pipeline(esper.Processor):
 
     # -- opening and closing ----------------------------------------------------------------------
 
+    def mark_running(self, on: bool) -> None:
+        """Whether Python can see that a step of this world is at work."""
+        self.in_step = on
+        (esper_bridge.running.add if on else esper_bridge.running.discard)(self.world.name)
+
+    def resume(self, program: Any, code: int, stop: int, dt: float) -> None:
+        """Do what a stage of a quiet step has asked for, and the rest of that step."""
+        waited, table = log.waited, self.physics.table
+        table.in_step = True
+        self.mark_running(True)
+        program.resume(code, stop, dt)
+        self.mark_running(False)
+        table.in_step = False
+        if log.waited != waited:
+            self.profiler.wait(log.waited - waited)
+
     def _begin(self, others_write: bool) -> None:
-        self.in_step = True
-        esper_bridge.running.add(self.world.name)
+        self.mark_running(True)
         try:
             self.physics.begin_step(others_write)
         except BaseException as error:
@@ -282,8 +296,7 @@ class Pipeline(esper.Processor):
                 parts += parts_of(system)
             self._run_parts(merged(parts), self.world.settings.dt)
             self.physics.end_phase()
-            self.in_step = False
-            esper_bridge.running.discard(self.world.name)
+            self.mark_running(False)
             self.order.apply()
         if self.faults.pending:
             self.tell_faults()
@@ -306,8 +319,7 @@ class Pipeline(esper.Processor):
         """Back to the start of an unfinished step, if there is one."""
         if not self.in_step:
             return False
-        self.in_step = False
-        esper_bridge.running.discard(self.world.name)
+        self.mark_running(False)
         self.physics.abandon_step()
         with esper_bridge.context(self.world.name):
             self.order.apply()

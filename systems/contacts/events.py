@@ -238,12 +238,6 @@ class ContactEvents(StagedSystem):
         report = Check(state.words, state.word_of("event_count"), PythonPart(self.name, self._report))
         return [PythonPart(self.name, self._take_disabled), self.segment(), report]
 
-    def closing_stages(self) -> list[Any]:
-        """What follows the last stage of all, so that the step is one call where no code of the game runs in it."""
-        state = self._state
-        defer = Check(state.words, state.word_of("event_count"), PythonPart(self.name, self._defer))
-        return [] if state.others_write else [defer]
-
     def _take_disabled(self, dt: float) -> None:
         """Contacts that a system has disabled after RESPONSE count as not touching."""
         if self._state.found_current:  # no response has run
@@ -253,7 +247,7 @@ class ContactEvents(StagedSystem):
         if enabled is not None:
             contacts.enabled[contacts.now, : len(enabled)] = enabled
 
-    def _defer(self, dt: float) -> None:
+    def defer(self, dt: float) -> None:
         """No code looks within the step: what has happened is recorded when it is read."""
         self._report_faults()
         self._contacts.defer(self._record)
