@@ -117,7 +117,7 @@ class Simulation:
     def _wire_program(self) -> None:
         """What Python does for each code that a stage returns; what errors of stages are said to be."""
         program = self.program
-        program.handlers = handlers(self)
+        program.handlers, program.system_of = handlers(self), self.system_of_stage
         program.describe_error, program.on_alarm = self.attribute_errors.describe, self.attribute_errors.check
         program.alarm = self.state.word_of("unsound")
 

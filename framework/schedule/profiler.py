@@ -37,12 +37,14 @@ class Profiler:
         """Count calls and time of stages and kernels; CaromError if that is going on already, in any world."""
         if compilation.timing():
             raise CaromError("a profile is on already: kernels can be timed for one world at a time")
-        self._profile_start = self.totals()
+        self._profile_start, program = self.totals(), self._pipeline.physics.program
         compilation.time_calls(self._record)
+        program.time_apart(True)
         try:
             yield
         finally:
             compilation.time_calls(None)
+            program.time_apart(False)
             self._profiled = self.profiled()
             self._profile_start = None
 

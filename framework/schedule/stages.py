@@ -26,8 +26,8 @@ from ..jit.records.schema import Schema, integer, ints
 from ..jit.source import source_module
 from ..jit.tick_counter import TickClock, read_ticks, ticks_now
 
-# What every state begins with: addresses of the stages (0: not needed), the time that each has taken in ticks of the
-# processor's clock, how often it ran, and the one that runs now.
+# What every state begins with: addresses of the stages (0: not needed; less a sign: its time counts with that of the
+# next one), the time that each has taken in ticks of the processor's clock, how often it ran, and the one that runs now.
 PROGRAM_FIELDS: dict[str, Any] = {"program": ints(), "ticks": ints(), "calls": ints(), "stage": integer()}
 PROGRAM = Schema("Program", **PROGRAM_FIELDS)
 
@@ -43,18 +43,22 @@ def run_stages(address: int, start: int, stop: int, dt: float) -> int:
     """
     state = _program_at(address)
     program, ticks, calls = state.program, state.ticks, state.calls
-    before = read_ticks()
+    before, code, last = read_ticks(), 0, -1
     for k in range(start, stop):
-        if program[k] != 0:
-            state.stage = k
-            code = _call_stage(program[k], state, dt)
-            now = read_ticks()
-            ticks[k] += now - before
+        address = program[k]
+        if address != 0:
+            state.stage = last = k
+            code = _call_stage(abs(address), state, dt)
             calls[k] += 1
-            before = now
             if code != 0:
-                return code
-    return 0
+                break
+            if address > 0:  # reading the clock takes longer than a stage that has nothing to do
+                now = read_ticks()
+                ticks[k] += now - before
+                before, last = now, -1
+    if last >= 0:
+        ticks[last] += read_ticks() - before
+    return code
 
 
 NEED_ROOM = 1  # what a stage returns that needs more rows than the columns of its ``room`` have
@@ -159,6 +163,8 @@ class Program:
         self._python_seconds = np.zeros(0)  # of what Python has done for each stage
         self.take(stages)
         self.inside = 0.0  # s of stages that Python has run within a step: not to be counted twice
+        self.system_of: Callable[[int], Any] = lambda stage: stage  # the system of a stage
+        self._apart = False
         self.describe_error: Callable[[BaseException], None] = lambda error: None  # adds notes to it
         self.alarm = 0  # the word of the state that is not 0 when a stage has noted something wrong
         self.on_alarm: Callable[[], None] = lambda: None
@@ -192,6 +198,15 @@ class Program:
         self._clock = self._clock or TickClock()
         for k, stage in enumerate(self.stages):
             self._addresses[k] = self._linked(stage).address if wanted(stage) else 0
+        self.time_apart(self._apart)
+
+    def time_apart(self, on: bool) -> None:
+        """Whether each stage is timed by itself: else those of a system are together."""
+        self._apart, after, addresses = on, None, self._addresses
+        for k in reversed(np.flatnonzero(addresses).tolist()):
+            system = self.system_of(k)
+            addresses[k] = abs(addresses[k]) * (-1 if system == after and not on else 1)
+            after = system
 
     def _linked(self, stage: Stage) -> Linked:
         return linked_stage(stage, self.state.schema, self.state.dimensions)
