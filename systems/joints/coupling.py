@@ -15,11 +15,12 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, item, replace, row, scale, store
 from ..integration.turning import change_of_spin, cross_spin, symmetric, twist
-from .records import CUSTOM, HOLD, POINT, SPRING, TURN
+from .records import CUSTOM, HOLD, LIMIT, POINT, SPRING, TURN
 
 MOST_ANSWERS = 6  # rows that hold, in space, and each a number
 BOTH_ANSWERS = 2 * MOST_ANSWERS  # as they are, and behind these as if they gave way
 MOST_LEVER = 16.0  # times as much as the masses alone: what more is moved at the end of an arm gives way no more
+NOT_COUPLED = -1.0  # in place of the share of its mass that a row takes part with
 NOTHING = 1e-9  # of what an impulse moves: less is held by rows before
 
 
@@ -88,7 +89,7 @@ def response_at(joints, j, k, soft):
 
 @inlined
 def compliance_of(solver, first, usual):
-    """By how much of what an impulse moves at it a joint gives way: the ``usual`` part, 1 / stiffness, but where that is
+    """By how much of what an impulse moves at it a joint gives way: the ``usual`` part, 1 / stiffness, but where that
     the end of a long arm of a body which turns easily. It may have to bear the body itself, and gives way less."""
     joints = solver.joints
     w = solver.inverse_mass[joints.first[first]] + solver.inverse_mass[joints.second[first]]
@@ -96,13 +97,21 @@ def compliance_of(solver, first, usual):
     return share / joints.stiffness if share < 1.0 else usual
 
 
+@inlined
+def is_idle(joints, first):
+    """Whether there are limits alone behind the first row of a joint, a point, and none was met in the last substep."""
+    idle = joints.kind[first] == POINT
+    for j in range(first + 1, end_of(joints, first)):
+        idle &= joints.rule[j] == LIMIT and joints.impulse[j] == 0.0
+    return idle
+
+
 @part
-def couple(solver, first, gives):
+def couple(solver, first):
     """The masses of the rows of a joint behind its first one, and the answers to them of those before that hold.
 
     Each row is made orthogonal to these, in the measure of kinetic energy and of what goes into the joint where that
-    gives way (Gram and Schmidt): by so much of what an impulse at it moves. Once as it is, then, but for springs, as if
-    it gave way.
+    gives way (Gram and Schmidt). Once as it is, then, but for springs, as if it gave way.
     """
     joints, zero = solver.joints, scale(solver.joints.normal[first], 0.0)
     n = BOTH_ANSWERS
@@ -111,6 +120,7 @@ def couple(solver, first, gives):
     a, b, d, held = joints.first[first], joints.second[first], len(zero), 0
     w, point = solver.inverse_mass[a] + solver.inverse_mass[b], joints.kind[first] == POINT
     arm_a, arm_b = joints.arm_a[first], joints.arm_b[first]
+    gives = compliance_of(solver, first, 1.0 / joints.stiffness)
     for j in range(first + 1 if point else first, end_of(joints, first)):
         along, turn_a, turn_b = row_directions(joints, j)
         turned_a, turned_b = change_of_spin(solver, a, turn_a), change_of_spin(solver, b, turn_b)

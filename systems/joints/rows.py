@@ -24,11 +24,14 @@ from ...framework.vectors import add, add_scaled, dot, item, length, replace, sc
 from ..contacts.constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY, SPRING_FREQUENCY
 from ..integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
 from .coupling import (
+    NOT_COUPLED,
     compliance_of,
     couple,
+    end_of,
     first_of,
     has_coupling,
     is_holding,
+    is_idle,
     is_soft_spring,
     response_at,
     symmetric_product,
@@ -240,8 +243,10 @@ def measure_joints(solver):
             continue
         if kind >= TURN:
             axis, angle = angle_of(solver, j)
-            moved = dot(axis, change_of_spin(solver, a, axis)) + dot(axis, change_of_spin(solver, b, axis))
-            joints.normal[j], joints.mass[j] = axis, 1.0 / moved if moved > 0.0 else 0.0
+            joints.normal[j] = axis
+            if not has_coupling(joints, j):
+                moved = dot(axis, change_of_spin(solver, a, axis)) + dot(axis, change_of_spin(solver, b, axis))
+                joints.mass[j] = 1.0 / moved if moved > 0.0 else 0.0
             update_joint_targets(joints, j, angle)
             continue
         arm_a, arm_b = turned_with(solver, a, base_a[j]), turned_with(solver, b, base_b[j])
@@ -264,13 +269,18 @@ def measure_joints(solver):
         elif value > 0.0:
             normal = scale(way, 1.0 / value)
         arms_a[j], arms_b[j], joints.normal[j] = arm_a, arm_b, normal
-        moved = solver.inverse_mass[a] + solver.inverse_mass[b]
-        joints.mass[j] = 1.0 / (moved + compliance(solver, a, arm_a, normal) + compliance(solver, b, arm_b, normal))
+        if not has_coupling(joints, j):
+            moved = solver.inverse_mass[a] + solver.inverse_mass[b]
+            joints.mass[j] = 1.0 / (moved + compliance(solver, a, arm_a, normal) + compliance(solver, b, arm_b, normal))
         update_joint_targets(joints, j, value)
     for e in range(joints.begin, joints.end):  # now that all rows are measured: those of a joint may come in any order
         j = order[e]
         if has_coupling(joints, j) and not has_coupling(joints, j - 1):
-            couple(solver, j - 1, compliance_of(solver, j - 1, usual))
+            if is_idle(joints, j - 1):  # until one is met: see solve_row
+                for i in range(j, end_of(joints, j)):
+                    joints.mass_scale[i] = NOT_COUPLED
+            else:
+                couple(solver, j - 1)
     for e in range(joints.begin, joints.end):
         if joints.rule[order[e]] == SERVO:
             servo_speed(joints, order[e])
@@ -367,13 +377,18 @@ def solve_row(solver, j, pushes):
         speed = dot(joints.normal[j], sub(solver.spin[joints.second[j]], solver.spin[joints.first[j]]))
     else:
         speed = dot(joints.normal[j], speed_between(solver, j))
+    asked = (joints.pushing[j] if pushes else joints.target_speed[j]) - speed
+    least, greatest = joints.least[j], joints.greatest[j]
+    if old == 0.0 and (asked <= 0.0 == least or asked >= 0.0 == greatest):
+        return  # most limits are not met
+    if joints.mass_scale[j] == NOT_COUPLED:
+        couple(solver, first_of(joints, j))
+    change = joints.mass[j] * asked
     if pushes:
-        change = joints.mass_scale[j] * joints.mass[j] * (joints.pushing[j] - speed) - joints.impulse_scale[j] * old
-    else:
-        change = joints.mass[j] * (joints.target_speed[j] - speed)
-    new = min(joints.greatest[j], max(joints.least[j], old + change))
+        change = joints.mass_scale[j] * joints.mass[j] * asked - joints.impulse_scale[j] * old
+    new = min(greatest, max(least, old + change))
     joints.impulse[j] = new
-    if new != old:  # most limits are not met
+    if new != old:
         apply_row(solver, j, new - old)
         if has_coupling(joints, j):
             row_response(solver, j, new - old, pushes and not is_soft_spring(joints, j))
