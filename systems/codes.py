@@ -21,4 +21,4 @@ CHECK_COLUMNS, CHECK_FLIGHT = 35, 36  # name bodies that cannot be right, and ta
 LOOK = 37  # code of the game may have changed what sleeps
 INDEX = 38  # grids and trees of where the bodies are now
 NEED_REST = 39  # contacts at rest were not expected, and what they need is not linked yet
-REPORT = 40  # contacts have begun or ended, impacts or faults have happened, and no code of the game runs in the step
+FAULTS = 40  # to be told; where code of the game runs in the step events are told with them

@@ -402,7 +402,7 @@ STATE = Schema(
     too_fast_for_discrete=flag(),  # a body is so fast that discrete collisions may miss what it passes:
     too_fast_row=integer(),
     turns_too_far=integer(),  # 1 + the row of a body that may turn past others within the step; 0: none
-    event_count=integer(),  # events of contacts that Python has to hear of
+    event_count=integer(),  # events of contacts in the last step that no history has yet
     # what an error names
     blamed=integer(),  # 1 + the row of a body for which a plugin's stage raises an error; 0: none
     row_a=integer(),

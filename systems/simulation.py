@@ -168,6 +168,7 @@ class Simulation:
 
     def open_window(self, step: int) -> None:
         self.contacts.open_window(step)
+        self.state.event_count = 0  # those of the last window that were never read
         self.table.frame += 1
 
     def begin_step(self, others_write: bool) -> None:
@@ -322,7 +323,7 @@ class Simulation:
         self.sleepers.abandon_step()
         state.moved = state.forces_summed = state.found_current = False
         state.kept = 0
-        state.impacts.logged = 0
+        state.impacts.logged = state.event_count = 0
         state.contacts_version += 1
         if self.contacts_before is not None:
             self.contacts.show(self.contacts_before)
@@ -410,7 +411,7 @@ class Simulation:
         self.scene.forget_enabled()
         self.links.version = NEVER_LINKED  # contacts may rest now
         set_counters(state, saved["counters"])
-        state.impacts.logged = 0
+        state.impacts.logged = state.event_count = 0
         state.found_current = state.moved = False
         state.contacts_version += 1
         state.motion_version += 1

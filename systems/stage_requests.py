@@ -27,7 +27,7 @@ def handlers(simulation: Any) -> dict[int, Callable[[float], None]]:
         codes.CHECK_COLUMNS: quarantine.check_columns,
         codes.CHECK_FLIGHT: quarantine.check_flight,
         codes.LOOK: lambda dt: sleepers.look(),
-        codes.REPORT: simulation.contact_events.defer,
+        codes.FAULTS: simulation.contact_events.report_faults,
         codes.INDEX: lambda dt: simulation.search.index_for_stages(simulation.scene),
         codes.WAKE: lambda dt: sleepers.wake_disturbed(),
         codes.WAKE_TOUCHED: partial(sleepers.wake_touched, simulation),

@@ -26,8 +26,8 @@ from ..jit.records.schema import Schema, integer, ints
 from ..jit.source import source_module
 from ..jit.tick_counter import TickClock, read_ticks, ticks_now
 
-# What every state begins with: addresses of the stages (0: not needed; less a sign: its time counts with that of the
-# next one), the time that each has taken in ticks of the processor's clock, how often it ran, and the one that runs now.
+# What every state begins with: addresses of the stages (0: not needed; below 0: its time counts with that of the next),
+# the time that each has taken in ticks of the processor's clock, how often it ran, and the one that runs now.
 PROGRAM_FIELDS: dict[str, Any] = {"program": ints(), "ticks": ints(), "calls": ints(), "stage": integer()}
 PROGRAM = Schema("Program", **PROGRAM_FIELDS)
 

@@ -261,7 +261,6 @@ class Contacts(ContactRows):
         self._chunks: dict[str, list[dict[str, np.ndarray]]] = {name: [] for name in self.HISTORIES}
         self.window = 0  # number of the step that the window was opened with
         self.recorded = False  # something has happened since
-        self.deferred: Callable[[], None] | None = None  # records what the last step has brought
 
     # -- what users read --------------------------------------------------------------------------
 
@@ -306,7 +305,7 @@ class Contacts(ContactRows):
 
     def open_window(self, step: int) -> None:
         """Forget what the last window held; ``step`` is the next one's number."""
-        self.window, self.deferred = step, None
+        self.window = step
         if self.recorded:
             self.recorded = False
             for chunks in self._chunks.values():
@@ -319,15 +318,10 @@ class Contacts(ContactRows):
             return None
         return self._source.lively(self._own_columns)
 
-    def defer(self, record: Callable[[], None]) -> None:
-        """Let ``record`` be called when the events are read, or before they are lost; most are never read."""
-        self.deferred = record
-
     def take_deferred(self) -> None:
-        """The next step begins, or rows are about to move: record what has been deferred."""
-        if self.deferred is not None:
-            record, self.deferred = self.deferred, None
-            record()
+        """The events are read, the next step of the window begins, or rows are about to move: record what the last step
+        has brought. Most events are never read."""
+        self._source.record_waiting()
 
     def record(self, history: str, columns: dict[str, np.ndarray]) -> None:
         """Add the rows of ``columns`` to a ``history`` of the window: begin, end or impacts."""
@@ -337,7 +331,6 @@ class Contacts(ContactRows):
 
     def forget_step(self, step: int) -> None:
         """Drop the events of a step that has failed."""
-        self.deferred = None
         for name, chunks in self._chunks.items():
             self._chunks[name] = [chunk for chunk in chunks if chunk["step"][0] != step]
 
@@ -359,7 +352,7 @@ class Contacts(ContactRows):
 
     def take_back(self, saved: dict[str, Any]) -> None:
         """Show what was ``saved`` again; the source has the contacts of that time."""
-        self.deferred, self.recorded, self.window = None, True, saved["window"]
+        self.recorded, self.window = True, saved["window"]
         self._chunks = {name: [_copied(chunk) for chunk in chunks] for name, chunks in saved["histories"].items()}
         if saved["columns"] is not None:
             self.show(_copied(saved["columns"]))

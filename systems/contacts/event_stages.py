@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...framework.compilation import part
 from ...framework.schedule.stages import Rows
 from ...framework.vectors import add
-from ..codes import OK, REPORT
+from ..codes import FAULTS, OK
 from ..narrow_phase.manifolds import move_to_end
 from ..records import CONTACT_ROWS
 
@@ -92,4 +92,4 @@ def compare_contacts(state, dt):
     faults += state.turns_too_far + solver.squeezed + solver.overloaded + solver.restrained + solver.joints.torn
     staying = stays + contacts.stored if state.stay_wanted else 0
     state.event_count = ends + begins + staying + state.impacts.logged + faults
-    return REPORT if state.event_count > 0 and not state.others_write else OK
+    return FAULTS if faults > 0 and not state.others_write else OK

@@ -121,6 +121,16 @@ class RecordedContacts:
             "time_of_impact": columns["log_time"][:count].copy(),
         }
 
+    def record_waiting(self) -> None:
+        """Add what has begun, ended and bounced in the last step to the histories, unless that is done."""
+        if self._state.event_count:
+            self._state.event_count = 0
+            self.record_impacts()
+            if self._touching.begins:
+                self.record("begin", self.began())
+            if self._touching.ends:
+                self.record("end", self.ended())
+
     def record_impacts(self) -> None:
         """Add the impacts of the step that is running to the history, unless they are in it already."""
         if self._impacts.logged and not self._state.impacts_recorded:
@@ -227,7 +237,7 @@ class ContactEvents(StagedSystem):
     ) -> None:  # fmt: skip
         super().__init__(program)
         self._state, self._source, self._contacts = program.state, source, contacts
-        self._touching, self._impacts = program.state.contacts, program.state.impacts
+        self._impacts = program.state.impacts
         self._membership, self._world = membership, world
         source.record = contacts.record
 
@@ -247,12 +257,8 @@ class ContactEvents(StagedSystem):
         if enabled is not None:
             contacts.enabled[contacts.now, : len(enabled)] = enabled
 
-    def defer(self, dt: float) -> None:
-        """No code looks within the step: what has happened is recorded when it is read."""
-        self._report_faults()
-        self._contacts.defer(self._record)
-
-    def _report_faults(self) -> None:
+    def report_faults(self, dt: float) -> None:
+        """Note what has gone wrong in the step."""
         state, impacts, solver = self._state, self._impacts, self._state.solver
         entity = state.bodies.entity
         if state.too_fast_for_discrete:
@@ -310,20 +316,11 @@ class ContactEvents(StagedSystem):
                 kind="impacts",
             )
 
-    def _record(self) -> None:
-        """Record what has begun, ended and bounced."""
-        source = self._source
-        source.record_impacts()
-        if self._touching.begins:
-            self._contacts.record("begin", source.began())
-        if self._touching.ends:
-            self._contacts.record("end", source.ended())
-
     def _report(self, dt: float) -> None:
         """Note it and call the handlers."""
-        self._report_faults()
-        self._record()
+        self.report_faults(dt)
         source, events = self._source, self.world.events
+        source.record_waiting()
         begin = source.began() if events.wanted("contact_begin") else None
         end = source.ended() if events.wanted("contact_end") else None
         stay = source.stay_columns() if events.wanted("contact_stay") else None
