@@ -43,22 +43,20 @@ def run_stages(address: int, start: int, stop: int, dt: float) -> int:
     """
     state = _program_at(address)
     program, ticks, calls = state.program, state.ticks, state.calls
-    before, code, last = read_ticks(), 0, -1
+    before = read_ticks()
     for k in range(start, stop):
         address = program[k]
         if address != 0:
-            state.stage = last = k
+            state.stage = k
             code = _call_stage(abs(address), state, dt)
             calls[k] += 1
-            if code != 0:
-                break
-            if address > 0:  # reading the clock takes longer than a stage that has nothing to do
+            if address > 0 or code != 0 or k == stop - 1:  # it takes longer than a stage that has nothing to do
                 now = read_ticks()
                 ticks[k] += now - before
-                before, last = now, -1
-    if last >= 0:
-        ticks[last] += read_ticks() - before
-    return code
+                before = now
+            if code != 0:
+                return code
+    return 0
 
 
 NEED_ROOM = 1  # what a stage returns that needs more rows than the columns of its ``room`` have

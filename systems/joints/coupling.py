@@ -20,7 +20,6 @@ from .records import CUSTOM, HOLD, LIMIT, POINT, SPRING, TURN
 MOST_ANSWERS = 6  # rows that hold, in space, and each a number
 BOTH_ANSWERS = 2 * MOST_ANSWERS  # as they are, and behind these as if they gave way
 MOST_LEVER = 16.0  # times as much as the masses alone: what more is moved at the end of an arm gives way no more
-NOT_COUPLED = -1.0  # in place of the share of its mass that a row takes part with
 NOTHING = 1e-9  # of what an impulse moves: less is held by rows before
 
 
@@ -119,6 +118,7 @@ def couple(solver, first):
     answers, furthers, masses = stack_array(n, zero), stack_array(n, zero), stack_array(n, 0.0)
     a, b, d, held = joints.first[first], joints.second[first], len(zero), 0
     w, point = solver.inverse_mass[a] + solver.inverse_mass[b], joints.kind[first] == POINT
+    before = d if point else 0
     arm_a, arm_b = joints.arm_a[first], joints.arm_b[first]
     gives = compliance_of(solver, first, 1.0 / joints.stiffness)
     for j in range(first + 1 if point else first, end_of(joints, first)):
@@ -143,7 +143,7 @@ def couple(solver, first):
                 spin_b = add_scaled(spin_b, row(spins_b, i, zero), share)
                 answer = add_scaled(answer, row(answers, i, zero), share)
                 further = add_scaled(further, row(furthers, i, zero), share)
-                k = i - begin + d if point else i - begin
+                k = i - begin + before
                 if k < d:
                     answer = replace(answer, k, item(answer, k) + share)
                 else:
@@ -158,10 +158,11 @@ def couple(solver, first):
             else:
                 joints.mass[j], joints.answer[j], joints.further[j] = mass, answer, further
             if holds:
-                store(force, begin + held, push)
-                store(spins_a, begin + held, spin_a)
-                store(spins_b, begin + held, spin_b)
-                store(answers, begin + held, answer)
-                store(furthers, begin + held, further)
-                masses[begin + held] = mass
+                at = begin + held
+                store(force, at, push)
+                store(spins_a, at, spin_a)
+                store(spins_b, at, spin_b)
+                store(answers, at, answer)
+                store(furthers, at, further)
+                masses[at] = mass
         held += holds

@@ -24,10 +24,8 @@ from ...framework.vectors import add, add_scaled, dot, item, length, replace, sc
 from ..contacts.constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY, SPRING_FREQUENCY
 from ..integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
 from .coupling import (
-    NOT_COUPLED,
     compliance_of,
     couple,
-    end_of,
     first_of,
     has_coupling,
     is_holding,
@@ -257,10 +255,10 @@ def measure_joints(solver):
             arms_a[j], arms_b[j], gap[j] = arm_a, arm_b, way
             compute_point_mass(solver, j, scale(way, 0.0))
             if is_holding(joints, j):
-                joints.mass_scale[j], joints.impulse_scale[j] = usual_mass, usual_impulse
-                gives = compliance_of(solver, j, usual)
+                gives, mass_scale, impulse_scale = compliance_of(solver, j, usual), usual_mass, usual_impulse
                 if gives < usual:
-                    joints.mass_scale[j], joints.impulse_scale[j] = 1.0 / (1.0 + gives), gives / (1.0 + gives)
+                    mass_scale, impulse_scale = 1.0 / (1.0 + gives), gives / (1.0 + gives)
+                joints.mass_scale[j], joints.impulse_scale[j] = mass_scale, impulse_scale
             continue
         normal, value = joints.normal[j], length(way)
         if kind == SLIDE:
@@ -275,12 +273,8 @@ def measure_joints(solver):
         update_joint_targets(joints, j, value)
     for e in range(joints.begin, joints.end):  # now that all rows are measured: those of a joint may come in any order
         j = order[e]
-        if has_coupling(joints, j) and not has_coupling(joints, j - 1):
-            if is_idle(joints, j - 1):  # until one is met: see solve_row
-                for i in range(j, end_of(joints, j)):
-                    joints.mass_scale[i] = NOT_COUPLED
-            else:
-                couple(solver, j - 1)
+        if has_coupling(joints, j) and not has_coupling(joints, j - 1) and not is_idle(joints, j - 1):
+            couple(solver, j - 1)
     for e in range(joints.begin, joints.end):
         if joints.rule[order[e]] == SERVO:
             servo_speed(joints, order[e])
@@ -379,13 +373,13 @@ def solve_row(solver, j, pushes):
         speed = dot(joints.normal[j], speed_between(solver, j))
     asked = (joints.pushing[j] if pushes else joints.target_speed[j]) - speed
     least, greatest = joints.least[j], joints.greatest[j]
-    if old == 0.0 and (asked <= 0.0 == least or asked >= 0.0 == greatest):
-        return  # most limits are not met
-    if joints.mass_scale[j] == NOT_COUPLED:
-        couple(solver, first_of(joints, j))
-    change = joints.mass[j] * asked
-    if pushes:
-        change = joints.mass_scale[j] * joints.mass[j] * asked - joints.impulse_scale[j] * old
+    if old == 0.0:
+        if asked <= 0.0 == least or asked >= 0.0 == greatest:
+            return  # most limits are not met
+        if has_coupling(joints, j):  # it may have been idle
+            couple(solver, first_of(joints, j))
+    mass = joints.mass[j]
+    change = joints.mass_scale[j] * mass * asked - joints.impulse_scale[j] * old if pushes else mass * asked
     new = min(greatest, max(least, old + change))
     joints.impulse[j] = new
     if new != old:
