@@ -40,6 +40,32 @@ def test_a_change_writes_the_rows_of_what_it_changes(monkeypatch):
     assert joints.columns()["entity"].tolist() == [*left, new]
 
 
+def test_a_world_that_goes_back_writes_the_rows_of_what_has_changed(monkeypatch):
+    world, joints = joint_world()
+    _, hinges = chain(world, 40, (1, 0), (0.45, 0.1))
+    run(world, 5)
+    before = world.snapshot()
+    world.restore(before)  # from here on all fields are known as a snapshot has them
+    run(world, 5)
+    after = world.state_hash()
+    written, put = [], JointRows.put
+
+    def counted(rows, joint, *made):
+        written.append(joint.entity)
+        return put(rows, joint, *made)
+
+    monkeypatch.setattr(JointRows, "put", counted)
+    world.component_for_entity(hinges[7], Hinge).motor_speed = 1.0
+    world.delete_entity(hinges[20])
+    run(world, 3)
+    written.clear()
+    world.restore(before)
+    assert written == [hinges[7], hinges[20]]
+    run(world, 5)
+    assert world.state_hash() == after
+    assert joints.columns()["entity"].tolist() == hinges
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_joints_that_come_go_and_change_move_as_if_all_were_written_again(seed):
     """Twins: one goes back to where it is before each step, which writes all rows from the components."""
