@@ -193,6 +193,14 @@ class AABBCollider(Collider):
         return corner
 
     @staticmethod
+    def edge(shape, direction):
+        x, y = shape.half_extents[0], shape.half_extents[1]
+        across = abs(direction[0]) >= abs(direction[1])
+        if (direction[0] if across else direction[1]) < 0.0:
+            x, y = -x, -y
+        return (x, -y if across else y), (x if across else -x, y)
+
+    @staticmethod
     def outline(shape, dimensions):
         return box_outline(shape.half_extents, dimensions)
 

@@ -57,6 +57,12 @@ class CapsuleCollider(Collider):
         return shape.radius
 
     @staticmethod
+    def edge(shape, direction):
+        up = shape.axes[1][1] * direction[0] >= shape.axes[1][0] * direction[1]
+        end = scale(shape.axes[1], shape.half_height if up else -shape.half_height)
+        return negative(end), end
+
+    @staticmethod
     def outline(shape, dimensions):
         return [(0.0, end, 0.0)[:dimensions] for end in (-shape.half_height, shape.half_height)], ()
 

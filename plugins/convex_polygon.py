@@ -11,7 +11,7 @@ from ..components.colliders import Collider
 from ..framework import Column, Plugin, array_column, column
 from ..framework.elementary import atan2, cos, sin, sines_and_cosines
 from ..framework.typing import ArrayField
-from .corners import bounds_of, support_of
+from .corners import bounds_of, edge_of, support_of
 
 __all__ = ["ConvexPolygonCollider"]
 
@@ -111,6 +111,10 @@ class ConvexPolygonCollider(Collider):
     @staticmethod
     def rounding(shape):
         return shape.corner_radius
+
+    @staticmethod
+    def edge(shape, direction):
+        return edge_of(shape.vertices, shape, direction)
 
     @staticmethod
     def outline(shape, dimensions):

@@ -29,6 +29,7 @@ SHAPE_FUNCTIONS = {
     "bounds": (("shape", "dimensions"), "half extents of the box around it"),
     "support": (("shape", "direction"), "a point"),
     "rounding": (("shape",), "how far it reaches beyond its core"),
+    "edge": (("shape", "direction"), "both ends of an edge"),
     "turned": (("shape", "axes"), ""),
     "outline": (("shape", "dimensions"), "corners, faces"),
     "second_moments": (("shape", "dimensions"), "measure, centre, means of xx, xy, yy (in 3D xx, yy, zz, xy, xz, yz)"),

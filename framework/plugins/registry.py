@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from ..compilation import inlined
 from ..data.component import Component
 from ..errors import PluginError
 from ..jit.records.schema import Schema
@@ -15,6 +16,12 @@ from ..world.events import CONTACT_EVENTS
 
 class Convex:
     """In a pair, any shape that has a support function: ``@plugin.pair(PlaneCollider, Convex)``."""
+
+
+@inlined
+def no_rounding(shape):
+    """Of a shape that has none."""
+    return 0.0
 
 
 @dataclass(frozen=True)
@@ -30,6 +37,8 @@ class Shape:
     support, rounding
         compiled, or None; (shape, direction) -> the core's farthest point that way; (shape) -> how far the shape
         reaches beyond its core
+    edge
+        compiled, or None; (shape, direction) -> in a plane both ends of the core's edge that looks most that way
     second_moments
         compiled, or None; (shape, dimensions) -> measure, centre, means of products of coordinates
     outline
@@ -45,6 +54,7 @@ class Shape:
     plugin: str
     support: Any | None = None
     rounding: Any | None = None
+    edge: Any | None = None
     second_moments: Any | None = None
     outline: Any | None = None
     material: Any | None = None
@@ -271,7 +281,7 @@ class Registry:
         one, other = self.shapes.get(first), self.shapes.get(second)
         if general is None or one is None or other is None or one.support is None or other.support is None:
             return None
-        helpers = (one.support, other.support, one.rounding, other.rounding)
+        helpers = (one.support, other.support, one.rounding or no_rounding, other.rounding or no_rounding)
         return replace(general, first=first, second=second, helpers=helpers)
 
     def _with_convex(self, first: type[Any], second: type[Any], convex: type[Any]) -> Pair | None:
@@ -280,7 +290,7 @@ class Registry:
         if pair is None or shape is None or shape.support is None or (first is Convex and second is Convex):
             return None
         sides = {"first": convex} if first is Convex else {"second": convex}
-        return replace(pair, **sides, helpers=(shape.support, shape.rounding))
+        return replace(pair, **sides, helpers=(shape.support, shape.rounding or no_rounding))
 
     def unhandled(self, first: type[Component], second: type[Component], where: str = "") -> str:
         """What to say of a pair that no plugin handles."""

@@ -129,7 +129,7 @@ def _kernel(dimensions: int) -> tuple[Any, Record]:
                 calls.hit[i], calls.depth[i] = call_sweep(function, state, pa, i, pb, i, calls.d[i], calls.v[i])
             else:
                 calls.point[i] = call_support(shape.support, pa, i, calls.d[i])
-                calls.depth[i] = call_rounding(shape.rounding, pa, i)
+                calls.depth[i] = call_rounding(shape.rounding, pa, i) if shape.rounding != 0 else 0.0
             calls.unsound[i] = state.unsound != 0
 
     return check_rows, make_record(STATE, dimensions)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from ...components import Collider
+from ...components import AABBCollider, Collider
 from ...framework import Plugin
 from ...framework.data.columns import special_column
 from ...framework.outlines import box_outline
 from ...framework.typing import VectorField
 from ...framework.vectors import add_scaled, dot, item, replace, scale
+from ..corners import along_axes, in_world
 
 boxes = Plugin("boxes that turn")
+edge_of_level = boxes.kernel(AABBCollider.edge)
 
 
 @boxes.shape(cost=3)
@@ -44,6 +46,11 @@ class BoxCollider(Collider):
             half = item(shape.half_extents, j)
             corner = add_scaled(corner, shape.axes[j], half if dot(shape.axes[j], direction) >= 0.0 else -half)
         return corner
+
+    @staticmethod
+    def edge(shape, direction):
+        one, two = edge_of_level(shape, along_axes(shape, direction))
+        return in_world(shape, one), in_world(shape, two)
 
     @staticmethod
     def outline(shape, dimensions):

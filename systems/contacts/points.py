@@ -50,7 +50,7 @@ def build_arms(state, dt, r, gap):
     d, nothing = centre_offset_at_start(bodies, a, b), zero_of(state)
     places, gaps = stack_array(MOST_POINTS, nothing), stack_array(MOST_POINTS, 0.0)
     point = pairs.point[c]
-    if not has_manifold(pairs, c):
+    if not has_manifold(pairs, c) and bodies.impact_count[a] + bodies.impact_count[b] > 0:  # which have turned shapes
         _, _, _, point = evaluate_pair(state, a, b, d)
     count, rows = 1, points_of(state, c)
     store(places, 0, point)
@@ -61,6 +61,7 @@ def build_arms(state, dt, r, gap):
         margin = turning_margin(state, dt, a, b)
         count = contact_points(state, (a, b), d, (-gap, normal, point), (margin, tilt), places, gaps)
     round_a, round_b = point_rounding(state, a), point_rounding(state, b)
+    radius_a, radius_b = bodies.rolling_radius[a], bodies.rolling_radius[b]
     rolling = max(bodies.rolling_friction[a], bodies.rolling_friction[b])
     solver.has_rolling |= rolling > 0.0
     for e in range(rows):
@@ -68,14 +69,12 @@ def build_arms(state, dt, r, gap):
         at, between = row(places, min(e, count - 1), nothing), gaps[min(e, count - 1)]
         solver.rolling[k], solver.rolled[k] = rolling, nothing
         solver.place[k], solver.gap[k] = at, between if e < count else UNREACHED * extent
-        solver.arm_a[k] = add(bodies.offset[a], add_scaled(at, normal, -0.5 * between))
-        solver.arm_b[k] = add(bodies.offset[b], add_scaled(sub(at, d), normal, 0.5 * between))
-        if bodies.rolling_radius[a] > 0.0:
-            solver.arm_a[k] = scale(normal, bodies.rolling_radius[a])
-        if bodies.rolling_radius[b] > 0.0:
-            solver.arm_b[k] = scale(normal, -bodies.rolling_radius[b])
-        solver.core_a[k] = add_scaled(solver.arm_a[k], normal, -round_a)
-        solver.core_b[k] = add_scaled(solver.arm_b[k], normal, round_b)
+        arm_a = add(bodies.offset[a], add_scaled(at, normal, -0.5 * between))
+        arm_b = add(bodies.offset[b], add_scaled(sub(at, d), normal, 0.5 * between))
+        arm_a = scale(normal, radius_a) if radius_a > 0.0 else arm_a
+        arm_b = scale(normal, -radius_b) if radius_b > 0.0 else arm_b
+        solver.arm_a[k], solver.core_a[k] = arm_a, add_scaled(arm_a, normal, -round_a)
+        solver.arm_b[k], solver.core_b[k] = arm_b, add_scaled(arm_b, normal, round_b)
 
 
 @part

@@ -1,8 +1,9 @@
 """The points in which two convex shapes touch: the corners of what their faces share.
 
 The face of a shape is made of its farthest points in directions tilted a little from the normal: in 2D the two ends of
-an edge, in 3D the corners of a polygon, or two of an edge. Seen along the normal the two faces are clipped by each
-other, and at each corner of what is left their heights give the gap. Neither face is the reference for the other.
+an edge, which many shapes tell themselves, in 3D the corners of a polygon, or two of an edge. Seen along the normal the
+two faces are clipped by each other, and at each corner of what is left their heights give the gap. Neither face is the
+reference for the other.
 
 Roundings are added along the normal: a rounded edge that is tilted keeps the ends of its core.
 """
@@ -15,14 +16,11 @@ from ....framework.compilation import inlined, part
 from ....framework.elementary import cos, sin
 from ....framework.jit.stack_arrays import stack_array
 from ....framework.vectors import add, add_scaled, dot, item, negative, replace, row, scale, store, sub
-from ..linking.convex_by_address import convex_at, rounding_by_address, support_by_address
+from ..linking.convex_by_address import convex_at, edge_by_address, rounding_by_address, support_by_address
+from .edges import FACE_LOOKS, FINER, FLAT_FACE, SAME_POINT
 from .gjk import cross
 
 MOST_POINTS = 4  # of a pair in 3D; 2 in 2D
-SAME_POINT = 1e-12  # of the coordinates: corners that are no farther apart are one
-FLAT_FACE = 1e-6  # of its size: how far a face may be from flat; what is shared and narrower is a point
-FINER = 0.25  # of the tilt: where several faces are within it the next look is so much narrower, until one lies flat
-FACE_LOOKS = 6  # at most
 DIRECTIONS = 8  # around the normal, in 3D: a face of more corners shows so many of them
 START_DIRECTION = cos(math.pi / 8), sin(math.pi / 8)  # the first: off the axes, where boxes have two corners
 SLANT = math.sqrt(0.5)  # sine and cosine of the way from one to the next
@@ -103,39 +101,22 @@ def keep_near(places, gaps, count, margin, like):
 # -- 2D -------------------------------------------------------------------------------------------
 
 
-@part
-def edge_towards(shape, normal, tilt):
-    """Both ends of the core's edge in the direction of a normal; twice the same point if there is a corner."""
-    along = (-normal[1], normal[0])
-    one = normal
-    for _ in range(FACE_LOOKS):
-        one = support_by_address(shape, add_scaled(normal, along, -tilt))
-        two = support_by_address(shape, add_scaled(normal, along, tilt))
-        way = sub(two, one)
-        square = dot(way, way)
-        if square <= SAME_POINT * SAME_POINT * dot(one, one):
-            break
-        outward = (way[1], -way[0])
-        if dot(outward, sub(support_by_address(shape, outward), one)) <= FLAT_FACE * square:
-            return one, two
-        tilt *= FINER
-    return one, one
-
-
-@part
+@inlined
 def profile(shape, centre, normal, face):
-    """(low, high, at, height, slope) of a face over the tangent: its ends, and its height at one place. face: (side:
-    1 if it looks along the normal, -1 against it, tilt, height if it is a plane)."""
+    """(low, high, at, height, slope) of a face over the tangent: its ends, and its height at one place; both ends are
+    one of what looks another way. face: (side: 1 if it looks along the normal, -1 against it, tilt, height if it is a
+    plane)."""
     side, tilt, level = face
     if shape[0] == 0:
         return -math.inf, math.inf, 0.0, level, 0.0
     along = (-normal[1], normal[0])
-    one, two = edge_towards(shape, scale(normal, side), tilt)
+    one, two = edge_by_address(shape, scale(normal, side), tilt)
     one, way = add(centre, one), sub(two, one)
-    at, reach = dot(along, one), dot(along, way)
-    slope = dot(normal, way) / reach if reach != 0.0 else 0.0
+    at, reach, rise = dot(along, one), dot(along, way), dot(normal, way)
+    if not abs(rise) < tilt * abs(reach):
+        return at, at, at, level, 0.0
     height = dot(normal, one) + side * rounding_by_address(shape)
-    return min(at, at + reach), max(at, at + reach), at, height, slope
+    return min(at, at + reach), max(at, at + reach), at, height, rise / reach
 
 
 @part

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ....framework.compilation import inlined
 from ....framework.jit.records.record_type import record_at
 from .parameters import HEADER
-from .signatures import call_rounding, call_support
+from .signatures import call_edge, call_rounding, call_support
 from .user_functions import as_argument
 
 # The header has no vectors, so it is the same in 2D and 3D.
@@ -28,7 +28,15 @@ def support_by_address(shape, direction):
 @inlined
 def rounding_by_address(shape):
     """How far the shape reaches beyond its core."""
-    return call_rounding(shape[1], shape[2], shape[3])
+    return call_rounding(shape[1], shape[2], shape[3]) if shape[1] != 0 else 0.0
+
+
+@inlined
+def edge_by_address(shape, normal, tilt):
+    """In a plane both ends, counter-clockwise, of the core's edge in the direction of a normal: the one that looks most
+    that way, if the shape tells it, else as in :func:`~..convex.edges.edge_towards`."""
+    x0, y0, x1, y1 = call_edge(_header_at(shape[2]).edge, shape[2], shape[3], normal, tilt)
+    return (x0, y0), (x1, y1)
 
 
 support_argument, rounding_argument = as_argument(support_by_address), as_argument(rounding_by_address)

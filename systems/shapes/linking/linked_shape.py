@@ -18,6 +18,7 @@ from ....framework.jit.records.schema import Schema, vectors
 from ....framework.jit.source import source_module
 from ....framework.plugins.registry import Shape
 from ...records import STATE
+from ..convex.edges import edge_towards
 from .parameters import (
     array_of,
     bind,
@@ -31,6 +32,7 @@ from .signatures import (
     NOT_FINITE,
     bounds_signature,
     call_bounds,
+    edge_signature,
     material_signature,
     moments_signature,
     rotated_signature,
@@ -92,10 +94,24 @@ class LinkedShape:
         return self._linked(made.support, support_signature(self.dimensions))
 
     @cached_property
-    def rounding(self) -> Linked:
+    def rounding(self) -> Linked | None:
+        """None if it has none."""
+        if self.shape.rounding is None:
+            return None
         source = f"return function({self._parameters('p')})"
         made = self._function("def rounding(p, i):", source, function=self.shape.rounding)
         return self._linked(made.rounding, rounding_signature())
+
+    @cached_property
+    def edge(self) -> Linked | None:
+        """In a plane both ends of an edge, by the support if the shape does not tell them; None in space."""
+        if self.dimensions == 3:
+            return None
+        told, parameters = self.shape.edge, self._parameters("p")
+        call = f"function({parameters}, normal)" if told else f"edge_towards({parameters}, function, normal, tilt)"
+        lines = f"one, two = {call}", "return one[0], one[1], two[0], two[1]"
+        made = self._function("def edge(p, i, normal, tilt):", *lines, function=told or self.shape.support)
+        return self._linked(made.edge, edge_signature(2))
 
     @cached_property
     def moments(self) -> Linked | None:
@@ -115,15 +131,15 @@ class LinkedShape:
         made = self._function("def material(p, i, point, normal):", source, function=self.shape.material)
         return self._linked(made.material, material_signature(self.dimensions))
 
-    def all_functions(self, by_address: bool) -> Iterator[Linked]:
-        """by_address: whether some pair takes the shape by the addresses of support and rounding."""
-        yield self.bounds
-        if self.rotated is not None:
-            yield self.rotated
-        if self.material is not None:
-            yield self.material
-        if by_address:
-            yield from (self.support, self.rounding)
+    def all_functions(self, by_address: bool, touched: bool = False) -> Iterator[Linked]:
+        """by_address: whether some pair takes the shape by the addresses of support and rounding; touched: whether what
+        spins touches it in several points, found by that of its edge too."""
+        found = [self.bounds, self.rotated, self.material]
+        if by_address or touched:
+            found += [self.support, self.rounding]
+        if touched:
+            found.append(self.edge)
+        yield from (linked for linked in found if linked is not None)
 
     def _parameters(self, address: str) -> str:
         return parameters_source(self.shape, f"at({address})", "i", "Parameters")
@@ -137,7 +153,7 @@ class LinkedShape:
         scope = {
             "function": user_function(function), "Parameters": parameter_tuple(self.shape), "array_of": array_of,
             "at": record_at(parameter_schema(self.shape), self.dimensions), "rows_of": rows_of,
-            "ALONE": ALONE, "NOT_FINITE": NOT_FINITE,
+            "edge_towards": edge_towards, "ALONE": ALONE, "NOT_FINITE": NOT_FINITE,
         }  # fmt: skip
         title = f'"""{self.shape.component.__name__}, {self.dimensions}D."""\n\n'
         return source_module(title + "\n    ".join([header, *lines]) + "\n", scope)

@@ -16,7 +16,7 @@ from ....framework.plugins.registry import Pair, Registry, Shape
 from .linked_pair import LinkedPair, convex_sides, linked_pair
 from .linked_shape import LinkedShape, linked_shape
 from .mixing import linked_rule
-from .parameters import bind, make_parameter_record, show_pool
+from .parameters import HEADER_FIELDS, bind, make_parameter_record, show_pool
 
 
 def linked_shapes(registry: Registry, components: list[type[Component]], dimensions: int) -> LinkedShapes:
@@ -90,9 +90,9 @@ class LinkedShapes:
     def all_functions(self, sweeps: bool, moments: bool) -> Iterator[Linked]:
         """Everything that a step may call for these shapes; sweeps: where there are swept bodies; moments: where some
         stage asks for them."""
-        by_address = self.supported(moments)
+        touched = self.touched(moments)
         for number, function in enumerate(self.functions):
-            yield from function.all_functions(by_address=number in by_address)
+            yield from function.all_functions(number in self.warm_started, number in touched)
             if moments and function.moments is not None:
                 yield function.moments
         yield from self._rules
@@ -100,11 +100,10 @@ class LinkedShapes:
             if pair is not None:
                 yield from pair.functions(sweeps)
 
-    def supported(self, moments: bool) -> set[int]:
-        """Shapes whose records have the addresses of support and rounding: all that have a support where moments are
-        asked for, because what spins touches in several points."""
-        spinning = (number for number, shape in enumerate(self.shapes) if moments and shape.support is not None)
-        return self.warm_started.union(spinning)
+    def touched(self, moments: bool) -> set[int]:
+        """Shapes whose records have the addresses of support, rounding and edge: all that have a support where moments
+        are asked for, because what spins touches in several points."""
+        return {number for number, shape in enumerate(self.shapes) if moments and shape.support is not None}
 
     def _table(self, name: str) -> np.ndarray:
         """Addresses of a function, by shape, or for pairs at first * count + second; 0 where there is none."""
@@ -131,7 +130,7 @@ class ParameterRecords:
     """The parameter records of one world: of each shape as its component has it, and as it is in the world.
 
     Both are one record for shapes that rotation does not change, and while no body is rotated. moments: as in
-    :meth:`LinkedShapes.supported`.
+    :meth:`LinkedShapes.touched`.
     """
 
     def __init__(self, linked: LinkedShapes, moments: bool = False) -> None:
@@ -143,8 +142,12 @@ class ParameterRecords:
             for number, shape in enumerate(linked.shapes) for name in shape.columns
             if isinstance(column := shape.component.columns[name], ArrayColumn)
         ]  # fmt: skip
-        for number in linked.supported(moments):
+        for number in linked.warm_started:
             self.need_support(number)
+        for number in linked.touched(moments):
+            self.need_support(number)
+            edge = linked.functions[number].edge
+            self.own[number].edge = 0 if edge is None else edge.address
 
     def bind(
         self, number: int, columns: Mapping[str, np.ndarray], axes: np.ndarray,
@@ -164,10 +167,8 @@ class ParameterRecords:
             return
         if self.world[number] is self.own[number]:
             self.world[number] = make_parameter_record(shape, self._linked.dimensions)
-            self.world[number].support, self.world[number].rounding = (
-                self.own[number].support,
-                self.own[number].rounding,
-            )
+            for name in HEADER_FIELDS:
+                setattr(self.world[number], name, getattr(self.own[number], name))
         bind(self.world[number], shape, rotated, axes)
 
     def follow_arrays(self) -> None:
@@ -190,4 +191,5 @@ class ParameterRecords:
 
 def set_support(record: Record, functions: LinkedShape) -> None:
     """The addresses of support and rounding, for pairs that take the shape by them."""
-    record.support, record.rounding = functions.support.address, functions.rounding.address
+    record.support = functions.support.address
+    record.rounding = 0 if functions.rounding is None else functions.rounding.address

@@ -1,8 +1,8 @@
 """Parameter records: one per shape, with the columns that its functions see as ``shape.radius`` and the like.
 
 Their fields are ``column_<name>`` for each column; an array column also has ``data_<name>`` and ``starts_<name>``, the
-pool. Shapes that rotate have ``axes``; ``matrices`` are the same numbers, d rows per body. ``support`` and ``rounding``
-come first in every record: the generic convex pair reads them without knowing the shape.
+pool. Shapes that rotate have ``axes``; ``matrices`` are the same numbers, d rows per body. ``support``, ``rounding``
+and ``edge`` come first in every record: what takes any convex shape reads them without knowing which.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from ....framework.jit.records.record_type import rows_of
 from ....framework.jit.records.schema import Column, Schema, axes, floats, integer, table, vectors
 from ....framework.plugins.registry import Shape
 
-# What every parameter record begins with.
-HEADER_FIELDS = {"support": integer(), "rounding": integer()}  # addresses; 0 until some function calls by them
+# What every parameter record begins with: addresses; 0 until some function calls by them, of a rounding: if it has none.
+HEADER_FIELDS = {"support": integer(), "rounding": integer(), "edge": integer()}
 HEADER = Schema("ShapeHeader", **HEADER_FIELDS)
 
 

@@ -81,6 +81,12 @@ def support_signature(dimensions: int) -> Signature:
     return floats(dimensions)(INT, INT, floats(dimensions))
 
 
+@cache
+def edge_signature(dimensions: int) -> Signature:
+    """(parameters, row, normal, tilt) -> both ends of an edge, one after the other."""
+    return floats(2 * dimensions)(INT, INT, floats(dimensions), FLOAT)
+
+
 def rounding_signature() -> Signature:
     """(parameters, row) -> rounding."""
     return FLOAT(INT, INT)
@@ -120,5 +126,6 @@ call_moments = call_in_dimension(moments_signature)
 call_material = call_in_dimension(material_signature)
 call_rotated = call_in_dimension(rotated_signature)
 call_support = call_in_dimension(support_signature)
+call_edge = call_in_dimension(edge_signature)
 call_rounding = linked_call(rounding_signature)
 call_mixing = linked_call(mixing_signature)
