@@ -161,10 +161,10 @@ def advance_conservatively(state, a, b, path, kind, times, until, slop):
     for look in range(MOST_ADVANCES):
         d = along(path, t)
         hit, depth, n, p = evaluate(state, shape_a, a, shape_b, b, d)
-        w = rate_along(path, t)
+        w, met = rate_along(path, t), (depth, n)
         rate = dot(w, n)
         if cornered:  # what they meet just behind the corner is what they touch
-            if not hit or is_corner_touch(state, shape_a, a, shape_b, b, d, slop):
+            if not hit or is_corner_touch(state, shape_a, a, shape_b, b, d, met, slop):
                 return AT_CORNER, time, normal, point, at
             return TOUCHES, time, n, point, at
         touches = known or hit or abs(depth) <= ROUNDING * length(d) or look == MOST_ADVANCES - 1
@@ -187,7 +187,7 @@ def advance_conservatively(state, a, b, path, kind, times, until, slop):
             found = not further > t
         if found:
             at, time = d, t
-            if not is_corner_touch(state, shape_a, a, shape_b, b, d, slop):
+            if not is_corner_touch(state, shape_a, a, shape_b, b, d, met, slop):
                 return TOUCHES, time, normal, point, at
             cornered = True
             further = t + 2.0 * slop / length(w)

@@ -109,8 +109,8 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
             if threshold > -math.inf:
                 met, address = (depth + least, normal, point), state.links[CLOSING_POINT]
                 rate, point = call_closing_point(address, state, a, b, d, met, near - least, w)
-            closes = rate < -threshold or (rate < 0.0 and not found)
-            if closes and (corners or not is_corner_touch(state, shape_a, a, shape_b, b, d, slop)):
+            closes, there = rate < -threshold or (rate < 0.0 and not found), (depth + least, normal)
+            if closes and (corners or not is_corner_touch(state, shape_a, a, shape_b, b, d, there, slop)):
                 touch, found, gap = (t, normal, point, d), True, -depth
                 high = t if rate < -threshold - ROUNDING * fastest else high
         elif convex:

@@ -22,8 +22,8 @@ def is_stationary(travel, slop):
 
 
 @part
-def meets_at_corner(state, a, b, d, slop):
-    """Whether the two touch at a corner only. Shapes without a rule of their own are looked at if they move past each
+def meets_at_corner(state, a, b, d, met, slop):
+    """Whether the two touch at a corner only. met: (depth, normal) there. Shapes without a rule of their own are looked at if they move past each
     other: what stays where it is does not catch. Two that turn may lean on each other's corners."""
     bodies, shape = state.bodies, state.bodies.shape
     if state.spinning and is_turned(bodies, a) and is_turned(bodies, b):
@@ -33,7 +33,7 @@ def meets_at_corner(state, a, b, d, slop):
             return False
         if is_stationary(sub(centre_offset(bodies, a, b), centre_offset_at_start(bodies, a, b)), slop):
             return False
-    return is_corner_touch(state, shape[a], a, shape[b], b, d, slop)
+    return is_corner_touch(state, shape[a], a, shape[b], b, d, met, slop)
 
 
 @part
@@ -68,7 +68,7 @@ def first_touch_on_segment(state, a, b, d, travel, edge):
         at, further = add_scaled(d, travel, t), t - depth / (-rate if convex else way)
         if depth >= -ROUNDING * (length(d) + t * way) or (not convex and depth >= -slop):
             further = t + 2.0 * slop / way
-            if rate < 0.0 and not meets_at_corner(state, a, b, at, slop):
+            if rate < 0.0 and not meets_at_corner(state, a, b, at, (depth, normal), slop):
                 ahead = t - 2.0 * edge / rate
                 if ahead < 1.0 and evaluate_pair(state, a, b, add_scaled(d, travel, ahead))[1] > edge:
                     return True, -depth - t * rate, normal

@@ -138,7 +138,7 @@ def is_resting(state, dt, c):
     hit, carried = count[a] > 0 or count[b] > 0, bodies.warm_started[a] or bodies.warm_started[b]
     if not pairs.near_contact[c] and not hit and not carried:
         return False
-    margin, d = turning_margin(state, dt, a, b), centre_offset(bodies, a, b)
+    d = centre_offset(bodies, a, b)
     turns = state.spinning and turns_far(state, a, b)
     if turns and state.impacts.sweeps and pairs.impulse[c] > 0.0 and restitution_of(state, a, b) > 0.0:  # it has left
         return False
@@ -146,6 +146,7 @@ def is_resting(state, dt, c):
         depth, normal, far = depth_by_plane(pairs, c, d), pairs.normal[c], False
     else:
         depth, normal, far = deepest(state, dt, c, d)
+        margin = turning_margin(state, dt, a, b)
         if state.spinning and not turns and depth < -margin:
             # A thin bar that lies on terrain is soon behind it, and what slides fast soon beyond what bears it.
             start = centre_offset_at_start(bodies, a, b)
@@ -155,28 +156,25 @@ def is_resting(state, dt, c):
                 if before >= -margin:
                     depth, normal, far = before, across, True
     was_near = pairs.near_contact[c] and has_manifold(pairs, c)  # not so pairs that were found within the step
-    if depth < -margin and (hit or turns or not was_near):  # the prediction may push too much
-        return False
+    if depth < 0.0 and (hit or turns or not was_near) and depth < -turning_margin(state, dt, a, b):
+        return False  # else it may have been pushed too much by the prediction
     if depth >= 0.0:
         pairs.near_contact[c] = True
     pairs.parting[c] = STATIONARY
     if state.impacts.active and still_bounces(state, dt, c, depth, normal):
         return False
-    return far or not meets_at_corner(state, a, b, d, slop_of(state, a, b))
+    return far or not meets_at_corner(state, a, b, d, (depth, normal), slop_of(state, a, b))
 
 
 def find_resting(state, dt):
     """The pairs that are contacts at rest, in canonical order."""
-    pairs, count = state.pairs, 0
+    pairs, count, rows = state.pairs, 0, 0
     if not state.response_idle:
         for c in range(pairs.count):
             pairs.rests[c] = pairs.is_solid[c] and is_resting(state, dt, c)
             if pairs.rests[c]:
                 pairs.resting[count] = c
-                count += 1
-    rows = count
-    for h in range(count if state.spinning else 0):
-        rows += points_of(state, pairs.resting[h]) - 1
+                count, rows = count + 1, rows + (points_of(state, c) if state.spinning else 1)
     pairs.resting_count, state.solver.contacts, state.solver.tips = count, rows, rows > count
     state.resting_counted += count
     return OK if count == 0 or state.rest_ready else NEED_REST
@@ -196,7 +194,7 @@ def entry(state, a, b, d, travel, at_end, slop):
         if look == 0 and depth_now == -math.inf:  # behind it there, and not where the step starts
             t = 0.0
             _, depth_now, n, _ = evaluate_pair(state, a, b, d)
-        elif meets_at_corner(state, a, b, at, slop):
+        elif meets_at_corner(state, a, b, at, (depth_now, n), slop):
             depth_now = min(depth_now, -slop)  # so that the search goes on
         if look == 0 or depth_now >= 0.0:  # the end, or a time in touch
             normal, depth, chosen = n, depth_now, t
@@ -260,7 +258,7 @@ def linearise(state, dt):
         apart, convex = gap > REST_GAP * extent, both_convex(state, bodies.shape[a], bodies.shape[b])
         solver.varies[k] = not convex and normal_varies(state, a, b, d, normal)
         moves = not is_stationary(sub(end, d), slop)
-        if moves and (apart or parting != STATIONARY or meets_at_corner(state, a, b, d, slop)):
+        if moves and (apart or parting != STATIONARY or meets_at_corner(state, a, b, d, (-gap, normal), slop)):
             far, gap, normal = touch_of_long_way(state, dt, a, b, end)
             if not far or parting != STATIONARY:
                 gap, normal = entry(state, a, b, d, sub(end, d), parting != STATIONARY, slop)

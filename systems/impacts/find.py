@@ -63,9 +63,9 @@ NO_TOUCH, OVERLAPS_AT_END, FOUND_BY_SWEEP = range(3)
 def overlap_at_end(state, a, b, path, dt):
     """(whether they overlap at the end of their motion, and not at a corner only; the normal there)."""
     shape_a, shape_b, d = state.bodies.shape[a], state.bodies.shape[b], along(path, dt)
-    hit, _, normal, _ = evaluate(state, shape_a, a, shape_b, b, d)
-    corners = state.spinning and is_turned(state.bodies, a) and is_turned(state.bodies, b)
-    return hit and (corners or not is_corner_touch(state, shape_a, a, shape_b, b, d, slop_of(state, a, b))), normal
+    hit, depth, normal, _ = evaluate(state, shape_a, a, shape_b, b, d)
+    corners, slop = state.spinning and is_turned(state.bodies, a) and is_turned(state.bodies, b), slop_of(state, a, b)
+    return hit and (corners or not is_corner_touch(state, shape_a, a, shape_b, b, d, (depth, normal), slop)), normal
 
 
 @part

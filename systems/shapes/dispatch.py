@@ -67,10 +67,10 @@ def evaluate_batch(state, kind, start, stop):
 
 
 @part
-def gives_way(state, shape_a, a, shape_b, b, d, slop):
+def gives_way(state, sides, d, met, slop):
     """Whether two shapes that touch by less than the slop would, a little deeper, have a shorter way out along another
-    normal: they touch where faces meet."""
-    _, depth, n, _ = evaluate(state, shape_a, a, shape_b, b, d)
+    normal: they touch where faces meet. Arguments as of :func:`is_corner_touch`."""
+    (shape_a, a, shape_b, b), (depth, n) = sides, met
     if not -slop <= depth <= slop:
         return False
     _, deeper, _, _ = evaluate(state, shape_a, a, shape_b, b, add_scaled(d, n, depth - DEEPER * slop))
@@ -90,12 +90,13 @@ def both_sharp(state, shape_a, shape_b):
 
 
 @inlined
-def is_corner_touch(state, shape_a, a, shape_b, b, d, slop):
-    """Whether the two touch by less than the slop and at a corner or an edge only, which is no contact."""
+def is_corner_touch(state, shape_a, a, shape_b, b, d, met, slop):
+    """Whether the two touch by less than the slop and at a corner or an edge only, which is no contact. met: (depth,
+    normal) there."""
     shapes, kind = state.shapes, pair_index(state, shape_a, shape_b)
     address = shapes.corner[kind]
     if address == 0:
-        return both_sharp(state, shape_a, shape_b) and gives_way(state, shape_a, a, shape_b, b, d, slop)
+        return both_sharp(state, shape_a, shape_b) and gives_way(state, (shape_a, a, shape_b, b), d, met, slop)
     pa, pb = shapes.parameters[shape_a], shapes.parameters[shape_b]
     if (shape_a > shape_b) != shapes.flipped[kind]:
         return call_corner(address, state, pb, b, pa, a, negative(d), slop)
