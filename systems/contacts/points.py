@@ -34,6 +34,15 @@ def points_of(state, c):
 
 
 @inlined
+def rows_from(solver, r):
+    """How many rows the pair has whose first is r."""
+    e = 1
+    while r + e < solver.contacts and solver.point[r + e] == e:
+        e += 1
+    return e
+
+
+@inlined
 def point_rounding(state, i):
     """How far the shape of body i reaches beyond its core."""
     shape = convex_at(state.shapes.parameters[state.bodies.shape[i]], i)
@@ -52,7 +61,7 @@ def build_arms(state, dt, r, gap):
     point = pairs.point[c]
     if not has_manifold(pairs, c) and bodies.impact_count[a] + bodies.impact_count[b] > 0:  # which have turned shapes
         _, _, _, point = evaluate_pair(state, a, b, d)
-    count, rows = 1, points_of(state, c)
+    count, rows = 1, rows_from(solver, r)
     store(places, 0, point)
     gaps[0] = gap
     if rows > 1:
@@ -168,7 +177,7 @@ def lay_first_touch(state, dt, r):
     core_b = add(core_b, turn_of_arm(scale(left_b, -1.0), core_b))
     before = add(add(way, sub(begin, start)), sub(turn_of_arm(left_b, core_b), turn_of_arm(left_a, core_a)))
     apart = dot(add(start, sub(arm_b, arm_a)), normal) if led else gap - dot(before, normal)
-    same_face, rows = dot(solver.normal[solver.slot[r]], normal) > SAME_FACE, points_of(state, c)
+    same_face, rows = dot(solver.normal[solver.slot[r]], normal) > SAME_FACE, rows_from(solver, r)
     at = nearest_row(solver, r, rows, core_a, core_b) if same_face else r
     for one in range(r, r + rows):
         k = solver.slot[one]

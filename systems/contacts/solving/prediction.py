@@ -54,11 +54,14 @@ def find_closing(state):
         if not memory.off[m]:
             a, b = owner_of(state, memory.first[now, m]), owner_of(state, memory.second[now, m])
             push = memory.push[now, m]
-            closing = dot(push, sub(velocity[a], velocity[b])) / length(push) - memory.closing[now, m]
+            size = length(push)
+            closing = dot(push, sub(velocity[a], velocity[b])) / size - memory.closing[now, m]
+            if not closing > 0.0:
+                continue
             if a < state.moving and closing > length(to_hold[a]):
-                to_hold[a] = scale(push, -closing / length(push))
+                to_hold[a] = scale(push, -closing / size)
             if b < state.moving and closing > length(to_hold[b]):
-                to_hold[b] = scale(push, closing / length(push))
+                to_hold[b] = scale(push, closing / size)
 
 
 @part
