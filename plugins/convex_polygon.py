@@ -7,11 +7,16 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..components.colliders import Collider
+from ..components.colliders import AABBCollider, Collider, SphereCollider
 from ..framework import Column, Plugin, array_column, column
 from ..framework.elementary import atan2, cos, sin, sines_and_cosines
 from ..framework.typing import ArrayField
-from .corners import bounds_of, edge_of, support_of
+from ..framework.vectors import dot, row, scale
+from .capsule import CapsuleCollider
+from .corners import along_axes, bounds_of, edge_of, farthest_of, in_world, support_of
+from .polygon_pairs import meet_by_edges
+from .rotation.box import BoxCollider
+from .rotation.box_pairs import level
 
 __all__ = ["ConvexPolygonCollider"]
 
@@ -156,3 +161,79 @@ class ConvexPolygonCollider(Collider):
         if not area > 0.0:
             return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         return area, mx / area, my / area, xx / area, xy / area, yy / area
+
+
+# -- pairs, each shape as polygon_pairs takes it ---------------------------------------------------
+
+
+@plugin.kernel
+def corner_of(shape, k, like):
+    return in_world(shape, row(shape.vertices, k, like))
+
+
+@plugin.kernel
+def reach_of(shape, direction):
+    along = along_axes(shape, direction)
+    return dot(row(shape.vertices, farthest_of(shape.vertices, 0, along), along), along)
+
+
+@plugin.kernel
+def box_corner(box, k, like):
+    x, y = box.half_extents[0], box.half_extents[1]
+    return in_world(box, (x if k == 0 or k == 3 else -x, y if k < 2 else -y))
+
+
+@plugin.kernel
+def box_reach(box, direction):
+    x, y = abs(dot(box.axes[0], direction)), abs(dot(box.axes[1], direction))
+    return x * box.half_extents[0] + y * box.half_extents[1]
+
+
+@plugin.kernel
+def segment_end(capsule, k, like):
+    return scale(capsule.axes[1], capsule.half_height if k == 0 else -capsule.half_height)
+
+
+@plugin.kernel
+def segment_reach(capsule, direction):
+    return abs(dot(capsule.axes[1], direction)) * capsule.half_height
+
+
+@plugin.kernel
+def centre_of(sphere, k, like):
+    return scale(like, 0.0)
+
+
+@plugin.kernel
+def no_reach(sphere, direction):
+    return 0.0
+
+
+@plugin.kernel
+def polygon(shape):
+    return shape, len(shape.vertices), corner_of, reach_of
+
+
+@plugin.pair(ConvexPolygonCollider, ConvexPolygonCollider)
+def two_polygons(a, b, d):
+    return meet_by_edges(polygon(a), polygon(b), d, a.corner_radius, b.corner_radius)
+
+
+@plugin.pair(BoxCollider, ConvexPolygonCollider)
+def box_polygon(a, b, d):
+    return meet_by_edges((a, 4, box_corner, box_reach), polygon(b), d, 0.0, b.corner_radius)
+
+
+@plugin.pair(AABBCollider, ConvexPolygonCollider)
+def level_box_polygon(a, b, d):
+    return meet_by_edges((level(a, d), 4, box_corner, box_reach), polygon(b), d, 0.0, b.corner_radius)
+
+
+@plugin.pair(CapsuleCollider, ConvexPolygonCollider)
+def capsule_polygon(a, b, d):
+    return meet_by_edges((a, 2, segment_end, segment_reach), polygon(b), d, a.radius, b.corner_radius)
+
+
+@plugin.pair(SphereCollider, ConvexPolygonCollider)
+def sphere_polygon(a, b, d):
+    return meet_by_edges((a, 1, centre_of, no_reach), polygon(b), d, a.radius, b.corner_radius)

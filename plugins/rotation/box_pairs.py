@@ -8,6 +8,7 @@ import math
 from ...components import AABBCollider, SphereCollider
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, scale
 from ...systems.shapes.convex.pair import SUPPORT_TILT, convex_convex, middle_of_overlap
+from ..capsule import CapsuleCollider, capsule_box
 from ..corners import along_axes, in_world
 from ..standard_shapes import sharp, sphere_box
 from .box import BoxCollider, boxes
@@ -15,7 +16,8 @@ from .box import BoxCollider, boxes
 CLOSE = 1e-14  # of the coordinates: nearer than that a distance has no direction, as for any two convex shapes
 
 Level = collections.namedtuple("Level", "half_extents axes")  # a box that never turns, as one that does
-ball_and_box = boxes.kernel(sphere_box)
+Seen = collections.namedtuple("Seen", "radius half_height axes")  # a capsule, along the axes of a box
+ball_and_box, capsule_and_box = boxes.kernel(sphere_box), boxes.kernel(capsule_box)
 support = boxes.kernel(BoxCollider.support)
 
 
@@ -114,6 +116,14 @@ boxes.pair(BoxCollider, BoxCollider)(two_boxes)
 def level_and_turned_box(a, b, d):
     """Two boxes, one of which has the axes of the world."""
     return two_boxes(level(a, d), b, d)
+
+
+@boxes.pair(CapsuleCollider, BoxCollider)
+def capsule_turned_box(a, b, d):
+    """As with a box that never turns, seen along its axes."""
+    u = along_axes(b, a.axes[1])
+    hit, depth, normal, point = capsule_and_box(Seen(a.radius, a.half_height, (u, u)), b, along_axes(b, d))
+    return hit, depth, in_world(b, normal), in_world(b, point)
 
 
 @boxes.pair(SphereCollider, BoxCollider)
