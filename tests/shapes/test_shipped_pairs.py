@@ -18,15 +18,16 @@ from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_hull import FIRST, ConvexHullCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider
 from carom.plugins.half_space import HalfSpaceCollider
+from carom.plugins.rotation.box_pairs import BoxCollider, boxes
 
 SHAPES = (
-    AABBCollider, CapsuleCollider, ConvexHullCollider, ConvexPolygonCollider, HalfSpaceCollider, SphereCollider,
+    AABBCollider, BoxCollider, CapsuleCollider, ConvexHullCollider, ConvexPolygonCollider, HalfSpaceCollider, SphereCollider,
 )  # fmt: skip
 DIRECTIONS = 24  # per pose: half of them anywhere, half near the normal
 ROUNDING = 1e-12  # of distance and sizes
 
 
-REGISTRY = registry(capsule.plugin, convex_hull.plugin, convex_polygon.plugin, half_space.plugin)
+REGISTRY = registry(boxes, capsule.plugin, convex_hull.plugin, convex_polygon.plugin, half_space.plugin)
 PAIRS = [
     (first, second, d)
     for first, second in itertools.combinations_with_replacement(SHAPES, 2)
@@ -48,6 +49,9 @@ def reach(rows: Rows, n: np.ndarray) -> np.ndarray:
         return np.broadcast_to(arrays["radius"][:, None], n.shape[:2])
     if component is AABBCollider:
         return np.einsum("pkd,pd->pk", np.abs(n), arrays["half_extents"])
+    if component is BoxCollider:
+        along = np.abs(np.einsum("pkd,pdj->pkj", n, rows.axes))
+        return np.einsum("pkj,pj->pk", along, arrays["half_extents"])
     if component is CapsuleCollider:
         along = np.abs(np.einsum("pkd,pd->pk", n, rows.axes[:, :, 1]))
         return along * arrays["half_height"][:, None] + arrays["radius"][:, None]
