@@ -13,7 +13,7 @@ from ..framework.elementary import atan2, cos, sin, sines_and_cosines
 from ..framework.typing import ArrayField
 from ..framework.vectors import dot, row, scale
 from .capsule import CapsuleCollider
-from .corners import along_axes, bounds_of, edge_of, farthest_of, in_world, support_of
+from .corners import along_axes, bounds_of, edge_of, in_world, support_of
 from .polygon_pairs import meet_by_edges
 from .rotation.box import BoxCollider
 from .rotation.box_pairs import level
@@ -173,8 +173,11 @@ def corner_of(shape, k, like):
 
 @plugin.kernel
 def reach_of(shape, direction):
-    along = along_axes(shape, direction)
-    return dot(row(shape.vertices, farthest_of(shape.vertices, 0, along), along), along)
+    along, farthest = along_axes(shape, direction), -math.inf
+    for k in range(len(shape.vertices)):
+        reach = dot(row(shape.vertices, k, along), along)
+        farthest = reach if reach > farthest else farthest  # no branch that is mispredicted
+    return farthest
 
 
 @plugin.kernel

@@ -19,9 +19,10 @@ CLOSE = 1e-14  # of a gap: corners that are no farther apart than an edge says a
 
 @inlined
 def widest_gap(one, other, d):
-    """(gap, outward unit normal) of the edge of a shape that another one, d from it, lies farthest beyond."""
+    """(gap, outward unit normal, start, end) of the edge of a shape that another one, d from it, lies farthest beyond."""
     shape, count, corner, _ = one
     most, normal, before = -math.inf, d, corner(shape, count - 1, d)
+    start, end = before, before
     for k in range(count if count > 1 else 0):
         here = corner(shape, k, d)
         way = sub(here, before)
@@ -30,28 +31,28 @@ def widest_gap(one, other, d):
             outward = (way[1] / size, -way[0] / size)
             gap = dot(outward, sub(d, here)) - other[3](other[0], negative(outward))
             if gap > most:
-                most, normal = gap, outward
+                most, normal, start, end = gap, outward, before, here
         before = here
-    return most, normal
+    return most, normal, start, end
 
 
 @inlined
 def span_along(one, outward, along):
-    """(low, high, level) of the edge or the corner of a shape that is farthest in a direction: where its ends are along
-    another one, and how far out."""
+    """(low, high) of the edge or the corner of a shape that is farthest in a direction: where its ends are along
+    another one."""
     shape, count, corner, _ = one
-    level, at = -math.inf, 0.0
+    level, at, place = -math.inf, 0, 0.0
     for k in range(count):
         here = corner(shape, k, along)
         if dot(outward, here) > level:
-            level, at = dot(outward, here), dot(along, here)
-    low, high = at, at
-    for k in range(count):
-        here = corner(shape, k, along)
-        place = dot(along, here)
-        if level - dot(outward, here) <= SUPPORT_TILT * abs(place - at):
-            low, high = min(low, place), max(high, place)
-    return low, high, level
+            level, at, place = dot(outward, here), k, dot(along, here)
+    low, high = place, place
+    for turn in range(2):
+        k = at + 1 - 2 * turn
+        beside = corner(shape, k - count if k == count else (count - 1 if k < 0 else k), along)
+        if level - dot(outward, beside) <= SUPPORT_TILT * abs(dot(along, beside) - place):
+            low, high = min(low, dot(along, beside)), max(high, dot(along, beside))
+    return low, high
 
 
 @inlined
@@ -70,14 +71,19 @@ def nearest_corners(one, other, d):
 @inlined
 def meet_by_edges(one, other, d, radius, beyond):
     """As from a pair's function; radius, beyond: the roundings of both."""
-    gap, normal = widest_gap(one, other, d)
-    back, opposite = widest_gap(other, one, negative(d))
-    if back > gap:
-        gap, normal = back, negative(opposite)
+    gap, normal, start, end = widest_gap(one, other, d)
+    back, opposite, from_b, to_b = widest_gap(other, one, negative(d))
+    across = back > gap
+    if across:
+        gap, normal, start, end = back, negative(opposite), add(d, to_b), add(d, from_b)
     along = (-normal[1], normal[0])
-    low, high, level = span_along(one, normal, along)
-    low_b, high_b, _ = span_along(other, negative(normal), along)
-    low, high = max(low, low_b + dot(along, d)), min(high, high_b + dot(along, d))
+    if across:
+        low, high = span_along(one, normal, along)
+    else:
+        low, high = span_along(other, negative(normal), along)
+        low, high = low + dot(along, d), high + dot(along, d)
+    low, high = max(low, dot(along, start)), min(high, dot(along, end))
+    level = dot(normal, end) - (gap if across else 0.0)
     point = add_scaled(scale(normal, level), along, 0.5 * (low + high))
     if gap > 0.0 and low > high:
         nearest, way = nearest_corners(one, other, d)
