@@ -49,6 +49,12 @@ def point_rounding(state, i):
     return rounding_by_address(shape) if shape[1] != 0 else 0.0
 
 
+@inlined
+def rolling_between(bodies, a, b):
+    """The rolling friction of two bodies."""
+    return max(bodies.rolling_friction[a], bodies.rolling_friction[b])
+
+
 @part
 def build_arms(state, dt, r, gap):
     """The points of the pair whose first row is r: gaps, and the arms to both bodies. Shapes stand as they are turned
@@ -71,12 +77,10 @@ def build_arms(state, dt, r, gap):
         count = contact_points(state, (a, b), d, (-gap, normal, point), (margin, tilt), places, gaps)
     round_a, round_b = point_rounding(state, a), point_rounding(state, b)
     radius_a, radius_b = bodies.rolling_radius[a], bodies.rolling_radius[b]
-    rolling = max(bodies.rolling_friction[a], bodies.rolling_friction[b])
-    solver.has_rolling |= rolling > 0.0
+    solver.has_rolling |= rolling_between(bodies, a, b) > 0.0
     for e in range(rows):
         k = solver.slot[r + e]
         at, between = row(places, min(e, count - 1), nothing), gaps[min(e, count - 1)]
-        solver.rolling[k], solver.rolled[k] = rolling, nothing
         solver.place[k], solver.gap[k] = at, between if e < count else UNREACHED * extent
         arm_a = add(bodies.offset[a], add_scaled(at, normal, -0.5 * between))
         arm_b = add(bodies.offset[b], add_scaled(sub(at, d), normal, 0.5 * between))
@@ -199,4 +203,7 @@ def lay_arms(state, dt):
             build_arms(state, dt, r, solver.gap[solver.slot[r]])
             if turns_far(state, pairs.a[solver.pair[r]], pairs.b[solver.pair[r]]):
                 lay_first_touch(state, dt, r)
+    for r in range(solver.contacts if solver.has_rolling else 0):
+        c = solver.pair[r]
+        solver.rolling[solver.slot[r]] = rolling_between(state.bodies, pairs.a[c], pairs.b[c])
     return OK

@@ -60,10 +60,13 @@ def touch_of_long_way(state, dt, a, b, end):
     deeper than that may be wrong, and none after an impact, on a way that was no straight one.
     """
     bodies, edge, nothing = state.bodies, FAST * smaller_extent(state.bodies, a, b), zero_of(state)
-    d, margin = segment_start(state, a, b), contact_margin(state, dt, a, b)
-    travel, turns = sub(end, d), turning_travel(state, dt, a, b)
+    d = segment_start(state, a, b)
+    travel = sub(end, d)
     way = length(travel)
-    if not (way > edge and (is_swept(state, a, b, way) or way <= margin)) or turns > edge:
+    if not way > edge:  # usual
+        return False, 0.0, nothing
+    margin, turns = contact_margin(state, dt, a, b), turning_travel(state, dt, a, b)
+    if not (is_swept(state, a, b, way) or way <= margin) or turns > edge:
         return False, 0.0, nothing
     least = min(edge, margin)
     if is_turning(state, dt, a, b) and state.impacts.sweeps and restitution_of(state, a, b) > 0.0:
@@ -75,12 +78,12 @@ def touch_of_long_way(state, dt, a, b, end):
 
 
 @part
-def deepest(state, dt, c, d):
+def deepest(state, dt, c, d, turns):
     """(depth where the centres are d apart, normal, whether it is) by the plane where the pair first touches on a long
-    way there; else by its manifold or its function."""
+    way there, or as it ``turns`` far; else by its manifold or its function."""
     pairs, bodies = state.pairs, state.bodies
     a, b = pairs.a[c], pairs.b[c]
-    if state.spinning and turns_far(state, a, b) and depth_bound_on_path(state, c) >= -slop_of(state, a, b):
+    if turns and depth_bound_on_path(state, c) >= -slop_of(state, a, b):
         touches, _, _, normal, _, _, _ = call_touch_of_turn(state.links[TOUCH_OF_TURN], state, dt, a, b)
         if touches or not is_followed(state, a, b, dt):
             return 2.0 * slop_of(state, a, b) if touches else -math.inf, normal, touches
@@ -145,7 +148,7 @@ def is_resting(state, dt, c):
     if pairs.early[c] and not hit and not turns and is_at_manifold(pairs, c, d, smaller_extent(bodies, a, b)):  # usual
         depth, normal, far = depth_by_plane(pairs, c, d), pairs.normal[c], False
     else:
-        depth, normal, far = deepest(state, dt, c, d)
+        depth, normal, far = deepest(state, dt, c, d, turns)
         margin = turning_margin(state, dt, a, b)
         if state.spinning and not turns and depth < -margin:
             # A thin bar that lies on terrain is soon behind it, and what slides fast soon beyond what bears it.
