@@ -19,7 +19,7 @@ CLOSE = 1e-14  # of a gap: corners that are no farther apart than an edge says a
 
 @inlined
 def widest_gap(one, other, d):
-    """(gap, outward unit normal, start, end) of the edge of a shape that another one, d from it, lies farthest beyond."""
+    """(gap, outward unit normal, start, end) of that edge of a shape which another, d from it, is farthest beyond."""
     shape, count, corner, _ = one
     most, normal, before = -math.inf, d, corner(shape, count - 1, d)
     start, end = before, before

@@ -21,7 +21,19 @@ from ..errors import PluginError
 from ..jit.records.schema import Column, Schema
 from ..outlines import SIGNS, Outline
 from ..schedule.stages import answers
-from .laws import Contacts, Law, Support, Trial, mixing_laws, outline_laws, pair_laws, plain, shape_laws, sweep_laws
+from .laws import (
+    Contacts,
+    Law,
+    Support,
+    Trial,
+    edge_laws,
+    mixing_laws,
+    outline_laws,
+    pair_laws,
+    plain,
+    shape_laws,
+    sweep_laws,
+)  # fmt: skip
 from .registry import Convex, Shape
 
 # Functions of a shape: their arguments, and what they return.
@@ -135,6 +147,9 @@ def check_shape(plugin: Any, component: Any, cost: float) -> None:
         half, support = _extents(where, component, samples, dimensions)
         said = f"{where}: for {shown(samples[0])} in {dimensions}D"
         require(lambda row, said=said: said, shape_laws(half, support, look, other))
+        edge = _shape_function(where, component, "edge", dimensions)
+        if dimensions == 2 and edge is not None and support is not None:
+            require(lambda row, said=said: said, edge_laws(edge(samples, look), support, look))
         require(lambda row, said=said: said, laws_of_outline(where, component, samples[:1], dimensions))
 
 
@@ -158,7 +173,8 @@ def _shape_function(where: str, component: Any, name: str, dimensions: int) -> P
         )
     moments = 1 + dimensions + dimensions * (dimensions + 1) // 2
     form = {"rounding": float, "second_moments": moments}.get(name, dimensions)
-    forms = (float, float, dimensions) if name == "material" else (form,)
+    several = {"material": (float, float, dimensions), "edge": (dimensions, dimensions)}
+    forms = several.get(name, (form,))
     return None if function is None else PlainFunction(f"{where}: {name}", function, *SHAPE_FUNCTIONS[name], *forms)
 
 

@@ -230,6 +230,20 @@ def shape_laws(half: np.ndarray, support: Support | None, look: np.ndarray, othe
     yield Law(np.abs(far - here) > slack, what, cure, (look, point, long))
 
 
+def edge_laws(ends: Sequence[np.ndarray], support: Support, look: np.ndarray) -> Iterator[Law]:
+    """Of both ends (n, 2) of the edges of n shapes, those asked for in the directions ``look``, (n, 2)."""
+    one, two = ends
+    way = two - one
+    outward = np.stack((way[:, 1], -way[:, 0]), axis=1)
+    reach = ((support(towards)[0] * towards).sum(axis=1) for towards in (look, outward))
+    most = (np.maximum((one * look).sum(axis=1), (two * look).sum(axis=1)), (one * outward).sum(axis=1))
+    slack = TOLERANCE * np.abs(np.concatenate(ends, axis=1)).max(axis=1)
+    what, cure = "edge({}) is from {} to {}, support reaches farther", "the farthest point is one end of it"
+    for towards, farthest, own in zip((look, outward), reach, most, strict=True):
+        yield Law(~(own >= farthest - slack * np.abs(towards).max(axis=1)), what, cure, (look, one, two))
+        what, cure = "support reaches beyond edge({}), from {} to {}", "go from end to end counter-clockwise"
+
+
 def outline_laws(
     outlines: Sequence[Outline], half: np.ndarray, beyond: np.ndarray, reach: np.ndarray | None, ways: np.ndarray
 ) -> Iterator[Law]:

@@ -23,8 +23,9 @@ def is_stationary(travel, slop):
 
 @part
 def meets_at_corner(state, a, b, d, met, slop):
-    """Whether the two touch at a corner only. met: (depth, normal) there. Shapes without a rule of their own are looked at if they move past each
-    other: what stays where it is does not catch. Two that turn may lean on each other's corners."""
+    """Whether the two touch at a corner only. Shapes without a rule of their own are looked at if they move past each
+    other: what stays where it is does not catch. Two that turn may lean on each other's corners. met: (depth, normal)
+    there."""
     bodies, shape = state.bodies, state.bodies.shape
     if state.spinning and is_turned(bodies, a) and is_turned(bodies, b):
         return False

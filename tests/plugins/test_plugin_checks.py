@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import pytest
 
-from carom.components import RigidBody, SphereCollider, Transform
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.components.colliders import Collider
 from carom.framework import Component, Convex, Plugin, PluginError, StepError, World, column
 from carom.framework.outlines import FACES, SIGNS
@@ -65,6 +66,18 @@ def outline(function, dimensions=(2,)):
         return tuple(math.copysign(0.5, x) for x in direction)
 
     return shape(bounds=bounds, support=support, outline=function, dimensions=dimensions)
+
+
+LEVEL = SimpleNamespace(half_extents=(0.5, 0.5))
+
+
+def edged(function):
+    """A square with half extents 0.5 and this edge."""
+
+    def support(shape, direction):
+        return tuple(math.copysign(0.5, x) for x in direction)
+
+    return shape(bounds=lambda shape, dimensions: (0.5, 0.5), support=support, edge=function, dimensions=(2,))
 
 
 def pair(function, **members):
@@ -174,6 +187,9 @@ MISTAKES = {
         outline(lambda shape, dimensions: (SIGNS[3], ()), dimensions=(3,)), "more than two corners need faces"
     ),
     "outline too large": (outline(lambda shape, dimensions: (1.1 * QUAD, ())), "outline reaches .*, bounds are"),
+    "edge of another side": (edged(lambda shape, d: ((0.5, -0.5), (0.5, 0.5))), "support reaches farther"),
+    "edge clockwise": (edged(lambda shape, d: AABBCollider.edge(LEVEL, d)[::-1]), "end to end counter-clockwise"),
+    "edge is one point": (edged(lambda shape, d: (0.5, 0.5)), "returned"),
     "outline too small": (outline(lambda shape, dimensions: (0.9 * QUAD, ())), "reaches 0.636[0-9]*, support 0.707"),
     "outline with a corner cut off": (outline(lambda shape, dimensions: (QUAD[:3], ())), "the outline reaches"),
     "outline beside the core": (

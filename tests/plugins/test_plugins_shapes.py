@@ -1,16 +1,22 @@
-"""Plugin shapes at work in a world: one that turns with its body, and one with an array field."""
+"""Shapes of plugins in a world: one that turns with its body, one with an array field; edges of shipped ones."""
 
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from carom.components import RigidBody, SphereCollider, Transform
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.components.colliders import Collider
 from carom.framework import Plugin, PluginError, World, array_column
+from carom.framework.plugins.laws import edge_laws
 from carom.plugins import Physics
+from carom.plugins.capsule import CapsuleCollider
+from carom.plugins.convex_polygon import ConvexPolygonCollider
+from carom.plugins.rotation import BoxCollider
+from carom.systems.shapes.convex.edges import edge_towards
 
 pytestmark = pytest.mark.plain
 
@@ -115,3 +121,28 @@ def test_queries_know_shapes_with_arrays():
     world.create_entity(Transform((0, 9)), RigidBody(), SphereCollider(1.0))
     (hit,) = world.shape_cast(CloudCollider([(0.0, 0.0), (1.0, 0.0)]), (-9, 9), (20, 0), exclude=cloud)
     assert hit.distance == pytest.approx(7.0)
+
+
+@pytest.mark.parametrize("kind", [AABBCollider, BoxCollider, CapsuleCollider, ConvexPolygonCollider])
+def test_edges_that_shapes_tell_are_those_that_their_support_finds(kind):
+    random, found = np.random.default_rng(60), 0
+    for _ in range(300):
+        angle, (x, y) = random.uniform(0.0, 7.0), random.uniform(0.1, 2.0, 2)
+        axes = ((1.0, 0.0), (0.0, 1.0))
+        if kind is not AABBCollider:
+            axes = (math.cos(angle), math.sin(angle)), (-math.sin(angle), math.cos(angle))
+        corners = ConvexPolygonCollider.regular(int(random.integers(3, 9)), x).vertices + y * random.uniform(-1, 1, 2)
+        shape = SimpleNamespace(half_extents=(x, y), half_height=x, vertices=corners, axes=axes)
+        look = np.array((math.cos(2.0 * angle), math.sin(2.0 * angle)))
+        edge = kind.edge(shape, tuple(look))
+
+        def support(ways, shape=shape):
+            return np.array([kind.support(shape, tuple(way)) for way in ways]), np.zeros(len(ways))
+
+        ends = [np.array([end]) for end in edge]
+        assert not any(law.is_broken for law in edge_laws(ends, support, look[None]))
+        one, two = edge_towards(shape, kind.support, tuple(look), 0.3)
+        if one != two:
+            found += 1
+            assert np.abs(np.subtract((one, two), edge)).max() < 1e-12
+    assert found > 20

@@ -21,7 +21,8 @@ from carom.plugins.half_space import HalfSpaceCollider
 from carom.plugins.rotation.box_pairs import BoxCollider, boxes
 
 SHAPES = (
-    AABBCollider, BoxCollider, CapsuleCollider, ConvexHullCollider, ConvexPolygonCollider, HalfSpaceCollider, SphereCollider,
+    AABBCollider, BoxCollider, CapsuleCollider, ConvexHullCollider, ConvexPolygonCollider, HalfSpaceCollider,
+    SphereCollider,
 )  # fmt: skip
 DIRECTIONS = 24  # per pose: half of them anywhere, half near the normal
 ROUNDING = 1e-12  # of distance and sizes

@@ -22,7 +22,7 @@ from ....framework.jit.records.record_type import rows_of
 from ....framework.jit.records.schema import Column, Schema, axes, floats, integer, table, vectors
 from ....framework.plugins.registry import Shape
 
-# What every parameter record begins with: addresses; 0 until some function calls by them, of a rounding: if it has none.
+# What every parameter record begins with: addresses; 0 until some function calls by them, and of what a shape has not.
 HEADER_FIELDS = {"support": integer(), "rounding": integer(), "edge": integer()}
 HEADER = Schema("ShapeHeader", **HEADER_FIELDS)
 
