@@ -42,7 +42,7 @@ from ..shapes.tolerances import (
     turning_travel,
 )  # fmt: skip
 from .approach import STAYS_SLOPS, first_touch_on_segment, is_stationary, meets_at_corner, segment_start
-from .points import is_ball, points_of
+from .points import is_ball, points_of, rows_from
 
 ENTRY_ITERATIONS = 24
 REST_GAP = 1e-11  # of the extent: a smaller gap is none, not even as seen past a round corner
@@ -224,14 +224,6 @@ def normal_varies(state, a, b, d, normal):
     return varies
 
 
-@inlined
-def repeat_row(solver, one, k):
-    """What the points of a pair have in common."""
-    solver.normal[k], solver.gap[k], solver.apart[k] = solver.normal[one], solver.gap[one], solver.apart[one]
-    solver.varies[k], solver.parting[k] = solver.varies[one], solver.parting[one]
-    solver.extent[k], solver.friction[k] = solver.extent[one], solver.friction[one]
-
-
 @part
 def find_surface_slips(state):
     """What surfaces that run add to the slip of each row; returns whether any does where there is friction."""
@@ -248,10 +240,9 @@ def linearise(state, dt):
     """Of each contact at rest the normal and the gap where the step starts, and what the solver needs of its bodies."""
     pairs, bodies, solver, has_friction = state.pairs, state.bodies, state.solver, False
     for r in range(solver.contacts):  # in the order of the pairs, for the caches
-        c, k = solver.pair[r], solver.slot[r]
-        if solver.point[r] > 0:
-            repeat_row(solver, solver.slot[r - 1], k)
+        if solver.point[r] > 0:  # as the first of the pair
             continue
+        c = solver.pair[r]
         a, b, parting = pairs.a[c], pairs.b[c], pairs.parting[c]
         extent, d = smaller_extent(bodies, a, b), centre_offset_at_start(bodies, a, b)
         slop, end, struck_along = slop_for(state, extent), centre_offset(bodies, a, b), pairs.normal[c]
@@ -259,7 +250,7 @@ def linearise(state, dt):
             make_manifold(state, c, d)
         gap, normal = -depth_by_plane(pairs, c, d), pairs.normal[c]
         apart, convex = gap > REST_GAP * extent, both_convex(state, bodies.shape[a], bodies.shape[b])
-        solver.varies[k] = not convex and normal_varies(state, a, b, d, normal)
+        varies = not convex and normal_varies(state, a, b, d, normal)
         moves = not is_stationary(sub(end, d), slop)
         if moves and (apart or parting != STATIONARY or meets_at_corner(state, a, b, d, (-gap, normal), slop)):
             far, gap, normal = touch_of_long_way(state, dt, a, b, end)
@@ -271,16 +262,17 @@ def linearise(state, dt):
         if pairs.impulse[c] > 0.0 and dot(normal, struck_along) <= 0.0:
             normal = struck_along  # coincident centres have parted: not back again
             forget_manifold(pairs, c)
-        solver.normal[k], pairs.normal[c] = normal, normal
+        pairs.normal[c] = normal
         if apart and state.spinning and is_ball(state, a, normal) and is_ball(state, b, normal):
             apart = False  # neither has a corner to slide past
-        solver.gap[k], solver.apart[k] = gap, apart
         # After an impact at time t the body seems to come from dv t behind: no overlap to be pushed out.
-        solver.parting[k] = parting == SEPARATES or (pairs.impulse[c] > 0.0 and gap > 0.0)
-        solver.extent[k] = extent
+        parts = parting == SEPARATES or (pairs.impulse[c] > 0.0 and gap > 0.0)
         mu = friction_at(state, a, b, (pairs.point[c], normal, d))
-        solver.friction[k] = mu
         has_friction |= mu != 0.0
+        for e in range(r, r + rows_from(solver, r)):
+            k = solver.slot[e]
+            solver.normal[k], solver.gap[k], solver.extent[k], solver.friction[k] = normal, gap, extent, mu
+            solver.apart[k], solver.varies[k], solver.parting[k] = apart, varies, parts
     solver.has_friction, solver.surfaces_run = has_friction, any_surface_runs(state) and find_surface_slips(state)
     solver.has_rolling = False
     return call_arms(state.links[ARMS_AT_REST], state, dt) if state.spinning else OK
