@@ -8,8 +8,7 @@ after all, they are taken back.
 
 from __future__ import annotations
 
-from ....framework.compilation import packed, part
-from ....framework.jit.records.record_type import zero_of
+from ....framework.compilation import inlined, packed, part
 from ....framework.schedule.stages import Rows
 from ....framework.vectors import add, add_scaled, dot, length, scale, sub
 from ...codes import OK
@@ -17,7 +16,7 @@ from ...joints.bodies import push_joined
 from ...parts.rows import owner_of
 from ...parts.stages import copy_prediction_to_parts
 from ...records import CURVES, PREDICTED
-from .warm_start import find_rows, scale_to
+from .warm_start import find_rows, scale_to, skip_before
 
 
 @part
@@ -32,36 +31,37 @@ def mark_disabled(state):
         if not pairs.disabled[c]:
             continue
         a, b = entity[pairs.a[c]], entity[pairs.b[c]]
-        while m < memory.counts[now] and (
-            memory.entity_a[now, m] < a or (memory.entity_a[now, m] == a and memory.entity_b[now, m] < b)
-        ):
-            m += 1
+        m = skip_before(memory, m, a, b)
         while m < memory.counts[now] and memory.entity_a[now, m] == a and memory.entity_b[now, m] == b:
             memory.off[m] = True
             m += 1
 
 
+@inlined
+def note_closing(bodies, i, moving, push, closing, share):
+    """``to_hold`` of body i becomes a share of a push where that closes faster than all before it."""
+    to_hold = bodies.to_hold
+    if i < moving and closing * abs(closing) > dot(to_hold[i], to_hold[i]):
+        to_hold[i] = scale(push, share)
+
+
 @part
 def find_closing(state):
     """``to_hold``: how much faster than when the last step ended each body closes on what pushed it, along the push of
-    the remembered contact where that is most, m/s."""
+    the remembered contact where that is most, m/s; what forces have given it where that is more."""
     memory, bodies, now = state.warm_start, state.bodies, state.warm_start.now
-    velocity, to_hold, nothing = bodies.linear_velocity, bodies.to_hold, zero_of(state)
+    velocity = bodies.linear_velocity
     for i in range(state.first, state.moving):
         bodies.warm_start_velocity[i] = velocity[i]  # of all, so that no branch asks which are supported
-        to_hold[i] = nothing
+        bodies.to_hold[i] = sub(velocity[i], bodies.start_velocity[i])
     for m in range(memory.counts[now]):
         if not memory.off[m]:
             a, b = owner_of(state, memory.first[now, m]), owner_of(state, memory.second[now, m])
             push = memory.push[now, m]
             size = length(push)
             closing = dot(push, sub(velocity[a], velocity[b])) / size - memory.closing[now, m]
-            if not closing > 0.0:
-                continue
-            if a < state.moving and closing > length(to_hold[a]):
-                to_hold[a] = scale(push, -closing / size)
-            if b < state.moving and closing > length(to_hold[b]):
-                to_hold[b] = scale(push, closing / size)
+            note_closing(bodies, a, state.moving, push, closing, -closing / size)
+            note_closing(bodies, b, state.moving, push, closing, closing / size)
 
 
 @part

@@ -6,7 +6,7 @@ substep, and what they gave in the whole step (push).
 
 from __future__ import annotations
 
-from ....framework.compilation import part
+from ....framework.compilation import inlined, part
 from ....framework.data.row_moves import place_of
 from ....framework.jit.records.record_type import zero_of
 from ....framework.schedule.stages import Rows
@@ -68,11 +68,13 @@ def start_with(solver, memory, k, several, span):
     only one if there are not several, then or now."""
     now, m = memory.now, span[0]
     if several:
-        nearest, m = SAME_PLACE_EXTENTS * solver.extent[k], -1
+        farthest = SAME_PLACE_EXTENTS * solver.extent[k]
+        nearest, m = farthest * farthest, -1
         for one in range(span[0], span[1]):
-            away = length(sub(memory.place[now, one], solver.place[k]))
-            if away < nearest and not memory.off[one]:
-                nearest, m = away, one
+            away = sub(memory.place[now, one], solver.place[k])
+            square = dot(away, away)
+            if square < nearest and not memory.off[one]:
+                nearest, m = square, one
         if m < 0:
             return
         memory.off[m] = True  # each once
@@ -83,38 +85,36 @@ def start_with(solver, memory, k, several, span):
         solver.tangent[k] = add_scaled(pull, n, -dot(pull, n))
 
 
+@inlined
+def skip_before(memory, m, a, b):
+    """The first remembered contact, from m on, of a pair of entities that is not before (a, b)."""
+    now = memory.now
+    while m < memory.counts[now] and (
+        memory.entity_a[now, m] < a or (memory.entity_a[now, m] == a and memory.entity_b[now, m] < b)
+    ):
+        m += 1
+    return m
+
+
 def match_warm_start(state, dt):
-    """Start each contact with the impulses that its pair had, if its normal has not turned far; else with none."""
-    solver, memory, bodies, pairs = state.solver, state.warm_start, state.bodies, state.pairs
-    if solver.contacts == 0:
-        return OK
-    entity, now, zero = bodies.entity, memory.now, zero_of(state)
-    for k in range(solver.contacts):
-        solver.impulse[k], solver.tangent[k] = 0.0, zero
-    if memory.counts[now] > 0:
-        scale_to(state, dt)
-        find_rows(state)
-    r = m = 0
-    while m < memory.counts[now]:
-        first, second, same, stop = memory.first[now, m], memory.second[now, m], False, m + 1
-        while r < solver.contacts:
-            c = solver.pair[r]
-            same = pairs.a[c] == first and pairs.b[c] == second
-            if same or entity[pairs.a[c]] > memory.entity_a[now, m]:
-                break
-            if entity[pairs.a[c]] == memory.entity_a[now, m] and entity[pairs.b[c]] > memory.entity_b[now, m]:
-                break
-            r += 1
-        while solver.tips and stop < memory.counts[now] and memory.first[now, stop] == first:
-            if memory.second[now, stop] != second:
-                break
+    """Start each contact with the impulses that its pair had, if its normal has not turned far; else with none. The
+    memory is that of a step of this length already, see ``predict_rest``. Both lists are in canonical order."""
+    solver, memory, pairs, entity = state.solver, state.warm_start, state.pairs, state.bodies.entity
+    now, zero, r, m = memory.now, zero_of(state), 0, 0
+    while r < solver.contacts:
+        c, begin = solver.pair[r], r
+        a, b = pairs.a[c], pairs.b[c]
+        stop = m = skip_before(memory, m, entity[a], entity[b])
+        while stop < memory.counts[now] and memory.first[now, stop] == a and memory.second[now, stop] == b:
             stop += 1
-        begin = r
-        while same and r < solver.contacts and solver.pair[r] == solver.pair[begin]:
+        while r < solver.contacts and solver.pair[r] == c:
             r += 1
-        several = stop - m > 1 or r - begin > 1
+        several = solver.tips and (stop - m > 1 or r - begin > 1)
         for one in range(begin, r):
-            start_with(solver, memory, solver.slot[one], several, (m, stop))
+            k = solver.slot[one]
+            solver.impulse[k], solver.tangent[k] = 0.0, zero
+            if stop > m:
+                start_with(solver, memory, k, several, (m, stop))
         m = stop
     return OK
 
