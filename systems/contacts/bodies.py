@@ -14,7 +14,7 @@ from ..joints.bodies import build_joint_rows
 from ..joints.order import order_direct
 from ..joints.records import DIRECT_BODIES
 from ..linking.parts import JOINED_BODIES, call_joined_bodies
-from ..parts.rows import has_parts, next_row, owner_of, place_of
+from ..parts.rows import next_row, owner_of
 from ..parts.stages import copy_to_parts
 from ..records import REST_COLUMNS, SOLVER_ARMS, SOLVER_BODIES, SOLVER_CONTACTS, SOLVER_SPINS, SOLVER_SURFACES
 from ..shapes.surfaces import any_surface_runs
@@ -46,10 +46,7 @@ def start_of_flight(state, i, v, a, dt):
 @part
 def reach_from_centre(state, i):
     """How far the shapes of body i reach from its centre of mass."""
-    bodies = state.bodies
-    if not has_parts(state, i):
-        return length(bodies.half_extents[i]) + length(bodies.offset[i])
-    reach, k = 0.0, i
+    bodies, reach, k = state.bodies, 0.0, i
     while k >= 0:
         if bodies.shape[k] >= 0:
             reach = max(reach, length(bodies.half_extents[k]) + length(bodies.offset[k]))
@@ -59,14 +56,17 @@ def reach_from_centre(state, i):
 
 @part
 def list_rows(state):
-    """The pair of each contact, and which of its points; in canonical order."""
-    solver, pairs, r = state.solver, state.pairs, 0
+    """The pair of each contact, and which of its points; in canonical order. Whether the points are those of the list
+    that was there."""
+    solver, pairs, r, same = state.solver, state.pairs, 0, True
     for h in range(pairs.resting_count):
         c = pairs.resting[h]
         for e in range(points_of(state, c) if solver.tips else 1):
+            same &= solver.point[r] == e
             solver.pair[r], solver.point[r] = c, e
             r += 1
     solver.frequency, solver.sag = (TIPPING_FREQUENCY, TIPPING_SAG) if solver.tips else (FREQUENCY, SAG)
+    return same
 
 
 @part
@@ -97,33 +97,25 @@ def gather(state, dt):
 
     Neighbours of one colour share no body that moves, so that the processor can work on several at once.
     """
-    solver, pairs, bodies = state.solver, state.pairs, state.bodies
+    solver, bodies = state.solver, state.bodies
     for i in range(state.first, state.moving if len(bodies.held) > 0 else 0):
         bodies.held[i] = False
     if rows_at_rest(state) == 0:
         return OK
-    list_rows(state)
-    order_rows(state, dt)
-    inverse_mass = bodies.inverse_mass
-    for r in range(solver.contacts):
-        c, k = solver.pair[r], solver.slot[r]
-        a, b = pairs.a[c], pairs.b[c]
-        solver.first[k], solver.second[k] = place_of(state, a), place_of(state, b)
-        solver.fixed[k] = solver.tips and (inverse_mass[a] == 0.0 or inverse_mass[b] == 0.0)
+    order_rows(state, dt, list_rows(state))
     nothing = zero_of(state)
     solver.movers = 0
     for q in range(solver.bodies):
         i = solver.body_row[q]
-        w = inverse_mass[i]
+        w = bodies.inverse_mass[i]
         solver.inverse_mass[q], solver.solver_mass[q] = w, 1.0 / w if w > 0.0 else 0.0
         v, x, a = nothing, nothing, nothing
         if i < state.moving:
             v = bodies.start_velocity[i]
-            spins = state.spinning and size_of_turn(bodies.spin[i]) > 0.0
-            if inverse_mass[i] == 0.0 and (dot(v, v) > 0.0 or spins):
+            if w == 0.0 and (dot(v, v) > 0.0 or (state.spinning and size_of_turn(bodies.spin[i]) > 0.0)):
                 solver.mover[solver.movers] = q
                 solver.movers += 1
-            if inverse_mass[i] > 0.0:
+            if w > 0.0:
                 x = sub(bodies.origin[i], bodies.previous_position[i])
                 a = sub(bodies.linear_velocity[i], v)
                 if bodies.warm_started[i]:
@@ -161,19 +153,19 @@ def gather_joined(state, dt):
 
 def put_back(state, dt):
     """Bodies that some contact pushed take what the solver says; without the predicted support they fly free."""
-    solver, pairs, bodies = state.solver, state.pairs, state.bodies
+    solver, pairs, bodies, joints = state.solver, state.pairs, state.bodies, state.solver.joints
     for r in range(solver.contacts):
         k = solver.slot[r]
         pairs.impulse[solver.pair[r]] += solver.total[k]
         if solver.had_impulse[k]:
             bodies.held[solver.body_row[solver.first[k]]] = True
             bodies.held[solver.body_row[solver.second[k]]] = True
-    for e in range(solver.joints.active):
-        a, b = solver.joints.row_a[solver.joints.order[e]], solver.joints.row_b[solver.joints.order[e]]
-        for i in (a, b):
+    for e in range(joints.active):
+        j = joints.order[e]
+        for i in (joints.row_a[j], joints.row_b[j]):
             if i >= 0:
                 bodies.held[owner_of(state, i)] = True
-    for q in range(solver.bodies if solver.contacts + solver.joints.active > 0 else 0):
+    for q in range(solver.bodies if solver.contacts + joints.active > 0 else 0):
         i = solver.body_row[q]
         bodies.place[i] = -1
         if state.spinning:

@@ -63,3 +63,28 @@ def test_a_turntable_drives_more_points_than_there_are_bodies():
         assert len(world.contacts.manifold) == solver.driven_rows == 160
         assert len(solver.driven_row) >= 160 > len(solver.body_row)
         np.testing.assert_allclose(moving.linear_velocity, np.cross((0.0, 0.1, 0.0), moving.position), atol=0.01)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_an_order_is_kept_while_pairs_are_and_is_that_of_a_new_one(d):
+    ends = []
+    for anew in (False, True):
+        with World(Physics(d, gravity=(0.0, -9.81, 0.0)[:d]), Rotation()) as world:
+            pile(world, d, np.random.default_rng((5, d)), 0.0, 30)
+            solver, boxes = world.physics.state.solver, sorted(world.bodies.dynamic.entity)
+            for step in range(160):
+                if step == 40:
+                    world.component_for_entity(boxes[0], RigidBody).mass = 3.0
+                if step in (60, 80):
+                    world.delete_entity(boxes[step // 10])
+                if anew:
+                    solver.ranges = 0
+                world.step()
+            ends.append(world.state_hash())
+            solver.colour[0] = 99
+            world.step()
+            assert solver.colour[0] == 99  # nothing has come or gone
+            world.delete_entity(boxes[1])
+            world.step()
+            assert solver.colour[0] != 99
+    assert ends[0] == ends[1]

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from ....framework.compilation import part
+from ....framework.compilation import inlined, part
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add, dot, length, sub
 from ...bits import lowest_bit
@@ -62,18 +62,32 @@ def solver_index(state, i):
 
 
 @part
+def is_ordered(state, listed):
+    """Whether rows whose points are ``listed`` as before have the order of the last step, too, which was of one range
+    without joints: it follows from their pairs, and which bodies can be moved. Then bodies get the places they had."""
+    solver, pairs, bodies, row = state.solver, state.pairs, state.bodies, state.solver.body_row
+    same = listed & (solver.ranges == 1) & (solver.row_ends[0] == solver.contacts)
+    same &= ((solver.chunks > 0) == state.spinning) & (solver.joint_ends[0] + solver.joints.active == 0)
+    for r in range(solver.contacts if same else 0):
+        a, b, k = pairs.a[solver.pair[r]], pairs.b[solver.pair[r]], solver.slot[r]
+        same &= (row[solver.first[k]] == owner_of(state, a)) & (row[solver.second[k]] == owner_of(state, b))
+    for q in range(solver.bodies if same else 0):
+        same &= solver.inverse_mass[q] == bodies.inverse_mass[row[q]]
+    for q in range(solver.bodies if same else 0):
+        bodies.place[row[q]] = q
+    return same
+
+
+@part
 def colour_rows(state):
     """Number the bodies of the rows, join them into islands and choose the colours, odd ones of pairs with several
     points."""
     solver, pairs, inverse_mass = state.solver, state.pairs, state.bodies.inverse_mass
-    used, starts, island = solver.used, solver.starts, solver.island
+    used, island = solver.used, solver.island
     solver.bodies = chosen = 0
-    for k in range(2 * COLOURS + 1):
-        starts[k] = 0
     for r in range(solver.contacts):
         if solver.point[r] > 0:
             solver.colour[r] = chosen
-            starts[chosen + 1] += 1
             continue
         c, taken = solver.pair[r], 0
         a, b = pairs.a[c], pairs.b[c]
@@ -92,9 +106,6 @@ def colour_rows(state):
             join_roots(island, p, q)
         chosen = 2 * colour + (r + 1 < solver.contacts and solver.point[r + 1] > 0)
         solver.colour[r] = chosen
-        starts[chosen + 1] += 1
-    for k in range(1, 2 * COLOURS + 1):
-        starts[k] += starts[k - 1]
 
 
 @part
@@ -102,18 +113,18 @@ def join_bodies(state):
     """Number the bodies of joints, which join islands as contacts do, and groups, which contacts do not join."""
     joints, inverse_mass = state.solver.joints, state.bodies.inverse_mass
     for e in range(joints.active):
-        a, b = joints.row_a[joints.order[e]], joints.row_b[joints.order[e]]
+        j = joints.order[e]
+        a, b = joints.row_a[j], joints.row_b[j]
         p, q = solver_index(state, a) if a >= 0 else -1, solver_index(state, b) if b >= 0 else -1
         if p >= 0 and q >= 0 and inverse_mass[a] > 0.0 and inverse_mass[b] > 0.0:
             join_roots(state.solver.island, p, q)
             join_roots(state.solver.group, p, q)
 
 
-@part
-def island_of_joint(state, j):
-    """The island of a row of joints."""
-    joints, island = state.solver.joints, state.solver.island
-    a, b = joints.row_a[j], joints.row_b[j]
+@inlined
+def island_of_rows(state, a, b):
+    """The island of the bodies of two rows, below 0 for the world."""
+    island = state.solver.island
     return max(island[place_of(state, a)] if a >= 0 else -1, island[place_of(state, b)] if b >= 0 else -1)
 
 
@@ -121,7 +132,8 @@ def island_of_joint(state, j):
 def measure_joint(state, j, dt):
     """Count a row of joints for its island, and find whether its bodies turn so fast that a limit strikes them."""
     solver, joints, spin = state.solver, state.solver.joints, state.bodies.spin
-    a, b, t = joints.row_a[j], joints.row_b[j], island_of_joint(state, j)
+    a, b = joints.row_a[j], joints.row_b[j]
+    t = island_of_rows(state, a, b)
     solver.jointed[t] = True
     solver.links[t] += 1
     solver.driven[t] |= joints.rule[j] > LIMIT
@@ -132,9 +144,9 @@ def measure_joint(state, j, dt):
 
 
 @part
-def number_islands(state, dt):
+def number_islands(state, dt, ordered):
     """``island`` becomes the number of each body's island, in the order of their first bodies; -1 for what cannot be
-    moved. What is known of its bodies is summed up."""
+    moved. It is that already if rows are ``ordered``. What is known of its bodies is summed up."""
     solver, bodies, island, count = state.solver, state.bodies, state.solver.island, 0
     velocity, start, warm_started = bodies.linear_velocity, bodies.start_velocity, bodies.warm_started
     for q in range(solver.bodies):
@@ -143,10 +155,9 @@ def number_islands(state, dt):
         if w == 0.0:
             solver.number[q] = -1
             continue
-        root = root_of(island, q)
-        t = solver.number[root]
-        if root == q:
-            t = count
+        root = q if ordered else root_of(island, q)
+        t = island[q] if ordered else (solver.number[root] if root < q else count)
+        if t == count:
             count += 1
             solver.lightest[t], solver.most_change[t], solver.mass_of[t], solver.force_of[t] = math.inf, 0.0, 0.0, 0.0
             solver.stiff[t] = solver.own[t] = solver.approach_extents[t] = solver.taken[t] = 0.0
@@ -181,11 +192,14 @@ def measure_joined_islands(state, dt):
 def measure_islands(state, dt):
     """What each island's rows ask for: how stiff they must be, and how fast they are struck."""
     solver, pairs, bodies, nothing = state.solver, state.pairs, state.bodies, zero_of(state)
-    velocity, inverse_mass = bodies.start_velocity, bodies.inverse_mass
+    velocity, inverse_mass, t = bodies.start_velocity, bodies.inverse_mass, -1
     for r in range(solver.contacts):
+        if solver.point[r] > 0:  # asks for nothing else
+            solver.size_of[t] += 1
+            continue
         c = solver.pair[r]
         a, b = pairs.a[c], pairs.b[c]
-        t = max(solver.island[place_of(state, a)], solver.island[place_of(state, b)])
+        t = island_of_rows(state, a, b)
         w_a, w_b, inverse_extent = inverse_mass[a], inverse_mass[b], 1.0 / smaller_extent(bodies, a, b)
         v_a, v_b = velocity[a] if a < state.moving else nothing, velocity[b] if b < state.moving else nothing
         solver.size_of[t] += 1
@@ -242,6 +256,12 @@ def place_rows(state):
     solver, bodies, pairs, starts = state.solver, state.bodies, state.pairs, state.solver.starts
     row, island, number, range_of = solver.body_row, solver.island, solver.number, solver.range_of
     ends, body_ends = solver.row_ends, solver.body_ends
+    for k in range(2 * COLOURS + 1):
+        starts[k] = 0
+    for r in range(solver.contacts):
+        starts[solver.colour[r] + 1] += 1
+    for k in range(1, 2 * COLOURS + 1):
+        starts[k] += starts[k - 1]
     for r in range(solver.contacts):
         e = starts[solver.colour[r]]
         starts[solver.colour[r]] += 1
@@ -253,7 +273,7 @@ def place_rows(state):
         ends[s] = body_ends[s] = 0
     for r in range(solver.contacts):
         c = solver.pair[r]
-        t = max(island[place_of(state, pairs.a[c])], island[place_of(state, pairs.b[c])])
+        t = island_of_rows(state, pairs.a[c], pairs.b[c])
         solver.slot[r] = range_of[t]
         ends[range_of[t]] += 1
     for q in range(solver.bodies):
@@ -285,7 +305,6 @@ def build_chunks(state):
     for r in range(solver.contacts):
         listed[solver.slot[r]] = r
     start = s = 0
-    solver.chunks = 0
     while start < solver.contacts:
         while ends[s] <= start:
             s += 1
@@ -296,11 +315,22 @@ def build_chunks(state):
         while stop < most and colour[listed[stop]] == chosen:
             stop += points
         pairs = (stop - start) // points
-        for t in range(stop - start):
-            solver.slot[listed[start + t]] = start + t % points * pairs + t // points
+        for q in range(pairs):
+            for e in range(points):
+                solver.slot[listed[start + q * points + e]] = start + e * pairs + q
         solver.ends[solver.chunks], solver.points[solver.chunks] = stop, points
         solver.chunks += 1
         start = stop
+
+
+@part
+def place_ends(state):
+    """The places of the two bodies of each row."""
+    solver, pairs, inverse_mass = state.solver, state.pairs, state.bodies.inverse_mass
+    for r in range(solver.contacts):
+        a, b, k = pairs.a[solver.pair[r]], pairs.b[solver.pair[r]], solver.slot[r]
+        solver.first[k], solver.second[k] = place_of(state, a), place_of(state, b)
+        solver.fixed[k] = solver.tips and (inverse_mass[a] == 0.0 or inverse_mass[b] == 0.0)
 
 
 @part
@@ -345,21 +375,24 @@ def order_joints(state):
 
 
 @part
-def order_rows(state, dt):
-    """Islands, their substeps, and the order of rows and bodies."""
-    solver = state.solver
-    colour_rows(state)
-    join_bodies(state)
-    number_islands(state, dt)
+def order_rows(state, dt, listed):
+    """Islands, their substeps, and the order of rows and bodies. listed: see :func:`is_ordered`."""
+    solver, ordered = state.solver, is_ordered(state, listed)
+    if not ordered:
+        colour_rows(state)
+        join_bodies(state)
+    number_islands(state, dt, ordered)
     measure_islands(state, dt)
     solver.ranges = 1
     for t in range(solver.islands):
         solver.range_of[t] = 0
         if choose_substeps(solver, t, state.substeps, dt):
-            solver.range_of[t], solver.special[solver.ranges] = solver.ranges, t
-            solver.ranges += 1
-    place_rows(state)
-    if state.spinning:
-        build_chunks(state)
-    for s in range(solver.ranges):
-        solver.joint_ends[s] = 0
+            s = solver.ranges
+            solver.range_of[t], solver.special[s], solver.joint_ends[s], solver.ranges = s, t, 0, s + 1
+    if not (ordered and solver.ranges == 1):
+        place_rows(state)
+        solver.chunks = 0
+        if state.spinning:
+            build_chunks(state)
+        place_ends(state)
+    solver.joint_ends[0] = 0
