@@ -18,7 +18,7 @@ from ..parts.rows import next_row, owner_of
 from ..parts.stages import copy_to_parts
 from ..records import REST_COLUMNS, SOLVER_ARMS, SOLVER_BODIES, SOLVER_CONTACTS, SOLVER_SPINS, SOLVER_SURFACES
 from ..shapes.surfaces import any_surface_runs
-from .constants import FREQUENCY, SAG, TIPPING_FREQUENCY, TIPPING_SAG
+from .constants import FREQUENCY, TIPPING_FREQUENCY
 from .points import points_of
 from .solving.islands import order_joints, order_rows
 from .solving.prediction import drop_support
@@ -65,7 +65,7 @@ def list_rows(state):
             same &= solver.point[r] == e
             solver.pair[r], solver.point[r] = c, e
             r += 1
-    solver.frequency, solver.sag = (TIPPING_FREQUENCY, TIPPING_SAG) if solver.tips else (FREQUENCY, SAG)
+    solver.frequency = TIPPING_FREQUENCY if solver.tips else FREQUENCY
     return same
 
 

@@ -16,7 +16,7 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
-from ..contacts.constants import DIRECT_RELAX_STIFFNESS, DIRECT_STIFFNESS_MAX
+from ..contacts.constants import DIRECT_STIFFNESS, DIRECT_STIFFNESS_MAX
 from ..integration.turning import change_of_spin, cross_spin, twist
 from .custom import speed_of_custom
 from .order import NO_BLOCK, block_of, freedoms
@@ -197,7 +197,7 @@ def factorise(solver, pushes):
         for k in range(direct.degree[q]):
             for i in range(n * n):
                 direct.values[direct.block[q, k], i] = 0.0
-    direct.stiffer, direct.mixed = 1.0 if pushes else DIRECT_RELAX_STIFFNESS, False
+    direct.stiffer, direct.mixed = 1.0 if pushes else DIRECT_STIFFNESS, False
     for e in range(joints.begin, joints.end):
         j = joints.order[e]
         if joints.at_once[j] == HELD_AT_ONCE:

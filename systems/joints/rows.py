@@ -21,7 +21,7 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.elementary import atan2, cos, exp
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
-from ..contacts.constants import JOINT_DAMPING_RATIO, JOINT_FREQUENCY, SPRING_FREQUENCY
+from ..contacts.constants import FREQUENCY, JOINT_DAMPING_RATIO, SPRING_FREQUENCY
 from ..integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
 from .coupling import (
     compliance_of,
@@ -91,7 +91,7 @@ def start_joints(solver, h, period):
     ``period``, whatever contacts ask for: changes of it would give energy to what is stretched."""
     joints = solver.joints
     joints.step, joints.moved_for, joints.fastest = h, 0.0, SPRING_FREQUENCY / period
-    omega = 2.0 * math.pi * JOINT_FREQUENCY / period
+    omega = 2.0 * math.pi * FREQUENCY / period
     damping = 2.0 * JOINT_DAMPING_RATIO + h * omega
     joints.stiffness = stiffness = h * omega * damping
     rate, kept, back = omega / damping, stiffness / (1.0 + stiffness), 1.0 / (1.0 + stiffness)

@@ -9,10 +9,10 @@ body, and the impulses.
 
 1. ``apply_forces``.
 2. ``apply_warm_start``: the impulses of the last substep.
-3. ``solve_pass`` that pushes: closing rows stop, overlapping rows part like an overdamped spring.
+3. ``solve_passes`` that push: closing rows stop, overlapping rows part like an overdamped spring.
 4. ``integrate_positions``, ``measure``: the bodies move; what each row may close from there.
-5. ``solve_pass`` that relaxes, two times, four in the last substep, once where bodies spin: the speed of pushing is
-   taken back.
+5. ``solve_passes`` that relax, two, four in the last substep, one where bodies spin: the speed of pushing is taken
+   back.
 6. ``guard.finish_substep``: further passes over islands that gained energy, or whose rows are far from solved; then
    the bound on their energy.
 

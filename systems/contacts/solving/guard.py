@@ -11,7 +11,6 @@ import math
 
 from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, dot, scale, sub
-from ...forces.stages import is_zero
 from ...integration.turning import cross_spin, momentum_of_spin
 from ...joints.custom import rates_of_custom
 from ...joints.records import CUSTOM, POINT, TURN
@@ -79,35 +78,24 @@ def close_solved(solver, arms):
 
 
 @part
-def list_driven(solver, span):
-    """The rows of a range to which what moves by itself may give energy, or a surface that runs."""
-    island, count = solver.island, 0
-    for k in range(span[0], span[1] if solver.movers > 0 or solver.surfaces_run else span[0]):
-        solver.driven_row[count] = k
-        runs = solver.surfaces_run and not is_zero(solver.surface_slip[k])
-        count += runs or min(island[solver.first[k]], island[solver.second[k]]) < 0
-    solver.driven_rows = count
-
-
-@part
-def work_of_mover(solver, k, arms):
-    """The work of a row of ``driven_row`` on what moves by itself, or drives a surface, J; what that gives to the
-    island is minus this."""
-    a, b = solver.first[k], solver.second[k]
-    push, work = scale(solver.normal[k], solver.impulse[k]), 0.0
-    if solver.has_friction:
-        push = add(push, solver.tangent[k])
-    if solver.island[b] < 0:
-        work = dot(push, velocity_at(solver, b, solver.arm_b, k, arms))
-    elif solver.island[a] < 0:
-        work = -dot(push, velocity_at(solver, a, solver.arm_a, k, arms))
+def work_of_row(solver, k, arms):
+    """The work of a row on what moves by itself, or drives a surface, J: minus what that gives to the island."""
+    a, b, island, work = solver.first[k], solver.second[k], solver.island, 0.0
+    if min(island[a], island[b]) < 0:
+        push = scale(solver.normal[k], solver.impulse[k])
+        if solver.has_friction:
+            push = add(push, solver.tangent[k])
+        if island[b] < 0:
+            work = dot(push, velocity_at(solver, b, solver.arm_b, k, arms))
+        else:
+            work = -dot(push, velocity_at(solver, a, solver.arm_a, k, arms))
     if solver.surfaces_run:
         work += dot(solver.tangent[k], solver.surface_slip[k])
     return work
 
 
 @part
-def work_at_joint(solver, j):
+def work_of_joint(solver, j):
     """The same, of a row of joints."""
     joints, island = solver.joints, solver.island
     a, b = joints.first[j], joints.second[j]
@@ -124,9 +112,22 @@ def work_at_joint(solver, j):
 
 
 @part
+def add_work(solver, span, arms):
+    """What moves by itself gives its work to open islands: it is no gain of contacts."""
+    joints, island = solver.joints, solver.island
+    for k in range(span[0], span[1] if solver.movers > 0 or solver.surfaces_run else span[0]):
+        t = island_of(solver, k)
+        if solver.listed_of[t] > 0:
+            solver.slope[t] += work_of_row(solver, k, arms)
+    for e in range(joints.opened if len(arms) > 1 and solver.movers > 0 else 0):
+        j = joints.open_row[e]
+        solver.slope[max(island[joints.first[j]], island[joints.second[j]])] += work_of_joint(solver, j)
+
+
+@part
 def measure_energy(solver, span, arms, islands):
     """What contacts do to the energy of each open island if a share s of all that they have changed acts: E(s) =
-    slope s + curvature s^2 / 2, which is exact. What moves by itself gives its work to the island, not the contacts."""
+    slope s + curvature s^2 / 2, which is exact, and without the work that is done on the island."""
     slope, curvature, energy, island = solver.slope, solver.curvature, solver.energy, solver.island
     for t in range(islands[0], islands[1]):
         if solver.listed_of[t] > 0:
@@ -145,17 +146,10 @@ def measure_energy(solver, span, arms, islands):
             slope[t] += dot(momentum, change)
             curvature[t] += dot(momentum_of_spin(solver, q, change), change)
             energy[t] += dot(momentum, before)
-    for e in range(solver.driven_rows):
-        k = solver.driven_row[e]
-        if solver.listed_of[island_of(solver, k)] > 0:
-            slope[island_of(solver, k)] += work_of_mover(solver, k, arms)
-    if len(arms) > 1:
-        for e in range(solver.joints.opened if solver.movers > 0 else 0):
-            j = solver.joints.open_row[e]
-            slope[max(island[solver.joints.first[j]], island[solver.joints.second[j]])] += work_at_joint(solver, j)
-        for t in range(islands[0], islands[1]):
-            if solver.driven[t]:
-                slope[t] = -math.inf
+    add_work(solver, span, arms)
+    for t in range(islands[0], islands[1] if len(arms) > 1 else islands[0]):
+        if solver.driven[t]:
+            slope[t] = -math.inf
 
 
 @part
@@ -192,6 +186,12 @@ def energy_budget(solver, bias_rate, h, dt, span, arms, islands):
 
 
 @inlined
+def gains_by_contacts(solver, t):
+    """Whether further passes may take what island t has gained: those of contacts do not take what joints give."""
+    return exceeds_budget(solver, t) and not solver.jointed[t]
+
+
+@inlined
 def excess_scale(solver, t):
     """How many times better than STRUCK_EXCESS the rows of a struck island are solved."""
     return max(1.0, solver.passes[t] / FINER_PASSES)
@@ -201,12 +201,10 @@ def excess_scale(solver, t):
 def find_unsolved_rows(solver, turn, any_struck, dt, span, arms, islands):
     """The rows of struck islands that are not solved, and all of islands that gain, come first in ``listed``; returns
     how many. An island has as many passes as its own size allows: what is solved elsewhere changes none of its bits."""
-    unsolved, struck, extent, used = solver.unsolved, solver.struck, solver.extent, solver.used
-    any_gain, finest, count = False, 0.0, 0
+    struck, extent, used, any_gain, finest, count = solver.struck, solver.extent, solver.used, False, 0.0, 0
     for t in range(islands[0], islands[1]):
         solver.listed_of[t] = 0
-        unsolved[t] = exceeds_budget(solver, t) and not solver.jointed[t]  # contact passes do not take what joints give
-        any_gain |= unsolved[t]
+        any_gain |= gains_by_contacts(solver, t)
         finest = max(finest, excess_scale(solver, t) if struck[t] else 0.0)
     for k in range(span[0], span[1] if any_gain or any_struck else span[0]):
         if turn > 0 and not any_gain and used[solver.first[k]] != turn and used[solver.second[k]] != turn:
@@ -214,7 +212,8 @@ def find_unsolved_rows(solver, turn, any_struck, dt, span, arms, islands):
         excess, least = excess_speed(solver, k, arms) * dt, STRUCK_EXCESS * extent[k]
         if excess * finest > least or any_gain:  # seldom
             t = island_of(solver, k)
-            if ((struck[t] and excess * excess_scale(solver, t) > least) or unsolved[t]) and turn < solver.passes[t]:
+            wrong = struck[t] and excess * excess_scale(solver, t) > least
+            if (wrong or gains_by_contacts(solver, t)) and turn < solver.passes[t]:
                 solver.listed[count] = k
                 solver.listed_of[t] += 1
                 count += 1

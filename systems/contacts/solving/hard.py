@@ -11,7 +11,7 @@ from ....framework.vectors import add, dot, sub
 from ...ccd.search_bounds import turns_far
 from ...integration.turning import is_turned
 from ..approach import centre_offset, centre_offset_at_start
-from ..constants import ALIGNED, GAP_TOLERANCE, IDLE_SHARE, LEAST_LOAD, UNREACHED
+from ..constants import ALIGNED, LEAST_LOAD, NEGLIGIBLE, UNREACHED
 from .rows import closing_speed, separation, separation_from_rotation
 
 
@@ -19,7 +19,7 @@ from .rows import closing_speed, separation, separation_from_rotation
 def is_loaded(solver, k, dt):
     """Whether contact k, of two bodies that can be moved, bears a load, or will: they overlap."""
     a, b, acceleration = solver.first[k], solver.second[k], solver.acceleration
-    if solver.gap[k] < -GAP_TOLERANCE * solver.extent[k]:
+    if solver.gap[k] < -NEGLIGIBLE * solver.extent[k]:
         return True
     least = LEAST_LOAD * solver.mass[k] * dt
     load = max(dot(acceleration[a], acceleration[a]), dot(acceleration[b], acceleration[b]))
@@ -86,7 +86,7 @@ def disable_out_of_reach(state):
             if state.spinning and (is_turned(bodies, a) or is_turned(bodies, b)):
                 continue  # turning brings its points nearer as well
             travel = sub(centre_offset(bodies, a, b), centre_offset_at_start(bodies, a, b))
-            if held[body] > 0.0 and solver.gap[k] + dot(travel, solver.normal[k]) > GAP_TOLERANCE * solver.extent[k]:
+            if held[body] > 0.0 and solver.gap[k] + dot(travel, solver.normal[k]) > NEGLIGIBLE * solver.extent[k]:
                 solver.gap[k] += UNREACHED * solver.extent[k]
 
 
@@ -106,6 +106,6 @@ def defer_open_contacts(solver, h, span, arms):
         if solver.hard[k] and solver.apart[k]:
             body = first[k] if solver.inverse_mass[first[k]] > 0.0 else second[k]
             room = separation(solver, k, arms)
-            idle = solver.impulse[k] <= IDLE_SHARE * held[body]
-            if held[body] > 0.0 and idle and room > -GAP_TOLERANCE * solver.extent[k]:
+            idle = solver.impulse[k] <= NEGLIGIBLE * held[body]
+            if held[body] > 0.0 and idle and room > -NEGLIGIBLE * solver.extent[k]:
                 solver.target_speed[k] = UNREACHED * solver.extent[k] / h

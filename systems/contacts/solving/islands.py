@@ -27,20 +27,18 @@ from ...parts.rows import owner_of, place_of
 from ...shapes.tolerances import smaller_extent
 from ..constants import (
     AT_ONCE_WORK,
-    FURTHER_PASSES,
-    FURTHER_WORK,
+    ISLAND_WORK,
     LEAST_FURTHER_PASSES,
-    LEAST_STRIKE,
     LEAST_WORK_SUBSTEPS,
     LIMIT_STRIKE,
+    MOST_REPEATS,
     MOST_SAG,
-    MOST_SUBSTEPS,
     MOST_SWAY,
     OWN_SAG,
     SAG,
     STRIKE_SUBSTEPS,
+    STRUCK_EXCESS,
     STRUCK_JOINT_SUBSTEPS,
-    SUBSTEP_WORK,
 )  # fmt: skip
 from ..points import points_of
 from .records import ROW_CHUNK
@@ -161,8 +159,7 @@ def number_islands(state, dt, ordered):
             count += 1
             solver.lightest[t], solver.most_change[t], solver.mass_of[t], solver.force_of[t] = math.inf, 0.0, 0.0, 0.0
             solver.stiff[t] = solver.own[t] = solver.approach_extents[t] = solver.taken[t] = 0.0
-            solver.size_of[t], solver.leader[t] = 0, i
-            solver.driven[t], solver.needs_substeps[t], solver.credit[t] = False, False, 0.0
+            solver.size_of[t], solver.driven[t], solver.needs_substeps[t], solver.credit[t] = 0, False, False, 0.0
             solver.jointed[t], solver.at_once[t], solver.sway[t], solver.links[t] = False, False, 0.0, 0
         solver.number[q] = t
         change = sub(velocity[i], start[i])
@@ -220,7 +217,7 @@ def choose_substeps(solver, t, usual, dt):
 
     Its contacts may have to bear its heaviest body: the sag under that falls with the square of the substeps, the depth
     of an impact with 1 / substeps. Where the own weight of bodies asks for too many, contacts are rigid. Loads beyond
-    MOST_SUBSTEPS are capped, see ``load_share``. From masses, not from impulses, which would change with the substeps;
+    MOST_REPEATS are capped, see ``load_share``. From masses, not from impulses, which would change with the substeps;
     by factors of two, so that it seldom changes. Light bodies whose joints bear heavy ones swing fast.
     """
     sag, least = SAG * solver.most_change[t] * dt, usual
@@ -239,13 +236,13 @@ def choose_substeps(solver, t, usual, dt):
         need *= OWN_SAG / max(OWN_SAG, own)
     strike = solver.approach_extents[t] - 2.0 * solver.most_change[t] * solver.own[t] * dt
     ratio = solver.stiff[t] / (solver.lightest[t] * solver.own[t])
-    struck = STRIKE_SUBSTEPS * strike * ratio if strike > LEAST_STRIKE else 0.0
-    most = max(LEAST_WORK_SUBSTEPS, min(MOST_SUBSTEPS, SUBSTEP_WORK // rows))
+    struck = STRIKE_SUBSTEPS * strike * ratio if strike > STRUCK_EXCESS else 0.0
+    most = max(LEAST_WORK_SUBSTEPS, min(MOST_REPEATS, ISLAND_WORK // rows))
     asked, substeps = max(need, struck * struck), least
     while float(substeps * substeps) < asked and 2 * substeps <= most:
         substeps *= 2
     solver.substeps_of[t], solver.hard_of[t] = substeps, hard
-    solver.passes[t] = max(LEAST_FURTHER_PASSES, min(FURTHER_PASSES, FURTHER_WORK // rows))
+    solver.passes[t] = max(LEAST_FURTHER_PASSES, min(MOST_REPEATS, ISLAND_WORK // rows))
     solver.load_share[t] = float(substeps * substeps) / need if need > 0.0 else math.inf
     return substeps > usual or hard or solver.at_once[t]
 

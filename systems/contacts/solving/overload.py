@@ -10,13 +10,13 @@ from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, dot, length, scale, sub
 from ...integration.turning import momentum_of_spin
 from ..constants import GAIN_ROUNDING
-from .guard import work_at_joint, work_of_mover
+from .guard import work_of_joint, work_of_row
 from .rows import compute_effective_mass, rotate_body
 
 
 @part
 def cap_mass_ratio(solver, t, dt, span, arms):
-    """Cap the masses of island t at what it can carry with MOST_SUBSTEPS."""
+    """Cap the masses of island t at what it can carry with MOST_REPEATS."""
     least = solver.lightest[t] / solver.load_share[t]
     solver.mass_of[t] = solver.force_of[t] = 0.0
     for q in range(span[2], span[3]):
@@ -53,11 +53,10 @@ def find_support(solver, span, arms):
     for q in range(span[2], span[3]):
         if solver.mass_ratio[q] < 1.0:
             given += max(0.0, dot(way, sub(solver.velocity[q], solver.velocity_before[q]))) * solver.solver_mass[q]
-    for e in range(solver.driven_rows):
-        work += work_of_mover(solver, solver.driven_row[e], arms)
-    if len(arms) > 1 and solver.movers > 0:
-        for e in range(solver.joints.begin, solver.joints.end):
-            work += work_at_joint(solver, solver.joints.order[e])
+    for k in range(span[0], span[1] if solver.movers > 0 or solver.surfaces_run else span[0]):
+        work += work_of_row(solver, k, arms)
+    for e in range(solver.joints.begin, solver.joints.end if len(arms) > 1 and solver.movers > 0 else 0):
+        work += work_of_joint(solver, solver.joints.order[e])
     return way, -work / size, size / max(size, given)
 
 

@@ -6,7 +6,7 @@ import math
 
 from ....framework.compilation import part
 from ....framework.vectors import length
-from ..constants import CONVERGED_SHARE, CONVERGED_SPEED, HARD_PASSES, SUBSTEP_WORK
+from ..constants import CONVERGED_SHARE, CONVERGED_SPEED, FRICTION_OVERRELAXATION, ISLAND_WORK, MOST_REPEATS
 from .chunks import has_chunks, solve_chunks
 from .rows import closing_speed, relax_listed, solve_friction, solve_normals, solve_rolling
 
@@ -52,13 +52,17 @@ def agrees(solver, h, least, span):
 
 
 @part
-def converge(solver, pushes, h, span, arms):
-    """Passes over a hard island until they agree."""
-    start, stop, least = span[0], span[1], least_change(solver, h, span)
-    for _ in range(min(HARD_PASSES, SUBSTEP_WORK // (stop - start))):
-        note_impulses(solver, span)
-        solve_pass(solver, solver.pushing if pushes else solver.target_speed, pushes, 1.0, span, arms)
-        if agrees(solver, h, least, span):
+def solve_passes(solver, pushes, passes, stiff, h, span, arms):
+    """So many ``passes`` over a range, and over a ``stiff`` one more, until they agree."""
+    bias, most, least = solver.pushing if pushes else solver.target_speed, passes, 0.0
+    if stiff:
+        most, least = max(passes, min(MOST_REPEATS, ISLAND_WORK // (span[1] - span[0]))), least_change(solver, h, span)
+    for left in range(passes - 1, passes - 1 - most, -1):
+        if stiff:
+            note_impulses(solver, span)
+        over = FRICTION_OVERRELAXATION if left > 0 and not pushes else 1.0
+        solve_pass(solver, bias, pushes, over, span, arms)
+        if stiff and left <= 0 and agrees(solver, h, least, span):
             break
 
 
@@ -92,7 +96,7 @@ def close_nearest_first(solver, h, span, arms):
     """
     list_by_gap(solver, span)
     count, least = span[1] - span[0], least_change(solver, h, span)
-    work = SUBSTEP_WORK
+    work = ISLAND_WORK
     for e in range(count):
         k = solver.listed[e]
         new = closing_speed(solver, k, arms) > solver.target_speed[k]

@@ -28,8 +28,6 @@ SOLVER = Schema(
     point=ints("int8"),  # and which of the points of that
     colour=ints("int8"),  # of contact r: twice that of its pair, one more if that has several points
     listed=ints("int32"),  # some rows
-    driven_row=ints("int32"),  # rows of what cannot be moved, where there are movers: so many
-    driven_rows=integer(),
     first=ints("uint32"),  # places of the two bodies
     second=ints("uint32"),
     normal=vectors(unit="1"),
@@ -136,9 +134,7 @@ SOLVER = Schema(
     share=floats(unit="1"),
     taken=floats(unit="J"),  # that the guard has taken in this step
     struck=flags(),  # some row is far from solved
-    unsolved=flags(),
     listed_of=ints("int32"),  # rows of it that further passes go over
-    leader=ints("int32"),  # row of its first body
     jointed=flags(),
     driven=flags(),  # by motors or springs, which give energy
     needs_substeps=flags(),  # so fast struck that its joints need more substeps
@@ -149,9 +145,7 @@ SOLVER = Schema(
     # ranges: the ordinary islands, then each special one
     ranges=integer(),
     usual=integer(),  # substeps,
-    frequency=number(unit="1"),  # of the springs, times the rate of the substeps,
-    sag=number(unit="1"),  # and what follows from it
-    push_rate=number(unit="1/s"),  # overlap that they push out of itself
+    frequency=number(unit="1"),  # of the springs, times the rate of the substeps
     special=ints("int32"),  # island of a range
     row_ends=ints("int32"),
     body_ends=ints("int32"),

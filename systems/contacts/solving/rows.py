@@ -25,7 +25,7 @@ from ...integration.turning import (
     shares_of_turn,
     twist,
 )  # fmt: skip
-from ..constants import CROWD_OVERLAP, CROWD_PUSH_MAX, CROWD_SLOPE, FULL_PUSH_OVERLAP, GAP_TOLERANCE, STRUCK_EXCESS
+from ..constants import CROWD_OVERLAP, CROWD_SLOPE, FULL_PUSH_OVERLAP, NEGLIGIBLE, STRUCK_EXCESS
 
 NO_ARMS, ARMS, JOINTED = (), (True,), (True, True)
 
@@ -156,7 +156,7 @@ def update_targets(solver, k, arms, asks):
     softness = springs[1][0] if solver.fixed[k] else springs[0][0]
     bias_rate = springs[1][1] if solver.fixed[k] else springs[0][1]
     opening = (room if room > 0.0 else 0.0) / ahead
-    deep, least = -(FULL_PUSH_OVERLAP * extent + solver.loaded[k]), -CROWD_PUSH_MAX * extent
+    deep, least = -(FULL_PUSH_OVERLAP * extent + solver.loaded[k]), (FULL_PUSH_OVERLAP - CROWD_OVERLAP) * extent
     beyond = CROWD_SLOPE * (room + CROWD_OVERLAP * extent)
     beyond = beyond if beyond < 0.0 else 0.0
     at_once = room / (h * bias_rate)
@@ -164,7 +164,7 @@ def update_targets(solver, k, arms, asks):
     once = hard and (len(arms) == 0 or len(solver.normal[k]) == 2)  # what stands on three points would rock for ever
     near = at_once if once else room
     push = deep + (beyond if beyond > least else least) if room < deep else near
-    soft = (room <= GAP_TOLERANCE * extent) & (not solver.parting[k])  # just closed, give or take rounding
+    soft = (room <= NEGLIGIBLE * extent) & (not solver.parting[k])  # just closed, give or take rounding
     wrong = excess_of(closing, opening, impulse) * dt > STRUCK_EXCESS * extent
     solver.target_speed[k], solver.pushing[k] = opening, bias_rate * push if soft else opening
     solver.soft[k] = 0.0 if stiff or hard or not soft else softness

@@ -19,24 +19,22 @@ from ...joints.direct import solve_direct
 from ...joints.rows import add_joints, keep_joints, measure_joints, solve_joints, start_joints, warm_start_joints
 from ..constants import (
     DAMPING_RATIO,
-    FRICTION_OVERRELAXATION,
     FULL_PUSH_OVERLAP,
     LAST_RELAX_PASSES,
     LOAD_SAG_MAX,
-    LOAD_SAG_SHARE,
+    NEGLIGIBLE,
     REFINED_PASSES,
     RELAX_PASSES,
     REPORTED_GAIN,
-    REST_TOLERANCE,
     STATIC_STIFFNESS,
     TURNING_RELAX_PASSES,
     WARM_START_MAX,
 )  # fmt: skip
 from .chunks import find_chunks, load_masses
-from .guard import finish_substep, island_of, islands_of, list_driven, open_all
+from .guard import finish_substep, island_of, islands_of, open_all
 from .hard import defer_open_contacts, select_rigid
 from .overload import cap_mass_ratio, restore_mass
-from .passes import close_nearest_first, converge, note_impulses, solve_pass
+from .passes import close_nearest_first, note_impulses, solve_passes
 from .rows import (
     ARMS,
     JOINTED,
@@ -48,8 +46,6 @@ from .rows import (
     update_targets,
 )
 from .turning import integrate_rotation_of_joined
-
-ORDINARY, REFINED, HARD = range(3)  # ranges: with the usual substeps, with more, with contacts that do not sag
 
 
 @part
@@ -126,29 +122,30 @@ def integrate_rotations(solver, h, span, arms):
 
 
 @part
-def relax_passes(solver, kind, ends, span, arms):
-    """How many passes take back the speed that pushing has given: more would pull joints apart, which have one."""
-    if kind != ORDINARY and not (len(arms) > 1 and solver.jointed[solver.island[span[2]]]):
-        return REFINED_PASSES
+def rule_of(solver, s, arms):
+    """(substeps, passes in each that take back the speed that pushing has given, the same in the last one, whether
+    they go on until they agree) of a range. More passes would pull joints apart, which have one."""
+    t, passes, last = solver.special[s], RELAX_PASSES, LAST_RELAX_PASSES
     if len(arms) > 0:
-        return TURNING_RELAX_PASSES
-    return LAST_RELAX_PASSES if ends else RELAX_PASSES
+        passes = last = TURNING_RELAX_PASSES
+    if s == 0:
+        return solver.usual, passes, last, False
+    if not (len(arms) > 1 and solver.jointed[t]):
+        passes = last = REFINED_PASSES
+    return solver.substeps_of[t], passes, last, solver.hard_of[t]
 
 
 @part
-def solve_substep(solver, springs, most, times, kind, ends, span, arms):
+def solve_substep(solver, springs, most, times, rule, ends, span, arms):
     """One substep of a range. springs: see ``contact_spring``; times: s, of a substep and of the step."""
-    (h, dt), start, stop = times, span[0], span[1]
-    opening, stiff = solver.target_speed, kind == HARD
+    (h, dt), (_, passes, last, stiff), start, stop = times, rule, span[0], span[1]
     apply_forces(solver, h, span, arms)
     apply_warm_start(solver, most, span, arms)
     if stiff:
         close_nearest_first(solver, h, span, arms)
     if len(arms) > 1:
         solve_joints(solver, True)
-    solve_pass(solver, solver.pushing, True, 1.0, span, arms)
-    if stiff:
-        converge(solver, True, h, span, arms)
+    solve_passes(solver, True, 1, stiff, h, span, arms)
     if len(arms) > 1 and solver.direct.begin < solver.direct.end and start < stop:
         solve_direct(solver, True)
     integrate_positions(solver, h, span, arms)
@@ -159,11 +156,7 @@ def solve_substep(solver, springs, most, times, kind, ends, span, arms):
         defer_open_contacts(solver, h, span, arms)
     if len(arms) > 1:  # once: more often, chains give way more
         solve_joints(solver, False)
-    last = relax_passes(solver, kind, ends, span, arms) - 1
-    for one in range(last + 1):
-        solve_pass(solver, opening, False, FRICTION_OVERRELAXATION if one < last else 1.0, span, arms)
-    if stiff:
-        converge(solver, False, h, span, arms)
+    solve_passes(solver, False, last if ends else passes, stiff, h, span, arms)
     if len(arms) > 1 and solver.direct.begin < solver.direct.end and start < stop:
         solve_direct(solver, False)
     finish_substep(solver, springs[0][1], any_struck, h, dt, span, arms)
@@ -190,11 +183,11 @@ def is_still(solver, dt, span, arms):
     for q in range(begin, end if len(arms) > 0 else begin):
         around = scale(solver.spin[q], solver.reach[q])
         fastest = max(fastest, dot(around, around))
-    if not math.sqrt(fastest) * dt <= REST_TOLERANCE * extent:
+    if not math.sqrt(fastest) * dt <= NEGLIGIBLE * extent:
         return False
     changes = False
     for k in range(start, stop):
-        changes |= abs(solver.impulse[k] - solver.previous[k]) > REST_TOLERANCE * solver.impulse[k]
+        changes |= abs(solver.impulse[k] - solver.previous[k]) > NEGLIGIBLE * solver.impulse[k]
     return not changes
 
 
@@ -217,11 +210,11 @@ def scale_impulses(solver, by, span):
 
 
 @part
-def most_impulse(solver, t, substeps):
+def most_impulse(solver, t, substeps, bias_rate):
     """The most that a substep may start with: what bears the loads of island t, or pushes all of it out. What is more
     was a blow, which does not act again."""
     own = solver.own[t]  # 0: of joints alone
-    pushes = solver.mass_of[t] * solver.push_rate * FULL_PUSH_OVERLAP / own if own > 0.0 else 0.0
+    pushes = solver.mass_of[t] * bias_rate * FULL_PUSH_OVERLAP / own if own > 0.0 else 0.0
     return WARM_START_MAX * (solver.force_of[t] / substeps + pushes)
 
 
@@ -238,28 +231,30 @@ def contact_spring(solver, stiffer, substeps, h):
 
 
 @part
-def solve_range(solver, substeps, kind, dt, span, arms):
+def solve_range(solver, s, dt, span, arms):
     """The substeps of a range."""
-    h, stiff, special = dt / substeps, kind == HARD, kind != ORDINARY
+    rule, special = rule_of(solver, s, arms), s > 0
+    substeps, _, _, stiff = rule
+    h = dt / substeps
     springs = contact_spring(solver, 1.0, substeps, h), contact_spring(solver, STATIC_STIFFNESS, substeps, h)
     open_all(solver, span, arms)
-    list_driven(solver, span)
     if len(arms) > 0:
         find_chunks(solver, span)
         load_masses(solver, span)
     scale_impulses(solver, 1.0 / substeps, span)
+    turn = 2.0 * math.pi * solver.frequency
     for k in range(span[0], span[1]):
-        sag = LOAD_SAG_SHARE * solver.sag * solver.impulse[k] * h / solver.mass[k]
+        sag = solver.impulse[k] * h / (turn * turn * solver.mass[k])
         solver.loaded[k] = 0.0 if stiff else min(sag, LOAD_SAG_MAX * solver.extent[k])
     if len(arms) > 1:
         start_joints(solver, h, dt / solver.usual)
     measure(solver, h, springs, dt, stiff, False, span, arms)
-    most = most_impulse(solver, solver.island[span[2]], substeps) if special else math.inf
+    most = most_impulse(solver, solver.island[span[2]], substeps, springs[0][1]) if special else math.inf
     for step in range(substeps):
         left = substeps - 1 - step
         if special:
             note_impulses(solver, span)
-        solve_substep(solver, springs, most, (h, dt), kind, left == 0, span, arms)
+        solve_substep(solver, springs, most, (h, dt), rule, left == 0, span, arms)
         if special and left > 0 and is_still(solver, dt, span, arms):
             repeat_substep(solver, left, h, span, arms)
             break
@@ -282,8 +277,9 @@ def count_work(state, dt):
             state.restrained_energy += taken
             step = math.sqrt(2.0 * taken / solver.mass_of[t]) * dt * solver.own[t]
             if taken > 0.5 * solver.energy[t] and step > REPORTED_GAIN:
-                if solver.restrained == 0:
-                    solver.restrained_row = solver.leader[t]
+                for q in range(solver.bodies - 1 if solver.restrained == 0 else -1, -1, -1):
+                    if solver.island[q] == t:  # the first body of the first such island
+                        solver.restrained_row = solver.body_row[q]
                 solver.restrained += 1
 
 
@@ -295,8 +291,6 @@ def solve_substeps(state, dt, arms):
         compute_effective_mass(solver, k, arms)
         solver.total[k], solver.had_impulse[k] = 0.0, False
     solver.visits, solver.usual = 0, state.substeps
-    omega = 2.0 * math.pi * solver.frequency * state.substeps / dt
-    solver.push_rate = omega / (2.0 * DAMPING_RATIO + omega * dt / state.substeps)
     select_rigid(state, dt, zero_of(state), arms)
     start, begin, solver.lightened = 0, 0, False
     for s in range(solver.ranges):
@@ -319,10 +313,7 @@ def solve_substeps(state, dt, arms):
             solver.direct.end = solver.direct.body_ends[s]
             any_joint = solver.joints.begin < solver.joints.end
         if span[1] > start or any_joint:
-            substeps, kind = state.substeps, ORDINARY
-            if special:
-                substeps, kind = solver.substeps_of[t], HARD if solver.hard_of[t] else REFINED
-            solve_range(solver, substeps, kind, dt, span, arms)
+            solve_range(solver, s, dt, span, arms)
         start, begin = span[1], span[3]
     count_work(state, dt)
 

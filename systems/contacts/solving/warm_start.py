@@ -12,7 +12,7 @@ from ....framework.jit.records.record_type import zero_of
 from ....framework.schedule.stages import Rows
 from ....framework.vectors import add_scaled, dot, length, scale, sub
 from ...codes import OK
-from ..constants import GAP_TOLERANCE, SAME_NORMAL, SAME_PLACE_EXTENTS, WARM_START_MAX
+from ..constants import ALIGNED, NEGLIGIBLE, SAME_PLACE_EXTENTS, WARM_START_MAX
 from .guard import island_of
 from .records import WARM_START_ROWS
 
@@ -79,7 +79,7 @@ def start_with(solver, memory, k, several, span):
             return
         memory.off[m] = True  # each once
     n = solver.normal[k]
-    if dot(memory.normal[now, m], n) > SAME_NORMAL:
+    if dot(memory.normal[now, m], n) > ALIGNED:
         pull = memory.tangent[now, m]
         solver.impulse[k] = memory.impulse[now, m]
         solver.tangent[k] = add_scaled(pull, n, -dot(pull, n))
@@ -131,7 +131,7 @@ def store_warm_start(state, dt):
     new, count = 1 - memory.now, 0
     for r in range(solver.contacts):
         k, c = solver.slot[r], solver.pair[r]
-        if not solver.total[k] * dt > GAP_TOLERANCE * solver.extent[k] * solver.mass[k]:  # of rounding; also nan
+        if not solver.total[k] * dt > NEGLIGIBLE * solver.extent[k] * solver.mass[k]:  # of rounding; also nan
             continue
         a, b = pairs.a[c], pairs.b[c]
         memory.first[new, count], memory.second[new, count] = a, b
