@@ -19,7 +19,6 @@ from ...joints.direct import solve_direct
 from ...joints.rows import add_joints, keep_joints, measure_joints, solve_joints, start_joints, warm_start_joints
 from ..constants import (
     DAMPING_RATIO,
-    FULL_PUSH_OVERLAP,
     LAST_RELAX_PASSES,
     LOAD_SAG_MAX,
     NEGLIGIBLE,
@@ -28,7 +27,6 @@ from ..constants import (
     REPORTED_GAIN,
     STATIC_STIFFNESS,
     TURNING_RELAX_PASSES,
-    WARM_START_MAX,
 )  # fmt: skip
 from .chunks import find_chunks, load_masses
 from .guard import finish_substep, island_of, islands_of, open_all
@@ -81,17 +79,14 @@ def apply_forces(solver, h, span, arms):
 
 
 @part
-def apply_warm_start(solver, most, span, arms):
-    """The impulses of the last substep act again, no more than ``most`` of each: what is more was a blow."""
+def apply_warm_start(solver, span, arms):
+    """The impulses of the last substep act again."""
     if len(arms) > 1:
         warm_start_joints(solver)
     for k in range(span[0], span[1] if len(arms) > 0 and solver.has_rolling else span[0]):
         solver.rolled[k] = scale(solver.normal[k], 0.0)
     for k in range(span[0], span[1]):
-        old = solver.impulse[k]
-        if old > 0.0:
-            if old > most:
-                solver.impulse[k], solver.tangent[k] = most, scale(solver.tangent[k], most / old)
+        if solver.impulse[k] > 0.0:
             push = scale(solver.normal[k], solver.impulse[k])
             if solver.has_friction:
                 push = add(push, solver.tangent[k])
@@ -136,11 +131,11 @@ def rule_of(solver, s, arms):
 
 
 @part
-def solve_substep(solver, springs, most, times, rule, ends, span, arms):
+def solve_substep(solver, springs, times, rule, ends, span, arms):
     """One substep of a range. springs: see ``contact_spring``; times: s, of a substep and of the step."""
     (h, dt), (_, passes, last, stiff), start, stop = times, rule, span[0], span[1]
     apply_forces(solver, h, span, arms)
-    apply_warm_start(solver, most, span, arms)
+    apply_warm_start(solver, span, arms)
     if stiff:
         close_nearest_first(solver, h, span, arms)
     if len(arms) > 1:
@@ -210,15 +205,6 @@ def scale_impulses(solver, by, span):
 
 
 @part
-def most_impulse(solver, t, substeps, bias_rate):
-    """The most that a substep may start with: what bears the loads of island t, or pushes all of it out. What is more
-    was a blow, which does not act again."""
-    own = solver.own[t]  # 0: of joints alone
-    pushes = solver.mass_of[t] * bias_rate * FULL_PUSH_OVERLAP / own if own > 0.0 else 0.0
-    return WARM_START_MAX * (solver.force_of[t] / substeps + pushes)
-
-
-@part
 def contact_spring(solver, stiffer, substeps, h):
     """(share of its impulse that a soft row gives back, speed per overlap at which it is pushed out).
 
@@ -249,12 +235,11 @@ def solve_range(solver, s, dt, span, arms):
     if len(arms) > 1:
         start_joints(solver, h, dt / solver.usual)
     measure(solver, h, springs, dt, stiff, False, span, arms)
-    most = most_impulse(solver, solver.island[span[2]], substeps, springs[0][1]) if special else math.inf
     for step in range(substeps):
         left = substeps - 1 - step
         if special:
             note_impulses(solver, span)
-        solve_substep(solver, springs, most, (h, dt), rule, left == 0, span, arms)
+        solve_substep(solver, springs, (h, dt), rule, left == 0, span, arms)
         if special and left > 0 and is_still(solver, dt, span, arms):
             repeat_substep(solver, left, h, span, arms)
             break
