@@ -66,7 +66,6 @@ GAIN_PUSH = 0.004  # of the energy at the speed of pushing,
 GAIN_WEIGHT = 2.5  # of the energy that forces give from rest: towers that are pushed out need it
 GAIN_ROUNDING = 1e-12  # of an energy: less is none
 REPORTED_GAIN = 0.05  # extents per step: a fault tells where contacts would have made an island faster by more
-WARM_START_FADING = 0.5  # of an impulse is kept at least for the next substep, where the guard has scaled it
 
 # Hard contacts of bodies that nothing presses on.
 LEAST_LOAD = 1e-6  # of the impulse that forces give in a step: less is none

@@ -24,7 +24,6 @@ from ..constants import (
     GAIN_WEIGHT,
     STRUCK_EXCESS,
     SWEEPS_PER_LOOK,
-    WARM_START_FADING,
 )  # fmt: skip
 from .rows import excess_speed, relax_listed, velocity_at
 
@@ -264,7 +263,6 @@ def limit_energy(solver, span, arms, islands):
     for k in range(start, stop if any_gain else start):
         kept = share[island_of(solver, k)]
         if kept < 1.0:
-            kept = max(kept, WARM_START_FADING)
             solver.impulse[k] *= kept
             solver.tangent[k] = scale(solver.tangent[k], kept)
 
@@ -277,7 +275,6 @@ def fade_joint_impulses(solver):
         j = joints.order[e]
         kept = solver.share[max(solver.island[joints.first[j]], solver.island[joints.second[j]])]
         if kept < 1.0:
-            kept = max(kept, WARM_START_FADING)
             joints.impulse[j], joints.push[j] = kept * joints.impulse[j], scale(joints.push[j], kept)
 
 
