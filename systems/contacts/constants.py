@@ -19,8 +19,6 @@ SAG = 1.0 / (2.0 * math.pi * FREQUENCY) ** 2  # of a contact that bears an impul
 FULL_PUSH_OVERLAP = 0.03  # extents: more overlap does not push faster; .2 lets rooms of mixed masses gain energy
 LOAD_SAG_MAX = 0.1  # extents of the sag under the last impulse is pushed out as well: without it jammed bodies keep
 # overlaps of .15 at equal, bounded pushes
-CROWD_OVERLAP = 0.2  # extents, from where overlap pushes faster again: crowds without room must spread
-CROWD_SLOPE = 0.5  # of what is beyond it, at most as fast as CROWD_OVERLAP would
 
 # Passes over the rows in a substep.
 RELAX_PASSES = 2  # after the pass that pushes: they take back the speed that pushing has given

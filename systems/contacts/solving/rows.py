@@ -25,7 +25,7 @@ from ...integration.turning import (
     shares_of_turn,
     twist,
 )  # fmt: skip
-from ..constants import CROWD_OVERLAP, CROWD_SLOPE, FULL_PUSH_OVERLAP, NEGLIGIBLE, STRUCK_EXCESS
+from ..constants import FULL_PUSH_OVERLAP, NEGLIGIBLE, STRUCK_EXCESS
 
 NO_ARMS, ARMS, JOINTED = (), (True,), (True, True)
 
@@ -156,14 +156,12 @@ def update_targets(solver, k, arms, asks):
     softness = springs[1][0] if solver.fixed[k] else springs[0][0]
     bias_rate = springs[1][1] if solver.fixed[k] else springs[0][1]
     opening = (room if room > 0.0 else 0.0) / ahead
-    deep, least = -(FULL_PUSH_OVERLAP * extent + solver.loaded[k]), (FULL_PUSH_OVERLAP - CROWD_OVERLAP) * extent
-    beyond = CROWD_SLOPE * (room + CROWD_OVERLAP * extent)
-    beyond = beyond if beyond < 0.0 else 0.0
+    deep = -(FULL_PUSH_OVERLAP * extent + solver.loaded[k])
     at_once = room / (h * bias_rate)
     at_once = at_once if at_once > deep else deep
     once = hard and (len(arms) == 0 or len(solver.normal[k]) == 2)  # what stands on three points would rock for ever
     near = at_once if once else room
-    push = deep + (beyond if beyond > least else least) if room < deep else near
+    push = deep if room < deep else near
     soft = (room <= NEGLIGIBLE * extent) & (not solver.parting[k])  # just closed, give or take rounding
     wrong = excess_of(closing, opening, impulse) * dt > STRUCK_EXCESS * extent
     solver.target_speed[k], solver.pushing[k] = opening, bias_rate * push if soft else opening
