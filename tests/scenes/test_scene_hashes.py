@@ -14,8 +14,8 @@ HASHES = {
     "pile2d": ({"n": 40}, "e4d685007faf3bd9cdaf4ecfcdd7ec3c53664da884e0bb84be816b37b274673f"),
     "pile3d": ({"n": 27}, "9230a04c971390150c906985c8dacbf885fb40bfdbf4990f712682dc69b8fdb1"),
     "tumbler": ({"n": 12}, "0c1980139e89fde1c589cce28d44e01f52c316eeab435314c4e599fccb103c62"),
-    "bridge": ({"n": 8, "crates": 2}, "d65d71345f10be67bfa67220af34c3a067740834575e97b82f41eaad29146c3f"),
-    "ragdoll": ({"n": 1}, "98ee53b269a0b1874e1ccb29142ced64902f34ad45001e1ea423f077af7212fd"),
+    "bridge": ({"n": 8, "crates": 2}, "ee27fc35ff4b83300c83f279bf423fee1cd0569e0b9f5b5f1173ebc6ac0a59a2"),
+    "ragdoll": ({"n": 1}, "9d5e25f64f2ddc11f5b1493a06547beea1a3641496428055a5ae422d78771a9e"),
 }
 STEPS = 60
 
