@@ -127,7 +127,7 @@ SPINS = Section(
     reach=floats(unit="m"),
     driven=floats(default=0.0, unit="m"),  # by which motors may move it, about where joints hold it, farther than that
     driven_turn=floats(default=0.0, unit="rad"),  # by which they may turn it
-    joined=flags(default=False),  # by joints, if any are active
+    joined=ints("int32", default=-1),  # by which joints, see joints.bodies; -1: by none that is active
 )  # fmt: skip
 FAILS = "the start of the step, for one that fails"
 UNDO_COLUMNS = Section("body", "going back", FAILS, kept_previous=vectors(unit="m"), kept_velocity=vectors(unit="m/s"))

@@ -17,6 +17,7 @@ from .contacts.points import lay_arms
 from .contacts.response import Response
 from .contacts.solving.islands import measure_joined_islands
 from .forces.accumulation import ForceAccumulation
+from .impacts.jointed import bend_struck, respond_joined, strike_joined
 from .impacts.together import resolve_simultaneous
 from .impacts.turning import respond_at_arms, turn_by_impact
 from .integration.system import Integration
@@ -27,7 +28,10 @@ from .linking.parts import (
     FIRST_TOUCH,
     FREE_TURN,
     JOINED_BODIES,
+    JOINED_IMPACT,
     JOINED_ISLANDS,
+    JOINED_RESPONSE,
+    JOINED_START,
     TAKE_TOGETHER,
     TOUCH_OF_TURN,
     TURN_BY_IMPACT,
@@ -148,6 +152,7 @@ LINKED_PARTS = {
     FREE_TURN: turn_with_unequal_moments, TURNING_TOUCH: touch_of_turning, TOUCH_OF_TURN: first_touch_of_turn,
     CLOSING_POINT: closing_point, ARMS_AT_REST: lay_arms, TURNING_RESPONSE: respond_at_arms,
     TURN_BY_IMPACT: turn_by_impact, JOINED_ISLANDS: measure_joined_islands, JOINED_BODIES: gather_joined,
+    JOINED_RESPONSE: respond_joined, JOINED_IMPACT: strike_joined, JOINED_START: bend_struck,
 }  # fmt: skip
 
 # The system of each stage; "" for those that open and close a step.

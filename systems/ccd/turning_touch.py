@@ -16,6 +16,7 @@ from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, length, negative, row, scale, sub
 from ..integration.trajectory import ROUNDING, along, path_of, rate_along, travel_of
 from ..integration.turning import arms_to, closing_by_spin, is_turned, size_of_turn
+from ..joints.groups import is_joined
 from ..linking.parts import CLOSING_POINT, TURNING_TOUCH, call_closing_point, call_turning_touch
 from ..shapes.convex.points import MOST_POINTS, contact_points
 from ..shapes.dispatch import both_convex, evaluate, has_corner_rule, is_corner_touch
@@ -138,8 +139,8 @@ def is_struck(state, i):
 @part
 def turn_of_path(state, i, dt):
     """By how much body i turns in the step, as seen from what the last impact has made of its spin."""
-    led = state.impacts.logged > 0 and state.bodies.impact_count[i] > 0 and has_unequal_moments(state, i)
-    struck = is_struck(state, i) or led
+    led = state.impacts.logged > 0 and state.bodies.impact_count[i] > 0
+    struck = is_struck(state, i) or (led and (has_unequal_moments(state, i) or is_joined(state, i, i)))
     return scale(state.bodies.spin[i], dt) if struck else state.bodies.turn[i]
 
 

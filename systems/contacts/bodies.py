@@ -13,7 +13,7 @@ from ..integration.turning import size_of_turn
 from ..joints.bodies import build_joint_rows
 from ..joints.order import order_direct
 from ..joints.records import DIRECT_BODIES
-from ..linking.parts import JOINED_BODIES, call_joined_bodies
+from ..linking.parts import JOINED_BODIES, JOINED_START, call_joined_bodies, call_joined_islands
 from ..parts.rows import next_row, owner_of
 from ..parts.stages import copy_to_parts
 from ..records import REST_COLUMNS, SOLVER_ARMS, SOLVER_BODIES, SOLVER_CONTACTS, SOLVER_SPINS, SOLVER_SURFACES
@@ -139,14 +139,16 @@ def gather(state, dt):
 def gather_joined(state, dt):
     """The order of joints, where they hold their bodies, and how these turn by themselves in space."""
     solver, nothing = state.solver, zero_of(state)
-    order_joints(state)
-    order_direct(solver)
     for q in range(solver.bodies if len(nothing) == 3 else 0):
         note_frame(state, q)
         solver.spin_before[q] = nothing
         if solver.frame[q, 0] != NOT_TUMBLING:
             rotate_body(solver, q, nothing)
             integrate_rotation_of_joined(solver, q, q + 1, -dt)
+    if state.impacts.active and state.impacts.logged > 0:
+        call_joined_islands(state.links[JOINED_START], state, dt)
+    order_joints(state)
+    order_direct(solver)
     build_joint_rows(state)
     return OK
 

@@ -22,6 +22,7 @@ from ..codes import OK
 from ..impacts.impulses import STOPPED
 from ..integration.trajectory import along, path_of
 from ..integration.turning import turn_of_arm
+from ..joints.groups import is_joined
 from ..linking.parts import TOUCH_OF_TURN, call_touch_of_turn
 from ..narrow_phase.manifolds import (
     centre_offset,
@@ -70,9 +71,8 @@ def penetration_of(state, dt, c, a, b):
     bodies, extent = state.bodies, smaller_extent(state.bodies, a, b)
     d, start = centre_offset(bodies, a, b), segment_start(state, a, b)
     travel = sub(d, start)
-    way, joined = length(travel), state.solver.joints.active > 0
-    joined = joined and (bodies.joined[owner_of(state, a)] or bodies.joined[owner_of(state, b)])
-    allowed = (JOINED if joined else ALLOWED) * extent
+    way = length(travel)
+    allowed = (JOINED if is_joined(state, a, b) else ALLOWED) * extent
     found, depth, normal = False, 0.0, travel
     if state.spinning and turns_far(state, a, b):  # where it started says nothing of the shapes at the end
         if c != NO_PAIR and depth_bound_on_path(state, c) <= allowed:  # usual

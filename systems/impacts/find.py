@@ -24,7 +24,6 @@ from ..integration.turning import arms_to, closing_by_spin, is_turned
 from ..linking.parts import FIRST_TOUCH, TURNING_RESPONSE, call_first_touch, call_turning_response
 from ..narrow_phase.manifolds import is_at_manifold
 from ..narrow_phase.stages import rank_rows
-from ..parts.rows import owner_of
 from ..shapes.dispatch import (
     both_convex,
     evaluate,
@@ -181,15 +180,6 @@ def is_missed_by_discrete(state, a, b, path, touch, dt):
 
 
 @part
-def is_held(state, a, b):
-    """Whether joints are to feel a touch of the two in the substep that brings it, not at the end of the step: nothing
-    bounces, and joints hold one of the two."""
-    joined = state.bodies.joined
-    held = state.solver.joints.active > 0 and (joined[owner_of(state, a)] or joined[owner_of(state, b)])
-    return held and restitution_of(state, a, b) == 0.0
-
-
-@part
 def approach_speed(state, c, path, touch, kind, dt):
     """Of a solid pair: (NO_EVENT, HAND_OVER if it lands, too slow to bounce, or IMPACT; speed along the normal)."""
     bodies, impacts, (t, normal, point, apart) = state.bodies, state.impacts, touch
@@ -200,7 +190,7 @@ def approach_speed(state, c, path, touch, kind, dt):
     threshold, rounding = bounce_threshold(state, a, b), 0.0
     if impacts.sweeps:  # else a plastic impact would be one again, by a rounding error
         rounding = ROUNDING * (length(bodies.path_velocity[a]) + length(bodies.path_velocity[b]))
-    if is_held(state, a, b) or not speed < -(threshold + rounding):  # a contact at rest
+    if not speed < -(threshold + rounding):  # a contact at rest
         if state.spinning and not speed < -ROUNDING * turning_travel(state, 1.0, a, b):  # it has landed
             return NO_EVENT, speed
         return HAND_OVER if is_missed_by_discrete(state, a, b, path, touch, dt) else NO_EVENT, speed

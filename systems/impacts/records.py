@@ -41,6 +41,7 @@ BODIES_OF_MEMBERS = Section(
     "impact", "impacts", BOUNCED,
     first_member=ints("int32"),
     gained=vectors(unit="m/s"),  # change of velocity
+    gained_spin=vectors(unit="rad/s"),  # of what joints hold
 )  # fmt: skip
 LOG = Section(
     "impact", "impacts", BOUNCED,
@@ -64,6 +65,7 @@ IMPACTS = Schema(
     touchdown_pair=integer(),  # the last one of whose bodies landings were searched
     touchdown_time=number(unit="s"),  # the time of its impact while they are searched, else 0
     now=number(unit="s"),
+    end=number(unit="s"),  # of the step
     until=number(unit="s"),
     # impacts at the same time
     together=integer(),  # for how many there must be room

@@ -53,7 +53,7 @@ def begin_impacts(state, dt):
     impacts, bodies, pairs = state.impacts, state.bodies, state.pairs
     impacts.logged = impacts.capped = impacts.group_visits = 0
     impacts.rounds = impacts.halted = impacts.looked = impacts.together = 0
-    impacts.active = False
+    impacts.active, impacts.end = False, dt
     if state.response_idle:
         return OK
     impacts.sweeps = state.sweeping and state.moved
@@ -205,7 +205,7 @@ ROOM_FOR_IMPACTS = (
     Rows("impacts", LOG, lambda s: s.impacts.logged + max(s.impacts.together, 1) if s.impacts.active else 0),
     Rows("impacts", MEMBERS, lambda s: s.impacts.together),
     Rows("impacts", ("next_member",), lambda s: 2 * s.impacts.together),  # one for each of two bodies
-    Rows("impacts", BODIES_OF_MEMBERS, lambda s: s.count if s.impacts.together > 0 else 0),
+    Rows("impacts", BODIES_OF_MEMBERS, lambda s: s.count if s.impacts.together + s.solver.joints.active > 0 else 0),
 )  # fmt: skip
 
 

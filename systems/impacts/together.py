@@ -14,6 +14,7 @@ from ...framework.vectors import dot
 from ..ccd.time_of_impact import clear_of_rounding
 from ..codes import NEED_ROOM, OK
 from ..integration.trajectory import rate_along, relative_path
+from ..joints.groups import is_joined
 from ..parts.rows import owner_of
 from .group import WORK, is_affordable, is_shooting, is_turning_group, push_group, solve_group
 from .heap import heap_pop, heap_push, is_current
@@ -48,7 +49,8 @@ def next_at(state, now, dt):
         if time - now > EQUAL * dt or (impacts.sweeps and time > impacts.until):
             return -1
         if is_current(state, event):
-            if kind == HAND_OVER or not is_at(state, event, now, dt):
+            joined = is_joined(state, state.pairs.a[c], state.pairs.b[c])
+            if kind == HAND_OVER or joined or not is_at(state, event, now, dt):
                 return -1
             if kind == IMPACT:
                 if not impacts.may_sink:
@@ -74,9 +76,11 @@ def resolve_simultaneous(state, event, dt):
     """Carry out all impacts at the time of ``event``, which has been taken off the queue, if there are others.
 
     Returns OK; NEED_ROOM if there is no room, and nothing has changed then; -1 if there is none besides it, or no
-    work left for groups.
+    work left for groups, or joints hold its bodies: such impacts come one after the other.
     """
-    impacts, now = state.impacts, state.impacts.event_time[event]
+    impacts, now, c = state.impacts, state.impacts.event_time[event], state.impacts.event_pair[event]
+    if is_joined(state, state.pairs.a[c], state.pairs.b[c]):
+        return -1
     if impacts.group_visits >= WORK or next_at(state, now, dt) < 0:
         return -1
     most = 1

@@ -17,6 +17,8 @@ from ...framework.vectors import add, add_scaled, divided, dot, item, length, re
 from ..codes import OK
 from ..integration.trajectory import along, path_of
 from ..integration.turning import arms_to, change_of_spin, compliance, cross_spin, lever, twist, velocity_by_spin
+from ..joints.groups import is_joined
+from ..linking.parts import JOINED_IMPACT, JOINED_RESPONSE, call_turn_by_impact, call_turning_response
 from ..parts.rows import next_row, owner_of
 from ..shapes.poses import advance_pose, has_unequal_moments, motion_of, rotate_pose, set_motion, turn_shape
 
@@ -77,6 +79,8 @@ def respond_at_arms(state, sides, touch, motion, e, mu):
     """
     bodies, (a, b), (_, normal, point, apart) = state.bodies, sides, touch
     velocity, speed = motion
+    if is_joined(state, a, b):
+        return call_turning_response(state.links[JOINED_RESPONSE], state, sides, touch, motion, e, mu)
     arms = arms_to(bodies, a, b, normal, point, apart)
     light = bodies.inverse_mass[a] + bodies.inverse_mass[b]
     lever_a, lever_b = lever(bodies, a, arms[0], normal), lever(bodies, b, arms[1], normal)
@@ -121,11 +125,30 @@ def kinematic_normal_speed(state, event):
     return dot(cross_spin(bodies.spin[q], arm), impacts.event_normal[event])
 
 
+@part
+def add_spin(state, i, change, left):
+    """Body i turns by so much faster for what is left of the step."""
+    bodies, i = state.bodies, owner_of(state, i) if length(change) > 0.0 else -1
+    while i >= 0:
+        if has_unequal_moments(state, i):
+            rotate_pose(state, i, bodies.spin[i], -left)
+            bodies.spin[i] = add(bodies.spin[i], change)
+            rotate_pose(state, i, bodies.spin[i], left)
+        else:
+            bodies.spin[i] = add(bodies.spin[i], change)
+            bodies.turn[i] = add_scaled(bodies.turn[i], change, left)
+            if bodies.rolling_radius[i] == 0.0:
+                turn_shape(state, i, scale(change, left))
+        i = next_row(state, i)
+
+
 def turn_by_impact(state, event, impulse, friction, dt):
     """An impact changes the spins of both bodies, with which they turn for the rest of the step. impulse: along the
     normal; friction: along the surface."""
     impacts, bodies, arms = state.impacts, state.bodies, arms_of(state, event)
     c, normal, left = impacts.event_pair[event], impacts.event_normal[event], dt - impacts.now
+    if is_joined(state, state.pairs.a[c], state.pairs.b[c]):
+        call_turn_by_impact(state.links[JOINED_IMPACT], state, event, impulse, friction, dt)
     for side in range(2):
         i, arm, sign = (state.pairs.a[c], arms[0], -1.0) if side == 0 else (state.pairs.b[c], arms[1], 1.0)
         twisted = add(scale(lever(bodies, i, arm, normal), impulse), twist(arm, friction))
@@ -133,16 +156,5 @@ def turn_by_impact(state, event, impulse, friction, dt):
         advance_pose(state, i, bodies.spin[i], -left)
         change = scale(change_of_spin(bodies, i, twisted), sign)
         set_motion(state, i, motion)
-        i = owner_of(state, i) if length(change) > 0.0 else -1
-        while i >= 0:
-            if has_unequal_moments(state, i):
-                rotate_pose(state, i, bodies.spin[i], -left)
-                bodies.spin[i] = add(bodies.spin[i], change)
-                rotate_pose(state, i, bodies.spin[i], left)
-            else:
-                bodies.spin[i] = add(bodies.spin[i], change)
-                bodies.turn[i] = add_scaled(bodies.turn[i], change, left)
-                if bodies.rolling_radius[i] == 0.0:
-                    turn_shape(state, i, scale(change, left))
-            i = next_row(state, i)
+        add_spin(state, i, change, left)
     return OK

@@ -9,18 +9,14 @@ from ...framework.vectors import add, add_scaled, dot, item, length, replace, sc
 from ..codes import OK
 from ..contacts.solving.rows import rotate_body
 from ..contacts.solving.warm_start import row_of
-from ..integration.turning import change_of_spin, cross_spin
+from ..integration.turning import change_of_spin, cross_spin, turn_of_arm
 from ..narrow_phase.stages import layers_meet
 from ..parts.rows import next_row, owner_of
+from ..shapes.poses import has_unequal_moments, row_of_axes
 from .coupling import first_of
+from .groups import join_held, may_move
 from .records import CUSTOM, DRIVE, FREE, POINT, SLIDE, TURN, TWIST
 from .rows import turn_about
-
-
-@inlined
-def may_move(state, i):
-    """Whether row i is a body that may move in this step."""
-    return 0 <= i < state.dynamic and state.bodies.inverse_mass[i] > 0.0
 
 
 @inlined
@@ -63,13 +59,7 @@ def find_active(state):
             joints.order[found] = j
             found += 1
     joints.active, joints.kept_in = found, state.step_number + 1
-    joined = state.bodies.joined
-    for i in range(state.count):
-        joined[i] = False
-    for e in range(found):
-        for i in (joints.row_a[joints.order[e]], joints.row_b[joints.order[e]]):
-            if i >= 0:
-                joined[owner_of(state, i)] = True
+    join_held(state)
 
 
 def begin_joints(state, dt):
@@ -154,6 +144,15 @@ def leave_out_joined(state, dt):
 
 
 @inlined
+def turned_by_quaternion(rotation, i, v):
+    """A vector in space, turned as body i is."""
+    axis, k = v, 4 * i
+    axis = replace(replace(replace(axis, 0, rotation[k + 1]), 1, rotation[k + 2]), len(v) - 1, rotation[k + 3])
+    half = cross_spin(axis, v)
+    return add(add_scaled(v, half, 2.0 * rotation[k]), scale(cross_spin(axis, half), 2.0))
+
+
+@inlined
 def turned_since(state, i, v):
     """A vector along the axes of body i, as it is in the world."""
     rotation, axes = state.bodies.rotation, state.bodies.axes
@@ -165,10 +164,52 @@ def turned_since(state, i, v):
         else:
             c, s = cos(rotation[i]), sin(rotation[i])
         return replace(replace(v, 0, c * item(v, 0) - s * item(v, 1)), 1, s * item(v, 0) + c * item(v, 1))
-    axis, k = v, 4 * i
-    axis = replace(replace(replace(axis, 0, rotation[k + 1]), 1, rotation[k + 2]), len(v) - 1, rotation[k + 3])
-    half = cross_spin(axis, v)
-    return add(add_scaled(v, half, 2.0 * rotation[k]), scale(cross_spin(axis, half), 2.0))
+    return turned_by_quaternion(rotation, i, v)
+
+
+@inlined
+def has_turned_by_impacts(state, i):
+    """Whether impacts have turned body i in this step, of which its rotation knows nothing yet."""
+    return state.impacts.logged > 0 and state.bodies.impact_count[i] > 0 and len(state.bodies.previous_rotation) > 0
+
+
+@part
+def turned_before(state, i, v):
+    """The same where the step starts."""
+    before = state.bodies.previous_rotation
+    if len(before) == 0:
+        return turned_since(state, i, v)
+    if len(v) == 2:
+        c, s = cos(before[i]), sin(before[i])
+        return replace(replace(v, 0, c * item(v, 0) - s * item(v, 1)), 1, s * item(v, 0) + c * item(v, 1))
+    return turned_by_quaternion(before, i, v)
+
+
+@part
+def turned_in_step(state, i, v):
+    """The same where the step ends, as impacts have turned it."""
+    if not has_turned_by_impacts(state, i):
+        return turned_since(state, i, v)
+    if has_unequal_moments(state, i):
+        if len(state.bodies.axes) == 0:
+            return turned_since(state, i, v)
+        turned = v
+        for k in range(len(v)):
+            turned = replace(turned, k, dot(row_of_axes(state, i, k), v))
+        return turned
+    turned = turned_before(state, i, v)
+    return add(turned, turn_of_arm(state.bodies.turn[i], turned))
+
+
+@part
+def angle_in_step(state, i):
+    """The angle of body i in a plane, likewise; of the world 0."""
+    if i < 0:
+        return 0.0
+    bodies = state.bodies
+    if has_turned_by_impacts(state, i):
+        return bodies.previous_rotation[i] + item(bodies.turn[i], 0)
+    return bodies.rotation[i]
 
 
 @part
@@ -200,8 +241,8 @@ def build_custom_rows(state, j):
     joints.base_b[j] = bodies.previous_position[b] if b >= 0 else zero
     for k in range(d):
         axis = replace(zero, k, 1.0)
-        joints.axes_a[d * j + k] = turned_since(state, a, axis) if a >= 0 else axis
-        joints.axes_b[d * j + k] = turned_since(state, b, axis) if b >= 0 else axis
+        joints.axes_a[d * j + k] = turned_in_step(state, a, axis) if a >= 0 else axis
+        joints.axes_b[d * j + k] = turned_in_step(state, b, axis) if b >= 0 else axis
 
 
 @part
@@ -222,16 +263,15 @@ def build_joint_rows(state):
         if joints.kind[j] == TURN and len(zero) == 2:
             joints.rail[j], joints.angle[j] = joints.axis[j], 0.0
             if len(bodies.rotation) > 0:
-                angle = bodies.rotation[b] if b >= 0 else 0.0
-                joints.angle[j] = angle - bodies.rotation[a] if a >= 0 else angle
+                joints.angle[j] = angle_in_step(state, b) - angle_in_step(state, a)
             continue
         start_a = bodies.previous_position[a] if a >= 0 else zero
         start_b = bodies.previous_position[b] if b >= 0 else zero
         joints.between[j] = sub(start_b, start_a)
-        joints.base_a[j] = turned_since(state, a, joints.anchor_a[j]) if a >= 0 else joints.anchor_a[j]
-        joints.base_b[j] = turned_since(state, b, joints.anchor_b[j]) if b >= 0 else joints.anchor_b[j]
+        joints.base_a[j] = turned_in_step(state, a, joints.anchor_a[j]) if a >= 0 else joints.anchor_a[j]
+        joints.base_b[j] = turned_in_step(state, b, joints.anchor_b[j]) if b >= 0 else joints.anchor_b[j]
         if joints.kind[j] == SLIDE or len(zero) == 3:
-            joints.rail[j] = turned_since(state, a, joints.axis[j]) if a >= 0 else joints.axis[j]
+            joints.rail[j] = turned_in_step(state, a, joints.axis[j]) if a >= 0 else joints.axis[j]
 
 
 def count_turns(state, dt):

@@ -7,6 +7,7 @@ from ...framework.jit.records.schema import Column, Schema, flag, floats, intege
 POINT, ROD, SLIDE, TURN, ALIGN, CONE, TWIST, CUSTOM = range(8)
 HOLD, LIMIT, DRIVE, SPRING, SERVO, FREE = range(6)
 BY_PASSES, HELD_AT_ONCE, LIMITED_AT_ONCE = range(3)
+NOT_JOINED = -1  # of a body that no active joint holds
 MOST_NEIGHBOURS = 64  # neighbours of a body where joints are solved at once
 
 JOINTS = Schema(

@@ -15,11 +15,12 @@ from ..shapes.linking.signatures import call_in_dimension
 # Places in ``state.links``.
 (
     BOUND_SEARCHES, FIRST_TOUCH, TAKE_TOGETHER, FREE_TURN, TURNING_TOUCH, TOUCH_OF_TURN, CLOSING_POINT, ARMS_AT_REST,
-    TURNING_RESPONSE, TURN_BY_IMPACT, JOINED_ISLANDS, JOINED_BODIES,
-) = PLACES = range(12)  # fmt: skip
+    TURNING_RESPONSE, TURN_BY_IMPACT, JOINED_ISLANDS, JOINED_BODIES, JOINED_RESPONSE, JOINED_IMPACT,
+    JOINED_START,
+) = PLACES = range(15)  # fmt: skip
 SWEPT_PARTS, IMPACT_PARTS = (BOUND_SEARCHES, FIRST_TOUCH), (FIRST_TOUCH,)
 TURNING_PARTS = (FREE_TURN, TURNING_TOUCH, TOUCH_OF_TURN, CLOSING_POINT, ARMS_AT_REST, TURNING_RESPONSE, TURN_BY_IMPACT)
-JOINT_PARTS = (JOINED_ISLANDS, JOINED_BODIES)
+JOINT_PARTS, JOINT_IMPACT_PARTS = (JOINED_ISLANDS, JOINED_BODIES), (JOINED_RESPONSE, JOINED_IMPACT, JOINED_START)
 IN_SPACE = (FREE_TURN,)  # in a plane nothing calls it
 
 
@@ -96,12 +97,12 @@ def _turn_by_impact(dimensions: int) -> Signature:
 
 SIGNATURES = (
     _bound_searches, _first_touch, _take_together, _free_turn, _turning_touch, _touch_of_turn, _closing_point, _of_step,
-    _turning_response, _turn_by_impact, _of_step, _of_step,
+    _turning_response, _turn_by_impact, _of_step, _of_step, _turning_response, _turn_by_impact, _of_step,
 )  # fmt: skip
 (
     call_bound_searches, call_first_touch, call_take_together, call_free_turn, call_turning_touch, call_touch_of_turn,
     call_closing_point, call_arms, call_turning_response, call_turn_by_impact, call_joined_islands, call_joined_bodies,
-) = map(call_in_dimension, SIGNATURES)  # fmt: skip
+) = map(call_in_dimension, SIGNATURES[:JOINED_RESPONSE])  # fmt: skip
 
 
 def needed_places(dimensions: int, sweeps: bool, bounces: bool, turns: bool, joined: bool) -> list[int]:
@@ -109,6 +110,7 @@ def needed_places(dimensions: int, sweeps: bool, bounces: bool, turns: bool, joi
     time are linked when there are some."""
     places = {*(SWEPT_PARTS if sweeps else ()), *(IMPACT_PARTS if bounces else ())}
     places.update(TURNING_PARTS if turns else (), JOINT_PARTS if joined else ())
+    places.update(JOINT_IMPACT_PARTS if joined and (sweeps or bounces) else ())
     return sorted(places.difference(IN_SPACE if dimensions == 2 else ()))
 
 

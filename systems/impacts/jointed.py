@@ -1,0 +1,147 @@
+"""Impacts on bodies that joints hold, with the answers of these: what an impact asks, what it does to all that joints
+connect with it, and where that starts in the solver then."""
+
+from __future__ import annotations
+
+from ...framework.compilation import part
+from ...framework.jit.records.record_type import zero_of
+from ...framework.vectors import add, add_scaled, dot, item, length, scale
+from ..codes import OK
+from ..contacts.solving.rows import rotate_body
+from ..integration.turning import arms_to, velocity_by_spin
+from ..joints.groups import group_of
+from ..joints.records import POINT
+from ..parts.rows import owner_of, place_of
+from ..shapes.poses import advance_pose, motion_of, set_motion
+from .impulses import count_impact, deflect
+from .joint_answers import (
+    HELD,
+    TAKE_NOTHING,
+    TAKE_SPEEDS,
+    TAKE_STARTS,
+    TAKE_WAYS,
+    answer,
+    list_answering,
+    parted_by,
+    push_rows,
+    rows_that_answer,
+    strike,
+)
+from .turning import add_spin, arms_of, impulses_of, slip_direction
+from .worklist import list_pairs_of
+
+
+def respond_joined(state, sides, met, motion, e, mu):
+    """What ``respond_at_arms`` tells, where joints hold one of the two."""
+    bodies, (a, b), (t, normal, point, apart) = state.bodies, sides, met
+    now, (velocity, speed) = state.impacts.now, motion
+    state.impacts.now = t
+    arms = arms_to(bodies, a, b, normal, point, apart)
+    light, touch, nothing = bodies.inverse_mass[a] + bodies.inverse_mass[b], (sides, arms, normal), scale(normal, 0.0)
+    rows, parted = rows_that_answer(state, touch)
+    answer(state, rows, touch, 0.0, nothing, TAKE_SPEEDS)
+    settled, nn = parted_by(state, touch), dot(parted, normal)
+    speed += dot(settled, normal)
+    smooth, pull = -(1.0 + e) * min(0.0, speed) * (light / nn), nothing
+    if mu > 0.0 and speed < 0.0:
+        velocity = add(add(velocity, settled), velocity_by_spin(bodies, a, b, arms))
+        slip = add_scaled(velocity, normal, -dot(velocity, normal))
+        driven = scale(add_scaled(parted, normal, -nn), 0.5 * smooth / light)
+        tangent = slip_direction(normal, slip, driven)
+        if length(tangent) > 0.0:
+            answer(state, rows, touch, 0.0, tangent, TAKE_NOTHING)
+            nt, tt = dot(parted, tangent), dot(parted_by(state, touch), tangent)
+            if tt > HELD * light:
+                pushed, pulled = impulses_of((nn, nt, tt), (speed, dot(slip, tangent)), e, mu)
+                smooth, pull = pushed * light, scale(tangent, pulled * light)
+    state.impacts.now = now
+    return smooth, pull
+
+
+@part
+def take_gains(state, i, dt):
+    """Body i goes on with what it has gained; returns whether it has gained anything."""
+    impacts, k, zero = state.impacts, owner_of(state, i), zero_of(state)
+    dv, spin = impacts.gained[k], impacts.gained_spin[k]
+    impacts.gained[k], impacts.gained_spin[k] = zero, zero
+    if length(dv) + length(spin) == 0.0:
+        return False
+    deflect(state, k, dv, impacts.now, dt)
+    add_spin(state, k, spin, dt - impacts.now)
+    return True
+
+
+def strike_joined(state, event, impulse, friction, dt):
+    """What joints answer an impact of two bodies with: all that they connect goes on with other velocities and spins,
+    and is searched for its next impacts. The joints bear it."""
+    impacts, joints, bodies = state.impacts, state.solver.joints, state.bodies
+    a, b = state.pairs.a[impacts.event_pair[event]], state.pairs.b[impacts.event_pair[event]]
+    touch = (a, b), arms_of(state, event), impacts.event_normal[event]
+    motions = motion_of(state, a), motion_of(state, b)  # of the end of the step
+    advance_pose(state, a, bodies.spin[a], impacts.now - dt)
+    advance_pose(state, b, bodies.spin[b], impacts.now - dt)
+    rows, _ = rows_that_answer(state, touch)
+    answer(state, rows, touch, impulse, friction, TAKE_SPEEDS)
+    strike(state, rows, touch, 0.0, scale(friction, 0.0))
+    push_rows(state, rows, joints.push)
+    set_motion(state, a, motions[0])
+    set_motion(state, b, motions[1])
+    take_gains(state, a, dt)
+    take_gains(state, b, dt)
+    for e in range(rows):
+        j = joints.open_row[e]
+        if joints.kind[j] == POINT:
+            joints.thrust[j] = add(joints.thrust[j], joints.push[j])
+        else:
+            joints.total[j] += item(joints.push[j], 0)
+        for i in (joints.row_a[j], joints.row_b[j]):
+            if i >= 0 and take_gains(state, i, dt):
+                count_impact(state, i, False)
+                list_pairs_of(state, i, -1, dt)
+    return OK
+
+
+@part
+def last_impact_of(state, group):
+    """When a body of that group has had its last impact in this step; -1: it has had none."""
+    impacts, pairs, last = state.impacts, state.pairs, -1.0
+    for k in range(impacts.logged):
+        c = impacts.log_pair[k]
+        if group_of(state, pairs.a[c]) == group or group_of(state, pairs.b[c]) == group:
+            last = impacts.log_time[k]
+    return last
+
+
+@part
+def displace(state, i, takes):
+    """Body i starts in the solver by so much elsewhere as it has gained, or with twice as much other velocities."""
+    impacts, solver, k, zero = state.impacts, state.solver, owner_of(state, i), zero_of(state)
+    q = place_of(state, k)
+    if takes == TAKE_WAYS:
+        solver.shift[q] = add(solver.shift[q], impacts.gained[k])
+        rotate_body(solver, q, add(solver.turn[q], impacts.gained_spin[k]))
+    else:
+        solver.velocity[q] = add_scaled(solver.velocity[q], impacts.gained[k], 2.0)
+        solver.spin[q] = add_scaled(solver.spin[q], impacts.gained_spin[k], 2.0)
+    impacts.gained[k], impacts.gained_spin[k] = zero, zero
+
+
+def bend_struck(state, dt):
+    """What has had an impact starts in the solver where its way behind it comes from, on a straight line, with the
+    velocity of the impact. Where joints hold it that is a bend: they bring it back to where it is as open as the step
+    starts, and its velocity to that of there. At half of the way the two velocities part what joints hold as much, one
+    way and the other, so that energy is the same."""
+    impacts, joints, zero = state.impacts, state.solver.joints, zero_of(state)
+    for e in range(joints.active):
+        a, b = joints.row_a[joints.order[e]], joints.row_b[joints.order[e]]
+        i = a if group_of(state, a) >= 0 else b
+        last = last_impact_of(state, e) if group_of(state, i) == e else -1.0
+        for takes in range(TAKE_STARTS, TAKE_WAYS + 1 if last >= 0.0 else TAKE_STARTS):
+            impacts.now = 0.0 if takes == TAKE_WAYS else 0.5 * last
+            rows = list_answering(state, i, i)
+            answer(state, rows, ((i, i), (zero, zero), zero), 0.0, zero, takes)
+            for m in range(rows):
+                for k in (joints.row_a[joints.open_row[m]], joints.row_b[joints.open_row[m]]):
+                    if group_of(state, k) >= 0:
+                        displace(state, k, takes)
+    return OK
