@@ -57,6 +57,12 @@ SLEEP_COLUMNS = Section(
     flown_position=vectors(unit="m"),  # where free flight leads it from there
     flown_velocity=vectors(unit="m/s"),
 )  # fmt: skip
+HELD_COLUMNS = Section(
+    "body", "the table", "contacts or joints have held it: the next step foresees that they do",
+    hold=vectors(default=0.0, unit="m/s^2"),  # what they gave it in the last step in which they did,
+    held_velocity=vectors(default=0.0, unit="m/s"),  # and with what velocity it ended that
+)  # fmt: skip
+HIDDEN_COLUMNS = (*SLEEP_COLUMNS, *HELD_COLUMNS)
 
 # Columns of the bodies that are made within a step or when rows have moved.
 START_COLUMNS = Section(
@@ -86,7 +92,6 @@ PREDICTED = Section(
     "body", "collisions", RESTED,
     warm_started=flags(default=False),  # the resting prediction has changed its velocity
     warm_start_velocity=vectors(unit="m/s"),
-    to_hold=vectors(unit="m/s"),  # at which it closes on what pushes it
 )  # fmt: skip
 REST_COLUMNS = Section(
     "body", "collisions", RESTED,
@@ -132,6 +137,9 @@ SPINS = Section(
 FAILS = "the start of the step, for one that fails"
 UNDO_COLUMNS = Section("body", "going back", FAILS, kept_previous=vectors(unit="m"), kept_velocity=vectors(unit="m/s"))
 UNDO_FORCE = Section("body", "going back", FAILS, kept_step_force=vectors(unit="N"))
+UNDO_HOLD = Section(
+    "body", "going back", FAILS, kept_hold=vectors(unit="m/s^2"), kept_held_velocity=vectors(unit="m/s")
+)  # fmt: skip
 SLEEPING = Section(
     "body", "sleeping", "bodies may sleep: islands, and whether anything has changed them",
     rest_root=ints("int32"),
@@ -141,7 +149,7 @@ SLEEPING = Section(
 # Columns of the records alone: no rows, or one for each of the table from when something asks for them.
 BODY_SECTIONS = (
     START_COLUMNS, QUARANTINE, COLLISIONS, PREDICTED, REST_COLUMNS, CURVES, SWEEP_COLUMNS, EVALUATIONS, SPINS,
-    PART_COLUMNS, UNDO_COLUMNS, UNDO_FORCE,
+    PART_COLUMNS, UNDO_COLUMNS, UNDO_FORCE, UNDO_HOLD,
     SLEEPING,
 )  # fmt: skip
 
@@ -154,7 +162,7 @@ def all_rows(state):
 BODY_COLUMNS = tuple(name for section in BODY_SECTIONS for name in section)
 
 BODIES = Schema(
-    "Bodies", *TABLE_SECTIONS, SLEEP_COLUMNS, *BODY_SECTIONS,
+    "Bodies", *TABLE_SECTIONS, SLEEP_COLUMNS, HELD_COLUMNS, *BODY_SECTIONS,
     Section(
         "body", "rotation", "some body is rotated, or a shape reads its axes",
         axes=floats(unit="1"),  # rotation matrices (n, d, d), flat,

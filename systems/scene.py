@@ -19,6 +19,8 @@ from .records import (
     BODY_COLUMNS,
     COLLIDERS,
     COLLISIONS,
+    HELD_COLUMNS,
+    HIDDEN_COLUMNS,
     SLEEP_COLUMNS,
     START_COLUMNS,
     TABLE_COLUMNS,
@@ -238,7 +240,7 @@ class Scene:
         for name in TABLE_COLUMNS:
             if name in table.arrays:
                 setattr(bodies, name, table.arrays[name])
-        for name in SLEEP_COLUMNS:
+        for name in HIDDEN_COLUMNS:
             if f"_{name}" in table.arrays:
                 setattr(bodies, name, table.arrays[f"_{name}"])
         for name in ("rotation", "previous_rotation"):
@@ -252,8 +254,9 @@ class Scene:
     def make(self, *names: str) -> None:
         """Columns on demand that a stage asks for, of the table or of the records alone."""
         for name in names:
-            if name in self.table.on_demand:
-                self.table.make(name)
+            shown = f"_{name}" if name in HIDDEN_COLUMNS else name
+            if shown in self.table.on_demand:
+                self.table.make(shown)
             else:
                 self.reserve(name)
 
@@ -508,6 +511,6 @@ def make_table(dimensions: int) -> Table:
     table.add_array("torque", "angular", on_demand=True)
     table.add_array("inverse_mass")
     table.add_array(STOPS, dtype=np.int8, on_demand=True)
-    for name, column in SLEEP_COLUMNS.fields.items():
+    for name, column in (*SLEEP_COLUMNS.fields.items(), *HELD_COLUMNS.fields.items()):
         table.add_array(f"_{name}", column.item, dtype=column.dtype, on_demand=True)
     return table

@@ -47,7 +47,16 @@ from .quarantine.columns import check_columns
 from .records import BODIES, COLLIDERS, STATE, TABLE_COLUMNS, all_rows
 from .shapes.poses import turn_with_unequal_moments
 from .sleeping.stages import update_sleep
-from .step_stages import KEEPS_FORCE, KEEPS_START, KEEPS_VELOCITY, close_step, index_bodies, keep_state, read_bodies
+from .step_stages import (
+    KEEPS_FORCE,
+    KEEPS_HOLD,
+    KEEPS_START,
+    KEEPS_VELOCITY,
+    close_step,
+    index_bodies,
+    keep_state,
+    read_bodies,
+)
 
 OPENING = (
     Stage(keep_state, "keeps what a failed step puts back", ("linear_velocity",), ("kept", "kept_velocity")),
@@ -119,6 +128,8 @@ KEPT = (
     (KEEPS_START, "position", "previous_position", "kept_rows"),
     (KEEPS_START, "previous_position", "kept_previous", "kept_rows"),
     (KEEPS_START, "linear_velocity", "start_velocity", "moving"),
+    (KEEPS_HOLD, "hold", "kept_hold", "moving"),
+    (KEEPS_HOLD, "held_velocity", "kept_held_velocity", "moving"),
     (KEEPS_VELOCITY, "linear_velocity", "kept_velocity", "moving"),  # from before start_velocity
 )
 MADE_AGAIN = ("force", "inverse_mass")  # by every step

@@ -13,7 +13,7 @@ FEW_BODIES = 160  # that are looked at one by one
 
 make_static_boxes, make_moving_boxes = part(box_statics), part(box_motions)
 
-OPENED, KEEPS_VELOCITY, KEEPS_START, KEEPS_FORCE, KEEPS_WRITTEN = 1, 2, 4, 8, 16  # bits of state.kept
+OPENED, KEEPS_VELOCITY, KEEPS_START, KEEPS_FORCE, KEEPS_WRITTEN, KEEPS_HOLD = 1, 2, 4, 8, 16, 32  # bits of state.kept
 LARGEST_FLOAT = 1.7976931348623157e308  # of all finite numbers
 
 

@@ -16,8 +16,18 @@ from ..joints.records import DIRECT_BODIES
 from ..linking.parts import JOINED_BODIES, JOINED_START, call_joined_bodies, call_joined_islands
 from ..parts.rows import next_row, owner_of
 from ..parts.stages import copy_to_parts
-from ..records import REST_COLUMNS, SOLVER_ARMS, SOLVER_BODIES, SOLVER_CONTACTS, SOLVER_SPINS, SOLVER_SURFACES
+from ..records import (
+    HELD_COLUMNS,
+    REST_COLUMNS,
+    SOLVER_ARMS,
+    SOLVER_BODIES,
+    SOLVER_CONTACTS,
+    SOLVER_SPINS,
+    SOLVER_SURFACES,
+    UNDO_HOLD,
+)
 from ..shapes.surfaces import any_surface_runs
+from ..step_stages import KEEPS_HOLD
 from .constants import FREQUENCY, TIPPING_FREQUENCY
 from .points import points_of
 from .solving.islands import order_joints, order_rows
@@ -82,7 +92,7 @@ def bodies_at_rest(state):
 
 
 ROOM_AT_REST = (
-    Rows("bodies", REST_COLUMNS, lambda s: s.count if rows_at_rest(s) > 0 else 0),
+    Rows("bodies", (*REST_COLUMNS, *HELD_COLUMNS, *UNDO_HOLD), lambda s: s.count if rows_at_rest(s) > 0 else 0),
     Rows("solver", SOLVER_CONTACTS, rows_at_rest),
     Rows("solver", SOLVER_BODIES, bodies_at_rest),
     Rows("solver", SOLVER_ARMS, lambda s: rows_at_rest(s) if s.spinning else 0),
@@ -102,6 +112,9 @@ def gather(state, dt):
         bodies.held[i] = False
     if rows_at_rest(state) == 0:
         return OK
+    state.kept |= KEEPS_HOLD
+    for i in range(state.first, state.moving):
+        bodies.kept_hold[i], bodies.kept_held_velocity[i] = bodies.hold[i], bodies.held_velocity[i]
     order_rows(state, dt, list_rows(state))
     nothing = zero_of(state)
     solver.movers = 0
@@ -175,6 +188,8 @@ def put_back(state, dt):
         if bodies.held[i] and solver.inverse_mass[q] > 0.0:
             bodies.position[i] = add(bodies.previous_position[i], solver.shift[q])
             bodies.linear_velocity[i] = solver.velocity[q]
+            gained = scale(sub(solver.velocity[q], bodies.start_velocity[i]), 1.0 / dt)
+            bodies.hold[i], bodies.held_velocity[i] = sub(gained, solver.acceleration[q]), solver.velocity[q]
             if state.spinning:
                 bodies.spin[i], bodies.turn[i] = solver.spin[q], add(bodies.turn[i], solver.turn[q])
     if state.any_warm_started:

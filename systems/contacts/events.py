@@ -152,7 +152,7 @@ class RecordedContacts:
         order = np.argsort(entity)
         first = order[np.searchsorted(entity, entity_a[known], sorter=order)]
         point = bodies.position[first] + bodies.offset[first] + memory.place[now, :count][known]
-        impulse = (memory.push[now, :count][known] * memory.normal[now, :count][known]).sum(axis=1)
+        impulse = memory.total[now, :count][known]
         row = np.concatenate((rows[known], np.flatnonzero(alone)))
         sort = np.argsort(row, kind="stable")
         return {

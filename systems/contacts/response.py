@@ -42,7 +42,7 @@ class Response(StagedSystem):
     STAGES = (
         Stage(begin_response, "where the paths begin", ("pairs",), ("path_velocity",), EITHER),
         Stage(
-            predict_rest, "the impulses of the last step act on the prediction, as far as there is something to hold",
+            predict_rest, "what held bodies acts on the prediction, as far as there is something to hold",
             ("warm_start",), MOVED_COLUMNS, RESTING_OR_JOINED, RESTED, ROOM_FOR_SUPPORT,
         ),
         Stage(begin_impacts, "no impact yet", ("pairs", "restitution"), ("impacts",), "colliders"),

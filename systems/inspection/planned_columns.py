@@ -11,7 +11,7 @@ from ...framework.data.table import HAS_OBJECTS, Table
 from ...framework.jit.records.record import Record
 from ...framework.jit.records.schema import Schema, Section
 from ...framework.schedule.plan import PlannedColumn
-from ..records import BODIES, SLEEP_COLUMNS
+from ..records import BODIES, HIDDEN_COLUMNS
 from ..scene import Scene
 
 FIELDS = "what the game has set"
@@ -59,7 +59,7 @@ def _sections(record: Record, sections: Sequence[Section], least: int = 1) -> It
             elif name == "axes_rotation" and record.dimensions == 3:
                 rows //= 4
             if rows >= least:
-                shown = f"_{name}" if section is SLEEP_COLUMNS else name
+                shown = f"_{name}" if name in HIDDEN_COLUMNS else name
                 unit = section.fields[name].unit
                 yield from _column(shown, section.of, section.group, array, rows, section.why, unit)
 

@@ -213,26 +213,6 @@ def angle_in_step(state, i):
 
 
 @part
-def push_joined(state, dt):
-    """The forces of the joints in the last step act on the velocities once more, see prediction."""
-    joints, bodies = state.solver.joints, state.bodies
-    velocity, inverse_mass = bodies.linear_velocity, bodies.inverse_mass
-    for e in range(joints.active):
-        j = joints.order[e]
-        given = joints.kind[j] == CUSTOM
-        if joints.kind[j] >= TURN and not given:
-            continue
-        push = scale(joints.pull[j] if joints.kind[j] == POINT else scale(joints.normal[j], joints.load[j]), dt)
-        back = scale(joints.along_a[j], -joints.load[j] * dt) if given else push
-        a, b = joints.row_a[j], joints.row_b[j]
-        a, b = owner_of(state, a) if a >= 0 else a, owner_of(state, b) if b >= 0 else b
-        if a >= 0 and inverse_mass[a] > 0.0:
-            bodies.warm_started[a], velocity[a] = True, add_scaled(velocity[a], back, -inverse_mass[a])
-        if b >= 0 and inverse_mass[b] > 0.0:
-            bodies.warm_started[b], velocity[b] = True, add_scaled(velocity[b], push, inverse_mass[b])
-
-
-@part
 def build_custom_rows(state, j):
     """Where the bodies of a row of a plugin are when the step starts, and their axes as it has turned them."""
     joints, bodies, zero = state.solver.joints, state.bodies, zero_of(state)

@@ -14,7 +14,18 @@ from ...framework.schedule.stages import Rows, Stage, asked
 from ..broad_phase.system import BroadPhase
 from ..integration.system import ON_WAY, Integration
 from ..narrow_phase.system import NarrowPhase
-from ..records import BODIES, COLLIDERS, QUARANTINE, SLEEP_COLUMNS, STATE, TABLE_COLUMNS, UNDO_COLUMNS, UNDO_FORCE
+from ..records import (
+    BODIES,
+    COLLIDERS,
+    HELD_COLUMNS,
+    QUARANTINE,
+    SLEEP_COLUMNS,
+    STATE,
+    TABLE_COLUMNS,
+    UNDO_COLUMNS,
+    UNDO_FORCE,
+    UNDO_HOLD,
+)
 from ..stage_list import CONDITIONS, ON_DEMAND, STAGES, SYSTEM_OF_STAGE
 from .compiled import compiled_stage, own_columns, visible_columns
 
@@ -22,7 +33,7 @@ INTEGRATORS = {stage.name for stage in Integration.STAGES if stage.needed in ("s
 REPEATED = (BroadPhase.__name__, NarrowPhase.__name__)  # their stages may run several times in a step
 RECORDS = {name for name, field in STATE.fields.items() if isinstance(field, Schema)} - {"bodies", "colliders"}
 # What others rely on in ways that no stage of a plugin can keep to, or what no failed step would put back.
-UNDONE = (*SLEEP_COLUMNS, *QUARANTINE, *UNDO_COLUMNS, *UNDO_FORCE)
+UNDONE = (*SLEEP_COLUMNS, *QUARANTINE, *UNDO_COLUMNS, *UNDO_FORCE, *UNDO_HOLD, *HELD_COLUMNS)
 FIXED = {"entity", "shape", "rank", "collider_slot", *UNDONE, *COLLIDERS.fields}
 FIXED -= {"rest_steps"}  # of what is not at rest, whatever its velocity says
 OF_TABLE = {*TABLE_COLUMNS, "rotation"} - {"entity"}

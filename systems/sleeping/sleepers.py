@@ -351,7 +351,7 @@ class Sleepers:
         """The impulses that belong to steps of that length."""
         columns, by = self.impulses.columns, dt / self._dt
         self._dt = dt
-        self.impulses.columns = {**columns, **{name: columns[name] * by for name in ("impulse", "tangent", "push")}}
+        self.impulses.columns = {**columns, **{name: columns[name] * by for name in ("impulse", "tangent", "total")}}
 
     def _both_still(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         still, table = self._still(), self._table

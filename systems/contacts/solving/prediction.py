@@ -1,22 +1,20 @@
-"""Apply last step's contact impulses to the free-flight prediction.
+"""Apply what contacts and joints gave a body in the last step to the free-flight prediction.
 
-Free flight lets a resting body fall by g dt: a ball that bounces on it would find no ground. So the impulses of the
-last step act on the prediction, bounded by the change of velocity by forces, or by the closing speed that the game has
-added: for a light body between heavy ones they are small differences of large numbers. Where no contact holds the body
-after all, they are taken back.
+Free flight lets a resting body fall by g dt: a ball that bounces on it would find no ground. So what held it acts on
+the prediction once more, bounded by the change of velocity by forces, or by what the game has added against it since
+the last step's end: a blow is not repeated. Where nothing holds the body after all, it is taken back.
 """
 
 from __future__ import annotations
 
-from ....framework.compilation import inlined, packed, part
+from ....framework.compilation import packed, part
 from ....framework.schedule.stages import Rows
 from ....framework.vectors import add, add_scaled, dot, length, scale, sub
 from ...codes import OK
-from ...joints.bodies import push_joined
 from ...parts.rows import owner_of
 from ...parts.stages import copy_prediction_to_parts
 from ...records import CURVES, PREDICTED
-from .warm_start import find_rows, scale_to, skip_before
+from .warm_start import find_rows, skip_before
 
 
 @part
@@ -37,47 +35,20 @@ def mark_disabled(state):
             m += 1
 
 
-@inlined
-def note_closing(bodies, i, moving, push, closing, share):
-    """``to_hold`` of body i becomes a share of a push where that closes faster than all before it."""
-    to_hold = bodies.to_hold
-    if i < moving and closing * abs(closing) > dot(to_hold[i], to_hold[i]):
-        to_hold[i] = scale(push, share)
-
-
 @part
-def find_closing(state):
-    """``to_hold``: how much faster than when the last step ended each body closes on what pushed it, along the push of
-    the remembered contact where that is most, m/s; what forces have given it where that is more."""
-    memory, bodies, now = state.warm_start, state.bodies, state.warm_start.now
-    velocity = bodies.linear_velocity
-    for i in range(state.first, state.moving):
-        bodies.warm_start_velocity[i] = velocity[i]  # of all, so that no branch asks which are supported
-        bodies.to_hold[i] = sub(velocity[i], bodies.start_velocity[i])
+def mark_supported(state):
+    """``warm_started`` of the bodies that contacts or joints have held and still do."""
+    memory, joints, now = state.warm_start, state.solver.joints, state.warm_start.now
+    inverse_mass, warm_started = state.bodies.inverse_mass, state.bodies.warm_started
     for m in range(memory.counts[now]):
         if not memory.off[m]:
-            a, b = owner_of(state, memory.first[now, m]), owner_of(state, memory.second[now, m])
-            push = memory.push[now, m]
-            size = length(push)
-            closing = dot(push, sub(velocity[a], velocity[b])) / size - memory.closing[now, m]
-            note_closing(bodies, a, state.moving, push, closing, -closing / size)
-            note_closing(bodies, b, state.moving, push, closing, closing / size)
-
-
-@part
-def apply_remembered(state):
-    """The impulses of the last step act on the velocities, with their friction."""
-    memory, bodies, now = state.warm_start, state.bodies, state.warm_start.now
-    velocity, inverse_mass = bodies.linear_velocity, bodies.inverse_mass
-    for m in range(memory.counts[now]):
-        if not memory.off[m]:
-            a, b = owner_of(state, memory.first[now, m]), owner_of(state, memory.second[now, m])
-            push = memory.push[now, m]
-            w_a, w_b = inverse_mass[a], inverse_mass[b]
-            if w_a > 0.0:  # storing what stays as it is would make contacts with one floor wait for each other
-                bodies.warm_started[a], velocity[a] = True, add_scaled(velocity[a], push, -w_a)
-            if w_b > 0.0:
-                bodies.warm_started[b], velocity[b] = True, add_scaled(velocity[b], push, w_b)
+            for i in (owner_of(state, memory.first[now, m]), owner_of(state, memory.second[now, m])):
+                if inverse_mass[i] > 0.0:
+                    warm_started[i] = True
+    for e in range(joints.active):
+        for i in (joints.row_a[joints.order[e]], joints.row_b[joints.order[e]]):
+            if i >= 0 and inverse_mass[owner_of(state, i)] > 0.0:
+                warm_started[owner_of(state, i)] = True
 
 
 @part
@@ -108,32 +79,28 @@ ROOM_FOR_SUPPORT = (
 def predict_rest(state, dt):
     """Correct velocity, position and path of the bodies that were held in the last step.
 
-    The impulses act like a force throughout the step, which displaces by ``force_travels`` times dt times the change of
-    velocity: what the integrator makes of a force.
+    What held them acts like a force throughout the step, which displaces by ``force_travels`` times dt times the change
+    of velocity: what the integrator makes of a force.
     """
     bodies = state.bodies
     state.any_warm_started = False
     forget_support(state)
     if not may_support(state):
         return OK
-    scale_to(state, dt)
     find_rows(state)
     state.any_warm_started = True
     state.force_travels = 0.5 if state.path_degree > 1 else (0.0 if state.moves_with_old_velocity else 1.0)
     mark_disabled(state)
-    find_closing(state)
-    apply_remembered(state)
-    push_joined(state, dt)
+    mark_supported(state)
     travels = state.force_travels
     for i in range(state.first, state.moving):
         if bodies.warm_started[i]:
-            before = bodies.warm_start_velocity[i]
-            dv = sub(bodies.linear_velocity[i], before)
-            given, forced = length(dv), length(sub(before, bodies.start_velocity[i]))
-            most = max(forced, dot(dv, bodies.to_hold[i]) / given if given > 0.0 else 0.0)
+            flown, dv = bodies.linear_velocity[i], scale(bodies.hold[i], dt)
+            given, forced = length(dv), length(sub(flown, bodies.start_velocity[i]))
+            most = max(forced, dot(dv, sub(bodies.held_velocity[i], flown)) / given if given > 0.0 else 0.0)
             if given > most:
                 dv = scale(dv, most / given)
-                bodies.linear_velocity[i] = add(before, dv)
+            bodies.linear_velocity[i] = add(flown, dv)
             bodies.warm_start_velocity[i] = dv
             bodies.position[i] = add_scaled(bodies.position[i], dv, travels * dt)
             if state.path_degree > 1:

@@ -180,8 +180,7 @@ WARM_START_ROWS = Section(
     normal=vectors(stacked=True, unit="1"),
     impulse=floats(stacked=True, unit="N s"),  # of the last substep, as if the step were one,
     tangent=vectors(stacked=True, unit="N s"),  # and along the surface
-    push=vectors(stacked=True, unit="N s"),  # what it gave in the step, with its friction,
-    closing=floats(stacked=True, unit="m/s"),  # at which the two closed along that in the end
+    total=floats(stacked=True, unit="N s"),  # what it gave in the step
     first=ints("int32", stacked=True),  # rows of the pairs, for ``rows_version``
     second=ints("int32", stacked=True),
     off=flags(),  # of no use in this step

@@ -1,7 +1,7 @@
 """What is known of last step's contacts at rest: the impulses that the solver starts with.
 
 Pairs in canonical order with the impulse of the last substep and its friction (tangent), as if the step were one
-substep, and what they gave in the whole step (push).
+substep, and what it gave in the whole step (total).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from ....framework.compilation import inlined, part
 from ....framework.data.row_moves import place_of
 from ....framework.jit.records.record_type import zero_of
 from ....framework.schedule.stages import Rows
-from ....framework.vectors import add_scaled, dot, length, scale, sub
+from ....framework.vectors import add_scaled, dot, scale, sub
 from ...codes import OK
 from ..constants import ALIGNED, NEGLIGIBLE, SAME_PLACE_EXTENTS, WARM_START_MAX
 from .guard import island_of
@@ -26,7 +26,7 @@ def scale_to(state, dt):
         for m in range(memory.counts[now]):
             memory.impulse[now, m] *= by
             memory.tangent[now, m] = scale(memory.tangent[now, m], by)
-            memory.push[now, m] = scale(memory.push[now, m], by)
+            memory.total[now, m] *= by
         memory.step[now] = dt
 
 
@@ -125,7 +125,6 @@ ROOM_TO_STORE = (Rows("warm_start", WARM_START_ROWS, lambda s: 0 if s.response_i
 def store_warm_start(state, dt):
     """Keep the contacts that pushed, for the next step; the memory until now stays, for a step that is undone."""
     solver, memory, pairs, entity = state.solver, state.warm_start, state.pairs, state.bodies.entity
-    velocity = state.bodies.linear_velocity
     if state.response_idle or (solver.contacts == 0 and memory.counts[memory.now] == 0):
         return OK
     new, count = 1 - memory.now, 0
@@ -136,12 +135,8 @@ def store_warm_start(state, dt):
         a, b = pairs.a[c], pairs.b[c]
         memory.first[new, count], memory.second[new, count] = a, b
         memory.entity_a[new, count], memory.entity_b[new, count] = entity[a], entity[b]
-        last, total = solver.impulse[k], solver.total[k]
-        push, most = scale(solver.normal[k], total), WARM_START_MAX * solver.force_of[island_of(solver, k)]
-        if last > 0.0 and solver.friction[k] != 0.0:
-            push = add_scaled(push, solver.tangent[k], min(1.0, total / last))
-        memory.push[new, count] = push
-        memory.closing[new, count] = dot(push, sub(velocity[a], velocity[b])) / length(push)
+        last, memory.total[new, count] = solver.impulse[k], solver.total[k]
+        most = WARM_START_MAX * solver.force_of[island_of(solver, k)]
         kept = most / last if last > most else 1.0
         memory.impulse[new, count], memory.tangent[new, count] = kept * last, scale(solver.tangent[k], kept)
         memory.normal[new, count] = solver.normal[k]
