@@ -27,13 +27,12 @@ from ..linking.parts import CLOSING_POINT, TURNING_TOUCH, call_closing_point, ca
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, sweep
 from ..shapes.poses import advance_pose, motion_of, set_motion
 from ..shapes.tolerances import is_turning, smaller_extent
-from .turning_touch import MOST_STRIDES, NEAR_EXTENTS, SHORTER
+from .turning_touch import APART, AT_CORNER, MOST_STRIDES, NEAR_EXTENTS, SHORTER, TOUCHES
 
 MOST_ADVANCES = 100  # a graze takes about 30; whatever is still closing in after that counts as touching
 SAFETY_FACTOR, FAR_ROUNDING = 1.001, 1e-12  # more than all rounding: of an extent, of a distance
 CLEAR = 64.0 * ROUNDING  # of the distances in a path: farther off a touch rounding does not turn its normal round
 DEPTH = 0.25  # of the extent: what is deeper in is there, however coarse the numbers are
-APART, TOUCHES, AT_CORNER = range(3)
 
 
 @part
@@ -67,8 +66,8 @@ def shift_of_offset(state, i, h):
 
 
 def first_touch(state, a, b, path, since, until, limits):
-    """(APART, TOUCHES or AT_CORNER; time, normal, point, from a's centre to b's) of the first touch on b's path as seen
-    from a, between two times; touching at ``since`` and parting is none unless the path leads back.
+    """(APART, TOUCHES, AT_CORNER or UNFOLLOWED; time, normal, point, from a's centre to b's) of the first touch on b's
+    path as seen from a, between two times; touching at ``since`` and parting is none unless the path leads back.
 
     AT_CORNER: they touch at a corner only, also a slop further on; what comes after it is not looked at.
     limits: (slop; stride, seconds between looks at concave shapes; approach speed below which these have no touch; by
@@ -82,7 +81,7 @@ def first_touch(state, a, b, path, since, until, limits):
         found, (t, normal, point, at), _ = call_turning_touch(address, state, a, b, path, spins, times, near_limits)
         # Offsets of colliders stand as where the step ends: seen from there, so that arms are right.
         shift_a, shift_b = shift_of_offset(state, a, t - until), shift_of_offset(state, b, t - until)
-        return (TOUCHES if found else APART), t, normal, add(point, shift_a), sub(at, sub(shift_b, shift_a))
+        return found, t, normal, add(point, shift_a), sub(at, sub(shift_b, shift_a))
     if not both_convex(state, shape_a, shape_b):
         return march(state, a, b, path, since, until, limits)
     t, known, met, share = since, False, False, 0.0

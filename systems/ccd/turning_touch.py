@@ -24,16 +24,18 @@ from ..shapes.linking.convex_by_address import convex_at, rounding_by_address, s
 from ..shapes.poses import has_unequal_moments, pose_of, turn_to
 from ..shapes.tolerances import slop_of, smaller_extent, way_of_turning
 
-TURNING_LOOKS, EXACT_LOOKS = 250, 60
+APART, TOUCHES, AT_CORNER, UNFOLLOWED = range(4)  # what a search finds: the last, that its looks have run out
+EXACT_LOOKS, COARSE_LOOKS = 60, 190
 NEAR_EXTENTS = 1e-6  # of the extent: a smaller gap is a touch; of bodies at rest,
 TOUCH_SLOP = 0.5  # of the slop
 TURNING_TILT = 0.1  # rad, between faces that may touch in several points
-MOST_STRIDES = 4096  # looks at shapes whose gap does not tell the next one;
+MOST_STRIDES = 4096  # looks in a search, and at shapes whose gap does not tell the next one;
 STRIDE, SHORTER = 0.02, 0.1  # extents between these; of the stride of others: that of a thin box which is turned is
 # the extent of the box around it
 FOLLOWED_TURN = 0.5  # rad in a step: up to that the end of the step tells where what turns touches
 MOST_SUNK = 0.5  # slops, or a graze: deeper nothing sinks in before a touch
-GRAZE = 0.125  # slops: as far as points move between looks at a pair that touches and parts, or after EXACT_LOOKS
+GRAZE = 0.125  # slops: as far as points move between looks at a pair that touches and parts, or after EXACT_LOOKS,
+THIN = 0.1  # of the widths of both: or no farther than that, or one may be behind the other at the next look
 
 
 def closing_point(state, a, b, d, met, near, velocity):
@@ -71,9 +73,18 @@ def clear_along(state, a, b, d, normal):
     return max(0.0, ahead, -way - reach_along(state, a, out) - reach_along(state, b, normal))
 
 
+@part
+def thin_along(state, a, b, normal, slop):
+    """How far points may move between two looks at a pair that is near along a normal; infinity if one has no end."""
+    out = negative(normal)
+    width = reach_along(state, a, normal) + reach_along(state, a, out)
+    width += reach_along(state, b, normal) + reach_along(state, b, out)
+    return max(THIN * width, GRAZE * slop)
+
+
 def touch_of_turning(state, a, b, path, spins, times, limits):
-    """(whether they touch; (time, normal, point, from a's centre to b's); gap then) between two times, while they turn
-    with those spins; shapes stand as at the second of these. limits:
+    """(APART, TOUCHES, or UNFOLLOWED: nothing is known of what comes later; (time, normal, point, from a's centre to
+    b's); gap then) between two times, while they turn with those spins; shapes stand as at the second of these. limits:
 
     - slop, m
     - gap of a touch, m
@@ -89,21 +100,24 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
     convex, ends = both_convex(state, shape_a, shape_b), sub(bodies.offset[b], bodies.offset[a])
     turning = way_of_turning(bodies, a, spin_a) + way_of_turning(bodies, b, spin_b)
     way = turning * (until - since) + travel_of(path, until)
-    graze = max(GRAZE * slop, way / (TURNING_LOOKS - EXACT_LOOKS + strides))
+    graze = max(GRAZE * slop, way / (COARSE_LOOKS + strides))
     bend = 2.0 * length(path[2]) + 6.0 * length(path[3]) * until
     corners = threshold < 0.0 or (is_turned(bodies, a) and is_turned(bodies, b))  # of others, too
     poses = pose_of(state, a), pose_of(state, b)
-    touch, found, gap = (until, zero_of(state), zero_of(state), zero_of(state)), False, 0.0
+    touch, found, gap, crept, ended = (until, zero_of(state), zero_of(state), zero_of(state)), False, 0.0, 0, False
     t, least, low, high = since, 0.0, since, math.inf
-    for look in range(TURNING_LOOKS + strides):
+    for look in range(MOST_STRIDES + strides):
         turn_to(state, a, poses[0], spin_a, until, t)
         turn_to(state, b, poses[1], spin_b, until, t)
         d = add(along(path, t), sub(sub(bodies.offset[b], bodies.offset[a]), ends))
         _, depth, normal, point = evaluate(state, shape_a, a, shape_b, b, d)
         w = rate_along(path, t)
-        least = max(0.0, depth + min(grazes * graze, max(graze, MOST_SUNK * slop))) if look == 0 else least
+        if look == 0 and grazes > -math.inf:
+            sunk = depth + min(grazes * graze, max(graze, MOST_SUNK * slop))
+            least = max(0.0, depth, min(sunk, thin_along(state, a, b, normal, slop)))
         depth -= least
-        near = max(near, graze) if look == EXACT_LOOKS + strides else near
+        if crept == EXACT_LOOKS:
+            near = max(near, min(graze, thin_along(state, a, b, normal, slop)))
         fastest, touches = turning + length(w) + bend * (until - t), -depth <= near
         if touches:
             rate = 0.0
@@ -117,17 +131,24 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
         elif convex:
             fastest += max(0.0, -dot(w, normal)) - length(w)
         low = low if high <= t else t
-        if (holds or (high - low) * fastest <= near) if high < math.inf else t >= until:
+        ended = (holds or (high - low) * fastest <= near) if high < math.inf else t >= until
+        if ended:
             break
-        further = t + (max(graze, -depth) if touches else max(-depth - 0.5 * near, 0.5 * near)) / fastest
+        clear = max(-depth - 0.5 * near, 0.5 * near)
+        if touches:
+            clear = max(-depth, min(graze, thin_along(state, a, b, normal, slop)))
+        further = t + clear / fastest
+        crept += 1 if holds or further < t + stride else 0
         if not holds:
             further = min(further, t + stride) if high == math.inf else 0.5 * (low + high)
             if convex and high == math.inf:  # what is beside the other one is looked at when it may be there
                 further = max(further, t + clear_along(state, a, b, d, normal) / (fastest + abs(dot(w, normal))))
+        if not (found or ended):
+            touch = t, normal, point, d
         t = further if further < until else until
     turn_to(state, a, poses[0], spin_a, until, until)
     turn_to(state, b, poses[1], spin_b, until, until)
-    return found, touch, gap
+    return (TOUCHES if found else APART if ended else UNFOLLOWED), touch, gap
 
 
 @inlined
@@ -181,4 +202,4 @@ def first_touch_of_turn(state, dt, a, b):
     address = state.links[TURNING_TOUCH]
     found, touch, gap = call_turning_touch(address, state, a, b, path, spins, (0.0, 1.0), limits)
     share, normal, point, _ = touch
-    return found, since + left * share, gap, normal, point, start, scale(travel, share)
+    return found == TOUCHES, since + left * share, gap, normal, point, start, scale(travel, share)

@@ -177,6 +177,7 @@ def resolve_static_penetration(state, dt):
     """Put the bodies that the solver has moved, and in swept modes those that rest, out of what cannot be moved."""
     pairs, bodies = state.pairs, state.bodies
     pushed = state.solver.contacts > 0 or state.any_warm_started or (state.spinning and state.impacts.logged > 0)
+    pushed |= state.turns_too_far > 0  # it stopped, and turned on
     if not pushed or state.count == state.dynamic:
         return OK
     for turn in range(ROUNDS):

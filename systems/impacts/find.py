@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 
-from ...framework.compilation import part
+from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST, is_swept, limits_of_sweep, rest_edge, turns_far
 from ..ccd.time_of_impact import APART, AT_CORNER, TOUCHES, bounds_stay_disjoint, clear_of_rounding
+from ..ccd.turning_touch import UNFOLLOWED
 from ..integration.trajectory import (
     ROUNDING,
     along,
@@ -39,6 +40,7 @@ from ..shapes.tolerances import is_turning, slop_of, smaller_extent, turning_tra
 from .heap import heap_push
 from .impulses import (
     CROSSING,
+    HALT,
     HAND_OVER,
     IMPACT,
     NO_EVENT,
@@ -55,7 +57,7 @@ SINKS, PLASTIC_SINKS = math.inf, 1.0  # by so many grazes, up to MOST_SUNK: elas
 # at each
 MOST_PLASTIC = 1000  # impacts of a body in a step after which those beyond the cap are none any more
 
-NO_TOUCH, OVERLAPS_AT_END, FOUND_BY_SWEEP = range(3)
+NO_TOUCH, OVERLAPS_AT_END, FOUND_BY_SWEEP, UNKNOWN = range(4)
 
 
 @part
@@ -98,7 +100,8 @@ def regraze_depth(state, a, b, restitution):
 @part
 def find_touch(state, c, a, b, path, since, restitution, dt):
     """(NO_TOUCH, OVERLAPS_AT_END or FOUND_BY_SWEEP; (time, normal, point, from a's centre to b's)) of the pair's next
-    touch from a time on. What is not swept, or touches at a corner, has none unless it overlaps at the step's end."""
+    touch from a time on; UNKNOWN: none until that time, nothing is known of later. What is not swept, or touches at a
+    corner, has none unless it overlaps at the step's end."""
     impacts, bodies, zero = state.impacts, state.bodies, zero_of(state)
     swept, overlaps, end_normal, nothing = False, False, zero, (dt, zero, zero, zero)
     turning = state.spinning and is_turning(state, dt, a, b)
@@ -130,8 +133,10 @@ def find_touch(state, c, a, b, path, since, restitution, dt):
         since = clear
         if since >= dt:
             return NO_TOUCH, nothing
-    if found == APART:
+    if found == APART or (found == UNFOLLOWED and not swept):
         return NO_TOUCH, nothing
+    if found == UNFOLLOWED:
+        return UNKNOWN, (t, normal, point, apart)
     if found != AT_CORNER:
         return FOUND_BY_SWEEP if swept else OVERLAPS_AT_END, (t, normal, point, apart)
     if swept:
@@ -222,17 +227,23 @@ def correct_speed(state, a, b, touch, speed, dt):
     return min(0.0, speed + bend * (t / dt - 0.5))
 
 
+@inlined
+def are_still(state, a, b):
+    """Whether impacts move neither of the two any more in this step."""
+    count, inverse_mass = state.bodies.impact_count, state.bodies.inverse_mass
+    return (count[a] >= STOPPED or inverse_mass[a] == 0.0) and (count[b] >= STOPPED or inverse_mass[b] == 0.0)
+
+
 @part
 def kind_beyond_cap(state, a, b, path, t, speed, restitution, dt):
     """What becomes of a pair of which a body has had all the impacts it may have: HAND_OVER; IMPACT, once more, but
     without restitution, if impacts that lose energy follow each other at once; NO_EVENT, if it goes on too little."""
-    bodies = state.bodies
-    count, inverse_mass = bodies.impact_count, bodies.inverse_mass
-    still = (count[a] >= STOPPED or inverse_mass[a] == 0.0) and (count[b] >= STOPPED or inverse_mass[b] == 0.0)
-    sinks = -speed * (dt - t) > slop_of(state, a, b)
-    if still or not sinks:
+    bodies, count = state.bodies, state.bodies.impact_count
+    turning = turning_travel(state, dt - t, a, b)
+    sinks = max(-speed * (dt - t), turning) > slop_of(state, a, b)
+    if are_still(state, a, b) or not sinks:
         return NO_EVENT
-    far = travel_of(path, dt - t) > FAST * smaller_extent(bodies, a, b)
+    far = travel_of(path, dt - t) + turning > FAST * smaller_extent(bodies, a, b)
     if not (far or is_deflected(state, a) or is_deflected(state, b)):
         return NO_EVENT
     if restitution == 1.0 and is_trapped(state, a, b):
@@ -289,6 +300,10 @@ def queue_next_impact(state, c, since, dt):
         return
     found, touch = find_touch(state, c, a, b, path, since, e, dt)
     if found == NO_TOUCH:
+        return
+    if found == UNKNOWN:
+        if not passive and not are_still(state, a, b):
+            queue_event(state, c, HALT, path, touch, 0.0, 0.0)
         return
     e = restitution_at(state, a, b, (touch[2], touch[1], touch[3]))
     if e == 0.0 and not (passive or impacts.sweeps):  # nothing of what bounces elsewhere

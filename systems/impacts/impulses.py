@@ -17,12 +17,14 @@ from ..linking.parts import TURN_BY_IMPACT, call_turn_by_impact
 from ..narrow_phase.manifolds import forget_manifold
 from ..parts.rows import next_row, owner_of
 from ..shapes.dispatch import restitution_at, restitution_of
+from ..shapes.tolerances import way_of_turning
 from .turning import kinematic_normal_speed
 
 STOPPED = 1 << 30  # added to a body's impacts: it moves no more in this step, and the solver leaves it alone
 
-# Events: an impact; a crossing of what does not push; a touch from which on the solver has the two. Else: none.
-IMPACT, CROSSING, HAND_OVER, NO_EVENT = range(4)
+# Events: an impact; a crossing of what does not push; a touch from which on the solver has the two; the time after
+# which nothing is known of two that turn too far. Else: none.
+IMPACT, CROSSING, HAND_OVER, HALT, NO_EVENT = range(5)
 MOST_LOOKS = 16_000_000  # at pairs in a step, of elastic impacts too: some seconds, then what meets is stopped
 FEW_IMPACTS, TRAPPED_IMPACTS = 16, 1000  # impacts of a body in a step, one after the other with what stands still
 
@@ -243,9 +245,26 @@ def hand_over(state, event, dt):
             if not landing:  # what turns may touch again at once, whatever it slides along
                 note_trapped(state, i, True)
         return
+    stop_pair(state, c)
+
+
+@part
+def stop_pair(state, c):
+    """Both bodies of pair c stay where they are until the step ends."""
+    impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
     pairs.crossed[c] = True
     forget_manifold(pairs, c)
     for side in range(2):
-        i = a if side == 0 else b
+        i = pairs.a[c] if side == 0 else pairs.b[c]
         if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] < STOPPED:
             stop_body(state, i, impacts.now)
+
+
+@part
+def halt(state, event):
+    """Two turn so far that it is not known what they do from now on: they stop before it, and a fault says so."""
+    bodies, c = state.bodies, state.impacts.event_pair[event]
+    a, b = state.pairs.a[c], state.pairs.b[c]
+    farther = way_of_turning(bodies, a, bodies.spin[a]) >= way_of_turning(bodies, b, bodies.spin[b])
+    state.turns_too_far = 1 + (a if farther else b)
+    stop_pair(state, c)

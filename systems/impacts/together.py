@@ -18,7 +18,7 @@ from ..joints.groups import is_joined
 from ..parts.rows import owner_of
 from .group import WORK, is_affordable, is_shooting, is_turning_group, push_group, solve_group
 from .heap import heap_pop, heap_push, is_current
-from .impulses import HAND_OVER, IMPACT, bounce_pair
+from .impulses import HALT, HAND_OVER, IMPACT, bounce_pair
 from .worklist import list_landings, list_pairs_of
 
 EQUAL = 1e-6  # of the step: times that differ by more are never the same, however slow the approach
@@ -50,7 +50,7 @@ def next_at(state, now, dt):
             return -1
         if is_current(state, event):
             joined = is_joined(state, state.pairs.a[c], state.pairs.b[c])
-            if kind == HAND_OVER or joined or not is_at(state, event, now, dt):
+            if kind in (HAND_OVER, HALT) or joined or not is_at(state, event, now, dt):
                 return -1
             if kind == IMPACT:
                 if not impacts.may_sink:

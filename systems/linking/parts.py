@@ -58,7 +58,7 @@ def _touch(dimensions: int) -> Kind:
 def _turning_touch(dimensions: int) -> Signature:
     vector, i, f = floats(dimensions), INT, FLOAT
     spins, times, limits = tuple_of(*(vector,) * 2), floats(2), floats(5)
-    found = tuple_of(BOOL, _touch(dimensions), f)
+    found = tuple_of(i, _touch(dimensions), f)
     return found(record_kind(STATE, dimensions), i, i, tuple_of(*(vector,) * 4), spins, times, limits)
 
 
