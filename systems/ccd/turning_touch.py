@@ -24,7 +24,8 @@ from ..shapes.linking.convex_by_address import convex_at, rounding_by_address, s
 from ..shapes.poses import has_unequal_moments, pose_of, turn_to
 from ..shapes.tolerances import slop_of, smaller_extent, way_of_turning
 
-APART, TOUCHES, AT_CORNER, UNFOLLOWED = range(4)  # what a search finds: the last, that its looks have run out
+APART, TOUCHES, AT_CORNER, UNFOLLOWED = range(4)  # what a search finds; the last: its looks have run out
+STOPPED = 1 << 30  # added to a body's impacts: it moves no more in this step, and the solver leaves it alone
 EXACT_LOOKS, COARSE_LOOKS = 60, 190
 NEAR_EXTENTS = 1e-6  # of the extent: a smaller gap is a touch; of bodies at rest,
 TOUCH_SLOP = 0.5  # of the slop
@@ -80,6 +81,14 @@ def thin_along(state, a, b, normal, slop):
     width = reach_along(state, a, normal) + reach_along(state, a, out)
     width += reach_along(state, b, normal) + reach_along(state, b, out)
     return max(THIN * width, GRAZE * slop)
+
+
+@part
+def has_to_stop(state, a, b, threshold):
+    """Whether one of two whose way an impact search cannot follow still moves."""
+    count, inverse_mass = state.bodies.impact_count, state.bodies.inverse_mass
+    moves_a, moves_b = inverse_mass[a] > 0.0 and count[a] < STOPPED, inverse_mass[b] > 0.0 and count[b] < STOPPED
+    return state.sweeping and threshold > -math.inf and (moves_a or moves_b)
 
 
 def touch_of_turning(state, a, b, path, spins, times, limits):
@@ -148,7 +157,10 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
         t = further if further < until else until
     turn_to(state, a, poses[0], spin_a, until, until)
     turn_to(state, b, poses[1], spin_b, until, until)
-    return (TOUCHES if found else APART if ended else UNFOLLOWED), touch, gap
+    if found or ended or not has_to_stop(state, a, b, threshold):
+        return (TOUCHES if found else APART), touch, gap
+    state.turns_too_far = 1 + (a if way_of_turning(bodies, a, spin_a) > way_of_turning(bodies, b, spin_b) else b)
+    return UNFOLLOWED, touch, gap
 
 
 @inlined

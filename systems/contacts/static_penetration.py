@@ -20,7 +20,7 @@ from ..ccd.search_bounds import FAST, turns_far
 from ..ccd.turning_touch import turn_of_path
 from ..codes import OK
 from ..impacts.impulses import STOPPED
-from ..integration.trajectory import along, path_of
+from ..integration.trajectory import along, path_of, relative_path
 from ..integration.turning import turn_of_arm
 from ..joints.groups import is_joined
 from ..linking.parts import TOUCH_OF_TURN, call_touch_of_turn
@@ -75,6 +75,12 @@ def penetration_of(state, dt, c, a, b):
     allowed = (JOINED if is_joined(state, a, b) else ALLOWED) * extent
     found, depth, normal = False, 0.0, travel
     if state.spinning and turns_far(state, a, b):  # where it started says nothing of the shapes at the end
+        searched = along(relative_path(state, a, b), dt)
+        pushed = sub(d, searched)
+        if state.impacts.sweeps and length(pushed) > FAST * extent:  # no search has seen that way
+            found, gap, normal = first_touch_on_segment(state, a, b, searched, pushed, FAST * extent)
+            if found:
+                return -gap - dot(pushed, normal) - allowed, normal
         if c != NO_PAIR and depth_bound_on_path(state, c) <= allowed:  # usual
             return 0.0, normal
         depth, normal = depth_on_side_of_touch(state, dt, a, b, d)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from ...framework.compilation import inlined, part
+from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST, is_swept, limits_of_sweep, rest_edge, turns_far
@@ -133,12 +133,11 @@ def find_touch(state, c, a, b, path, since, restitution, dt):
         since = clear
         if since >= dt:
             return NO_TOUCH, nothing
-    if found == APART or (found == UNFOLLOWED and not swept):
+    if found == APART:
         return NO_TOUCH, nothing
-    if found == UNFOLLOWED:
-        return UNKNOWN, (t, normal, point, apart)
     if found != AT_CORNER:
-        return FOUND_BY_SWEEP if swept else OVERLAPS_AT_END, (t, normal, point, apart)
+        touch = t, normal, point, apart
+        return (UNKNOWN if found == UNFOLLOWED else FOUND_BY_SWEEP if swept else OVERLAPS_AT_END), touch
     if swept:
         overlaps, end_normal = overlap_at_end(state, a, b, path, dt)
         if not overlaps:
@@ -227,24 +226,16 @@ def correct_speed(state, a, b, touch, speed, dt):
     return min(0.0, speed + bend * (t / dt - 0.5))
 
 
-@inlined
-def are_still(state, a, b):
-    """Whether impacts move neither of the two any more in this step."""
-    count, inverse_mass = state.bodies.impact_count, state.bodies.inverse_mass
-    return (count[a] >= STOPPED or inverse_mass[a] == 0.0) and (count[b] >= STOPPED or inverse_mass[b] == 0.0)
-
-
 @part
 def kind_beyond_cap(state, a, b, path, t, speed, restitution, dt):
     """What becomes of a pair of which a body has had all the impacts it may have: HAND_OVER; IMPACT, once more, but
     without restitution, if impacts that lose energy follow each other at once; NO_EVENT, if it goes on too little."""
-    bodies, count = state.bodies, state.bodies.impact_count
-    turning = turning_travel(state, dt - t, a, b)
-    sinks = max(-speed * (dt - t), turning) > slop_of(state, a, b)
-    if are_still(state, a, b) or not sinks:
-        return NO_EVENT
-    far = travel_of(path, dt - t) + turning > FAST * smaller_extent(bodies, a, b)
-    if not (far or is_deflected(state, a) or is_deflected(state, b)):
+    bodies = state.bodies
+    count, inverse_mass = bodies.impact_count, bodies.inverse_mass
+    still = (count[a] >= STOPPED or inverse_mass[a] == 0.0) and (count[b] >= STOPPED or inverse_mass[b] == 0.0)
+    sinks = -speed * (dt - t) > slop_of(state, a, b)
+    far = travel_of(path, dt - t) + turning_travel(state, dt - t, a, b) > FAST * smaller_extent(bodies, a, b)
+    if still or not sinks or not (far or is_deflected(state, a) or is_deflected(state, b)):
         return NO_EVENT
     if restitution == 1.0 and is_trapped(state, a, b):
         return HAND_OVER
@@ -302,7 +293,7 @@ def queue_next_impact(state, c, since, dt):
     if found == NO_TOUCH:
         return
     if found == UNKNOWN:
-        if not passive and not are_still(state, a, b):
+        if not passive:
             queue_event(state, c, HALT, path, touch, 0.0, 0.0)
         return
     e = restitution_at(state, a, b, (touch[2], touch[1], touch[3]))

@@ -12,15 +12,13 @@ from ...framework.elementary import exp
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST
+from ..ccd.turning_touch import STOPPED
 from ..integration.trajectory import along, centre_at, path_of, rate_along
 from ..linking.parts import TURN_BY_IMPACT, call_turn_by_impact
 from ..narrow_phase.manifolds import forget_manifold
 from ..parts.rows import next_row, owner_of
 from ..shapes.dispatch import restitution_at, restitution_of
-from ..shapes.tolerances import way_of_turning
 from .turning import kinematic_normal_speed
-
-STOPPED = 1 << 30  # added to a body's impacts: it moves no more in this step, and the solver leaves it alone
 
 # Events: an impact; a crossing of what does not push; a touch from which on the solver has the two; the time after
 # which nothing is known of two that turn too far. Else: none.
@@ -227,16 +225,17 @@ def count_capped(state, a, b):
 @part
 def hand_over(state, event, dt):
     """Leave a touch to the solver. What lands loses its approach and slides along what cannot be moved, as does what is
-    caught there, until it is caught twice as often; what else is beyond the cap stays where it is."""
+    caught there, until it is caught twice as often; what else is beyond the cap, or halts, stays where it is."""
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
     c = impacts.event_pair[event]
     a, b = pairs.a[c], pairs.b[c]
     landing = is_landing(state, event)
+    halts = impacts.event_kind[event] == HALT
     if landing:
         bounce_pair(state, event, dt)
-    else:
+    elif not halts:
         count_capped(state, a, b)
-    caught = restitution_of(state, a, b) == 1.0 and is_trapped(state, a, b)
+    caught = not halts and restitution_of(state, a, b) == 1.0 and is_trapped(state, a, b)
     if landing or (caught and max(bodies.trapped_impacts[a], bodies.trapped_impacts[b]) < 2 * trapped_limit(state)):
         if bodies.inverse_mass[a] * bodies.inverse_mass[b] == 0.0:
             i = a if bodies.inverse_mass[a] > 0.0 else b
@@ -245,26 +244,9 @@ def hand_over(state, event, dt):
             if not landing:  # what turns may touch again at once, whatever it slides along
                 note_trapped(state, i, True)
         return
-    stop_pair(state, c)
-
-
-@part
-def stop_pair(state, c):
-    """Both bodies of pair c stay where they are until the step ends."""
-    impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
     pairs.crossed[c] = True
     forget_manifold(pairs, c)
     for side in range(2):
-        i = pairs.a[c] if side == 0 else pairs.b[c]
+        i = a if side == 0 else b
         if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] < STOPPED:
             stop_body(state, i, impacts.now)
-
-
-@part
-def halt(state, event):
-    """Two turn so far that it is not known what they do from now on: they stop before it, and a fault says so."""
-    bodies, c = state.bodies, state.impacts.event_pair[event]
-    a, b = state.pairs.a[c], state.pairs.b[c]
-    farther = way_of_turning(bodies, a, bodies.spin[a]) >= way_of_turning(bodies, b, bodies.spin[b])
-    state.turns_too_far = 1 + (a if farther else b)
-    stop_pair(state, c)

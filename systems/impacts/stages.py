@@ -13,7 +13,7 @@ from ..linking.parts import FIRST_TOUCH, TAKE_TOGETHER, call_take_together
 from ..narrow_phase.stages import flag_fast_bodies
 from .find import queue_next_impact
 from .heap import heap_pop, is_current
-from .impulses import CROSSING, HALT, IMPACT, STOPPED, bounce_pair, halt, hand_over, stop_body
+from .impulses import CROSSING, IMPACT, STOPPED, bounce_pair, hand_over, stop_body
 from .records import BODIES_OF_MEMBERS, EVENTS, HEADS, LOG, MEMBERS
 from .together import EQUAL, requeue
 from .worklist import list_contacts, list_landings, list_neighbours, list_pairs_of, most_listed
@@ -136,8 +136,6 @@ def take_event(state, event, dt):
             return taken
     if kind == IMPACT:
         bounce_pair(state, event, dt)
-    elif kind == HALT:
-        halt(state, event)
     else:
         hand_over(state, event, dt)
     list_neighbours(state, c, dt)

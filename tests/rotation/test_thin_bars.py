@@ -122,3 +122,20 @@ def test_what_contacts_have_turned_is_put_out_of_walls_as_it_stands_then(dt, mod
                 reach = np.hstack((abs(c), abs(s))) * h[:, :1] + np.hstack((abs(s), abs(c))) * h[:, 1:]
                 deep = (abs(world.bodies.dynamic.position) + reach).max(axis=1) - 3.0
                 assert (deep < h[:, 1]).all()
+
+
+@pytest.mark.parametrize("mode", MODES[1:])
+@pytest.mark.parametrize("spin", [1e4, 1e6])
+def test_what_spins_at_any_rate_stays_between_walls(spin, mode):
+    """Or a fault names it: of looks that would follow it 4,096 are taken."""
+    for e, friction in ((0.0, 0.5), (1.0, 0.0)):
+        with turning_world(2, 0, terrain.plugin, half_space.plugin, collision=mode, on_fault="ignore") as world:
+            for x in (-2, 2):
+                wall = AABBCollider((1.0, 9.0, 9.0)[:2], restitution=e, friction=friction)
+                world.create_entity(Transform((x, 0, 0)[:2]), RigidBody(kind="static"), wall)
+            material = {"restitution": e, "friction": friction}
+            box(world, (0, 0, 0)[:2], (0.5, 0.25), (3.0, 0, 0)[:2], spin, **material)
+            for _ in range(20):
+                world.step()
+                inside = abs(world.bodies.dynamic.position[0, 0]) < 1.0
+                assert inside or any("turns so far" in text for text in world.faults)

@@ -160,3 +160,20 @@ def beyond_wall(mode, rate, seed):
 def test_no_arrow_passes_a_thin_wall(seed, mode, rate):
     """At restitution 0 each strike turns it: about its length by the speed over its width, at some 1,000 rad/s."""
     assert beyond_wall(mode, rate, seed)[0] == 0
+
+
+@pytest.mark.parametrize("mode", MODES[1:])
+@pytest.mark.parametrize("spin", [1e4, 1e6])
+def test_what_spins_at_any_rate_stays_between_walls(spin, mode):
+    """Or a fault names it: of looks that would follow it 4,096 are taken."""
+    for e, friction in ((0.0, 0.5), (1.0, 0.0)):
+        with turning_world(3, 0, terrain.plugin, collision=mode, on_fault="ignore") as world:
+            for x in (-2, 2):
+                wall = AABBCollider((1.0, 9.0, 9.0)[:3], restitution=e, friction=friction)
+                world.create_entity(Transform((x, 0, 0)[:3]), RigidBody(kind="static"), wall)
+            material = {"restitution": e, "friction": friction}
+            box(world, (0, 0, 0)[:3], (0.5, 0.25, 0.25), (3.0, 0, 0)[:3], np.array((0.3, 0.2, 1.0)) * spin, **material)
+            for _ in range(20):
+                world.step()
+                inside = abs(world.bodies.dynamic.position[0, 0]) < 1.0
+                assert inside or any("turns so far" in text for text in world.faults)
