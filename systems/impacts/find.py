@@ -233,8 +233,9 @@ def kind_beyond_cap(state, a, b, path, t, speed, restitution, dt):
     bodies = state.bodies
     count, inverse_mass = bodies.impact_count, bodies.inverse_mass
     still = (count[a] >= STOPPED or inverse_mass[a] == 0.0) and (count[b] >= STOPPED or inverse_mass[b] == 0.0)
-    sinks = -speed * (dt - t) > slop_of(state, a, b)
-    far = travel_of(path, dt - t) + turning_travel(state, dt - t, a, b) > FAST * smaller_extent(bodies, a, b)
+    turning = turning_travel(state, dt - t, a, b)  # brings in other points than the one that closes so slowly
+    sinks = turning - speed * (dt - t) > slop_of(state, a, b)
+    far = turning + travel_of(path, dt - t) > FAST * smaller_extent(bodies, a, b)
     if still or not sinks or not (far or is_deflected(state, a) or is_deflected(state, b)):
         return NO_EVENT
     if restitution == 1.0 and is_trapped(state, a, b):
