@@ -145,7 +145,8 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
             break
         clear = max(-depth - 0.5 * near, 0.5 * near)
         if touches:
-            clear = max(-depth, min(graze, thin_along(state, a, b, normal, slop)))
+            inwards = thin_along(state, a, b, normal, slop) - (depth + least)  # what follows each other adds up
+            clear = max(-depth, GRAZE * slop, min(graze, inwards))
         further = t + clear / fastest
         crept += 1 if holds or further < t + stride else 0
         if not holds:
