@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 
 from ....framework.compilation import inlined, part
-from ....framework.jit.records.schema import Schema, vectors
+from ....framework.jit.records.schema import Schema, floats, vectors
 from ....framework.jit.records.stack_record import stack_record
 from ....framework.vectors import add, add_scaled, dot, item, replace, scale, sub
 from ...integration.turning import cross_spin, symmetric, twist
 from .records import ROW_CHUNK
 
-FEW_ROWS = 6  # rows of a chunk: fewer are as fast one by one, with the same bits
+SEVERAL = 1.0 + 1e-9  # times the masses that two points of a pair move: they are solved at once even if they are one
 
 # What the rows of a chunk need of the bodies of its pairs.
 CHUNK = Schema(
@@ -26,6 +26,8 @@ CHUNK = Schema(
     velocity_b=vectors(apart=True, unit="m/s"),
     spin_a=vectors(apart=True, flat=1, unit="rad/s"),
     spin_b=vectors(apart=True, flat=1, unit="rad/s"),
+    impulse=floats(unit="N s"),  # at two points
+    other=floats(unit="N s"),
 )
 make_chunk = stack_record(CHUNK, ROW_CHUNK)
 
@@ -40,17 +42,11 @@ def find_chunks(solver, span):
     solver.end_chunk = c
 
 
-@inlined
-def has_chunks(solver, span):
-    """Whether the chunks of a range have many rows."""
-    return (solver.end_chunk - solver.first_chunk) * FEW_ROWS < span[1] - span[0]
-
-
 @part
 def load_masses(solver, span):
-    """The masses of the bodies of the pairs of a range, where its rows are solved by chunks."""
+    """The masses of the bodies of the pairs of a range."""
     start = span[0]
-    for c in range(solver.first_chunk, solver.end_chunk if has_chunks(solver, span) else solver.first_chunk):
+    for c in range(solver.first_chunk, solver.end_chunk):
         for k in range(start, start + (solver.ends[c] - start) // solver.points[c]):
             a, b = solver.first[k], solver.second[k]
             solver.mass_a[k], solver.mass_b[k] = solver.inverse_mass[a], solver.inverse_mass[b]
@@ -88,9 +84,9 @@ def chunk_motion(chunk, q):
 
 
 @inlined
-def keep_motion(chunk, q, motion):
-    """They change to these."""
-    chunk.velocity_a[q], chunk.spin_a[q], chunk.velocity_b[q], chunk.spin_b[q] = motion
+def store_motion(chunk, q, motion):
+    v_a, s_a, v_b, s_b = motion
+    chunk.velocity_a[q], chunk.spin_a[q], chunk.velocity_b[q], chunk.spin_b[q] = v_a, s_a, v_b, s_b
 
 
 @inlined
@@ -124,27 +120,97 @@ def pull_in_chunk(old, slip, normal, mass, limit):
     return scale(pull, limit / math.sqrt(square) if square > limit * limit else 1.0)
 
 
-@part
-def solve_rows(solver, chunk, bias, pushes, start, pairs, ahead):
-    """The rows of one point of the pairs of a chunk, ``ahead`` of those of the first one, without a branch for single
-    ones: along their normals, then along their surfaces. In two loops less waits for what is before it."""
+@inlined
+def point_at(solver, one, k, motion, bias, pushes):
+    """Of row k of the pair whose first row is ``one``: (normal, what an impulse of 1 along it twists of each body, how
+    that changes their spins, 1 / kg that it moves, what a soft row keeps, how much faster than it may it closes)."""
+    n, (v_a, s_a, v_b, s_b), keep = solver.normal[k], motion, 1.0
+    t_a, t_b = twist(solver.arm_a[k], n), twist(solver.arm_b[k], n)
+    x_a = symmetric(solver.inertia_a[one], solver.products_a[one], t_a)
+    x_b = symmetric(solver.inertia_b[one], solver.products_b[one], t_b)
+    own = SEVERAL * (solver.mass_a[one] + solver.mass_b[one] + (dot(t_a, x_a) + dot(t_b, x_b)))
+    excess = dot(sub(v_a, v_b), n) + (dot(s_a, t_a) - dot(s_b, t_b)) - bias[k]
+    if pushes:  # a soft row gives a share of its impulse back: all of its equation times what it keeps
+        keep = 1.0 - solver.soft[k]
+        excess = keep * excess - solver.soft[k] * own * solver.impulse[k]
+    return n, t_a, t_b, x_a, x_b, own, keep, excess
+
+
+@inlined
+def rub_at(solver, one, k, impulse, motion):
+    """The motion after the impulse along the surface at row k, which has that along its normal, of the pair whose first
+    row is ``one``."""
+    n, arm_a, arm_b, tangent = solver.normal[k], solver.arm_a[k], solver.arm_b[k], solver.tangent[k]
+    slip = parting_at(motion, arm_a, arm_b)
+    pull = pull_in_chunk(tangent, slip, n, solver.tangent_mass[k], solver.friction[k] * impulse)
+    solver.tangent[k] = pull
+    return pushed(solver, one, motion, arm_a, arm_b, sub(pull, tangent))
+
+
+@inlined
+def solve_two(solver, one, k, m, motion, bias, pushes):
+    """(motion, impulses) after two points k and m of the pair whose first row is ``one`` have been solved along their
+    normals both at once, so that neither is the first: what falls flat stays so.
+
+    With impulses p, q the points may close no faster than they may, and do so as fast where they push: of the four
+    cases, each of the two pushes or not, one is right.
+    """
+    n, t_a, t_b, x_a, x_b, own, keep, e = point_at(solver, one, k, motion, bias, pushes)
+    o, _, _, y_a, y_b, other, keeps, f = point_at(solver, one, m, motion, bias, pushes)
+    w_a, w_b, old, before = solver.mass_a[one], solver.mass_b[one], solver.impulse[k], solver.impulse[m]
+    mixed = (w_a + w_b) * dot(n, o) + (dot(t_a, y_a) + dot(t_b, y_b))
+    on_first, on_second = keep * mixed, keeps * mixed
+    share = 1.0 / (own * other - on_first * on_second)
+    p, q = old + share * (other * e - on_first * f), before + share * (own * f - on_second * e)
+    alone, single = old + solver.mass[k] * (e + on_first * before), before + solver.mass[m] * (f + on_second * old)
+    alone, single = alone if alone > 0.0 else 0.0, single if single > 0.0 else 0.0
+    if_first, if_second = 0.0 if q > 0.0 else alone, 0.0 if p > 0.0 else single
+    both = (p > 0.0) & (q > 0.0)
+    p, q = p if both else if_first, q if both else if_second
+    more, less, (v_a, s_a, v_b, s_b) = p - old, q - before, motion
+    push = add(scale(n, more), scale(o, less))
+    s_a, s_b = sub(s_a, add(scale(x_a, more), scale(y_a, less))), add(s_b, add(scale(x_b, more), scale(y_b, less)))
+    return (add_scaled(v_a, push, -w_a), s_a, add_scaled(v_b, push, w_b), s_b), p, q
+
+
+@inlined
+def solve_one(solver, one, motion, bias, pushes):
+    """The only point of a pair, along its normal, then along its surface."""
+    n, arm_a, arm_b, old = solver.normal[one], solver.arm_a[one], solver.arm_b[one], solver.impulse[one]
+    excess = solver.mass[one] * (-dot(parting_at(motion, arm_a, arm_b), n) - bias[one])
+    if pushes:
+        excess -= solver.soft[one] * (excess + old)
+    new = old + excess if old + excess > 0.0 else 0.0
+    solver.impulse[one] = new
+    return rub_at(solver, one, one, new, pushed(solver, one, motion, arm_a, arm_b, scale(n, new - old)))
+
+
+@inlined
+def rub_rows(solver, chunk, impulses, start, first, pairs):
+    """The rows of one point of the pairs of a chunk along their surfaces."""
     for q in range(pairs):
-        k = start + q + ahead
-        n, arm_a, arm_b, motion = solver.normal[k], solver.arm_a[k], solver.arm_b[k], chunk_motion(chunk, q)
-        old = solver.impulse[k]
-        excess = solver.mass[k] * (-dot(parting_at(motion, arm_a, arm_b), n) - bias[k])
-        if pushes:
-            excess -= solver.soft[k] * (excess + old)
-        new = old + excess if old + excess > 0.0 else 0.0
-        solver.impulse[k] = new
-        keep_motion(chunk, q, pushed(solver, start + q, motion, arm_a, arm_b, scale(n, new - old)))
-    for q in range(pairs if solver.has_friction else 0):
-        k = start + q + ahead
-        arm_a, arm_b, old, motion = solver.arm_a[k], solver.arm_b[k], solver.tangent[k], chunk_motion(chunk, q)
-        slip, limit = parting_at(motion, arm_a, arm_b), solver.friction[k] * solver.impulse[k]
-        pull = pull_in_chunk(old, slip, solver.normal[k], solver.tangent_mass[k], limit)
-        solver.tangent[k] = pull
-        keep_motion(chunk, q, pushed(solver, start + q, motion, arm_a, arm_b, sub(pull, old)))
+        impulse = impulses[q]
+        solver.impulse[first + q] = impulse
+        store_motion(chunk, q, rub_at(solver, start + q, first + q, impulse, chunk_motion(chunk, q)))
+
+
+@part
+def solve_rows(solver, chunk, bias, pushes, start, pairs, points):
+    """The rows of the pairs of a chunk, without a branch for single ones; of four points those across first, as on
+    two of them what lies flat is in balance."""
+    if points == 1:
+        for q in range(pairs):
+            store_motion(chunk, q, solve_one(solver, start + q, chunk_motion(chunk, q), bias, pushes))
+    for e in range(points // 2):
+        first, second = start + e * pairs, start + (e + points // 2) * pairs
+        for q in range(pairs):  # it stores nothing where it reads: else no two pairs would be solved together
+            motion = chunk_motion(chunk, q)
+            motion, chunk.impulse[q], chunk.other[q] = solve_two(
+                solver, start + q, first + q, second + q, motion, bias, pushes
+            )
+            store_motion(chunk, q, motion)
+        rub_rows(solver, chunk, chunk.impulse, start, first, pairs)
+        rub_rows(solver, chunk, chunk.other, start, second, pairs)
 
 
 @part
@@ -155,7 +221,6 @@ def solve_chunks(solver, bias, pushes, span):
         points = solver.points[c]
         pairs = (solver.ends[c] - start) // points
         gather_motion(solver, chunk, start, pairs)
-        for e in range(points):
-            solve_rows(solver, chunk, bias, pushes, start, pairs, e * pairs)
+        solve_rows(solver, chunk, bias, pushes, start, pairs, points)
         scatter_motion(solver, chunk, start, pairs)
         start = solver.ends[c]

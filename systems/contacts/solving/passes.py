@@ -7,7 +7,7 @@ import math
 from ....framework.compilation import part
 from ....framework.vectors import length
 from ..constants import CONVERGED_SHARE, CONVERGED_SPEED, FRICTION_OVERRELAXATION, ISLAND_WORK, MOST_PASSES
-from .chunks import has_chunks, solve_chunks
+from .chunks import solve_chunks
 from .rows import closing_speed, relax_listed, solve_friction, solve_normals, solve_rolling
 
 
@@ -16,7 +16,7 @@ def solve_pass(solver, bias, pushes, over, span, arms):
     """One pass over the rows of a range, normals and friction. over: see FRICTION_OVERRELAXATION."""
     if len(arms) > 0 and solver.has_rolling:
         solve_rolling(solver, span)
-    if len(arms) > 0 and has_chunks(solver, span) and not solver.surfaces_run:
+    if len(arms) > 0 and not solver.surfaces_run:
         solve_chunks(solver, bias, pushes, span)
     else:
         solve_normals(solver, bias, pushes, span, arms)
