@@ -13,7 +13,7 @@ from ..framework.elementary import atan2, cos, sin, sines_and_cosines
 from ..framework.typing import ArrayField
 from ..framework.vectors import dot, row, scale
 from .capsule import CapsuleCollider
-from .corners import along_axes, bounds_of, edge_of, in_world, support_of
+from .corners import along_axes, bounds_of, in_world, support_of
 from .polygon_pairs import meet_by_edges
 from .rotation.box import BoxCollider
 from .rotation.box_pairs import level
@@ -116,10 +116,6 @@ class ConvexPolygonCollider(Collider):
     @staticmethod
     def rounding(shape):
         return shape.corner_radius
-
-    @staticmethod
-    def edge(shape, direction):
-        return edge_of(shape.vertices, shape, direction)
 
     @staticmethod
     def outline(shape, dimensions):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..framework.compilation import inlined
-from ..framework.vectors import absolute, add_scaled, dot, item, replace, row, scale, sub
+from ..framework.vectors import absolute, add_scaled, dot, item, replace, row, scale
 
 
 @inlined
@@ -27,37 +27,14 @@ def in_world(shape, vector):
 
 
 @inlined
-def farthest_of(corners, first, along):
-    """The row, from ``first`` on, of the corner that lies farthest in a direction, which is given along the axes."""
-    farthest, at = -math.inf, first
-    for k in range(first, len(corners)):
-        reach = dot(row(corners, k, along), along)
-        if reach > farthest:
-            farthest, at = reach, k
-    return at
-
-
-@inlined
 def support_of(corners, first, shape, direction):
     """The corner, from row ``first`` on, that lies farthest in a direction."""
-    at = farthest_of(corners, first, along_axes(shape, direction))
+    along, farthest, at = along_axes(shape, direction), -math.inf, first
+    for k in range(first, len(corners)):
+        reach = dot(row(corners, k, direction), along)
+        if reach > farthest:
+            farthest, at = reach, k
     return in_world(shape, row(corners, at, direction))
-
-
-@inlined
-def edge_of(corners, shape, direction):
-    """In a plane both ends of the edge that looks most in a direction, of corners that run counter-clockwise."""
-    along = along_axes(shape, direction)
-    at = farthest_of(corners, 0, along)
-    here = row(corners, at, along)
-    before = row(corners, (at if at > 0 else len(corners)) - 1, along)
-    after = row(corners, at + 1 if at + 1 < len(corners) else 0, along)
-    left, right = sub(after, here), sub(here, before)
-    ahead = along[0] * left[1] - along[1] * left[0]
-    behind = along[0] * right[1] - along[1] * right[0]
-    if ahead * math.sqrt(dot(right, right)) >= behind * math.sqrt(dot(left, left)):
-        return in_world(shape, here), in_world(shape, after)
-    return in_world(shape, before), in_world(shape, here)
 
 
 @inlined

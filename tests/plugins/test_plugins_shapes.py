@@ -14,7 +14,6 @@ from carom.framework import Plugin, PluginError, World, array_column
 from carom.framework.plugins.laws import edge_laws
 from carom.plugins import Physics
 from carom.plugins.capsule import CapsuleCollider
-from carom.plugins.convex_polygon import ConvexPolygonCollider
 from carom.plugins.rotation import BoxCollider
 from carom.systems.shapes.convex.edges import edge_towards
 
@@ -123,7 +122,7 @@ def test_queries_know_shapes_with_arrays():
     assert hit.distance == pytest.approx(7.0)
 
 
-@pytest.mark.parametrize("kind", [AABBCollider, BoxCollider, CapsuleCollider, ConvexPolygonCollider])
+@pytest.mark.parametrize("kind", [AABBCollider, BoxCollider, CapsuleCollider])
 def test_edges_that_shapes_tell_are_those_that_their_support_finds(kind):
     random, found = np.random.default_rng(60), 0
     for _ in range(300):
@@ -131,8 +130,7 @@ def test_edges_that_shapes_tell_are_those_that_their_support_finds(kind):
         axes = ((1.0, 0.0), (0.0, 1.0))
         if kind is not AABBCollider:
             axes = (math.cos(angle), math.sin(angle)), (-math.sin(angle), math.cos(angle))
-        corners = ConvexPolygonCollider.regular(int(random.integers(3, 9)), x).vertices + y * random.uniform(-1, 1, 2)
-        shape = SimpleNamespace(half_extents=(x, y), half_height=x, vertices=corners, axes=axes)
+        shape = SimpleNamespace(half_extents=(x, y), half_height=x, axes=axes)
         look = np.array((math.cos(2.0 * angle), math.sin(2.0 * angle)))
         edge = kind.edge(shape, tuple(look))
 
