@@ -114,7 +114,7 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
     corners = threshold < 0.0 or (is_turned(bodies, a) and is_turned(bodies, b))  # of others, too
     poses = pose_of(state, a), pose_of(state, b)
     touch, found, gap, crept, ended = (until, zero_of(state), zero_of(state), zero_of(state)), False, 0.0, 0, False
-    t, least, low, high = since, 0.0, since, math.inf
+    t, least, begun, low, high = since, 0.0, 0.0, since, math.inf
     for look in range(MOST_STRIDES + strides):
         turn_to(state, a, poses[0], spin_a, until, t)
         turn_to(state, b, poses[1], spin_b, until, t)
@@ -124,6 +124,8 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
         if look == 0 and grazes > -math.inf:
             sunk = depth + min(grazes * graze, max(graze, MOST_SUNK * slop))
             least = max(0.0, depth, min(sunk, thin_along(state, a, b, normal, slop)))
+        if look == 0 and not 0.0 < grazes < math.inf:  # else it has sunk in by plastic impacts, which add up
+            begun = max(0.0, depth)
         depth -= least
         if crept == EXACT_LOOKS:
             near = max(near, min(graze, thin_along(state, a, b, normal, slop)))
@@ -145,7 +147,7 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
             break
         clear = max(-depth - 0.5 * near, 0.5 * near)
         if touches:
-            inwards = thin_along(state, a, b, normal, slop) - (depth + least)  # what follows each other adds up
+            inwards = thin_along(state, a, b, normal, slop) - (depth + least - begun)
             clear = max(-depth, GRAZE * slop, min(graze, inwards))
         further = t + clear / fastest
         crept += 1 if holds or further < t + stride else 0
