@@ -158,7 +158,8 @@ def beyond_wall(mode, rate, seed):
 @pytest.mark.parametrize("mode", MODES[1:])
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.long) for k in range(1, 12))])
 def test_no_arrow_passes_a_thin_wall(seed, mode, rate):
-    """At restitution 0 each strike turns it: about its length by the speed over its width, at some 1,000 rad/s."""
+    """At restitution 0 each strike turns it: about its length by the speed over its width, at some 1,000 rad/s. Missed:
+    one of fifty in seeds 6 and 8 at 60 Hz, 9 and 11 at 20 Hz."""
     assert beyond_wall(mode, rate, seed)[0] == 0
 
 
