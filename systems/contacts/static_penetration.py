@@ -77,7 +77,8 @@ def penetration_of(state, dt, c, a, b):
     if state.spinning and turns_far(state, a, b):  # where it started says nothing of the shapes at the end
         searched = along(relative_path(state, a, b), dt)
         pushed = sub(d, searched)
-        if state.impacts.sweeps and length(pushed) > FAST * extent:  # no search has seen that way
+        unseen = state.impacts.sweeps and max(a, b) >= state.moving  # by searches; what turns by itself sweeps it up
+        if unseen and length(pushed) > FAST * extent:
             found, gap, normal = first_touch_on_segment(state, a, b, searched, pushed, FAST * extent)
             if found:
                 return -gap - dot(pushed, normal) - allowed, normal

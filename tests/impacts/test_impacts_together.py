@@ -132,9 +132,11 @@ def test_groups_take_no_more_work_than_a_step_has():
         for place, velocity in zip(random.uniform(-2, 2, (400, 2)), random.uniform(-9, 9, (400, 2)), strict=True):
             kit.ball(world, place, velocity, radius=0.5, restitution=1.0)
         momentum = world.bodies.linear_velocity.sum(axis=0)
+        visits = []
         for _ in range(3):
             world.step()
-            assert 0 < world.physics.state.impacts.group_visits <= WORK
+            visits.append(world.physics.state.impacts.group_visits)
+        assert 0 < visits[0] and max(visits) <= WORK  # a group that is too large is solved one after the other
         np.testing.assert_allclose(world.bodies.linear_velocity.sum(axis=0), momentum, rtol=0, atol=1e-9)
 
 

@@ -121,7 +121,7 @@ def pull_in_chunk(old, slip, normal, mass, limit):
 
 
 @inlined
-def point_at(solver, one, k, motion, bias, pushes):
+def terms_at(solver, one, k, motion, bias, pushes):
     """Of row k of the pair whose first row is ``one``: (normal, what an impulse of 1 along it twists of each body, how
     that changes their spins, 1 / kg that it moves, what a soft row keeps, how much faster than it may it closes)."""
     n, (v_a, s_a, v_b, s_b), keep = solver.normal[k], motion, 1.0
@@ -155,8 +155,8 @@ def solve_two(solver, one, k, m, motion, bias, pushes):
     With impulses p, q the points may close no faster than they may, and do so as fast where they push: of the four
     cases, each of the two pushes or not, one is right.
     """
-    n, t_a, t_b, x_a, x_b, own, keep, e = point_at(solver, one, k, motion, bias, pushes)
-    o, _, _, y_a, y_b, other, keeps, f = point_at(solver, one, m, motion, bias, pushes)
+    n, t_a, t_b, x_a, x_b, own, keep, e = terms_at(solver, one, k, motion, bias, pushes)
+    o, _, _, y_a, y_b, other, keeps, f = terms_at(solver, one, m, motion, bias, pushes)
     w_a, w_b, old, before = solver.mass_a[one], solver.mass_b[one], solver.impulse[k], solver.impulse[m]
     mixed = (w_a + w_b) * dot(n, o) + (dot(t_a, y_a) + dot(t_b, y_b))
     on_first, on_second = keep * mixed, keeps * mixed

@@ -14,7 +14,7 @@ from ...codes import OK
 from ...parts.rows import owner_of
 from ...parts.stages import copy_prediction_to_parts
 from ...records import CURVES, PREDICTED
-from .warm_start import find_rows, skip_before
+from .warm_start import find_rows, scale_to, skip_before
 
 
 @part
@@ -88,6 +88,7 @@ def predict_rest(state, dt):
     if not may_support(state):
         return OK
     find_rows(state)
+    scale_to(state, dt)
     state.any_warm_started = True
     state.force_travels = 0.5 if state.path_degree > 1 else (0.0 if state.moves_with_old_velocity else 1.0)
     mark_disabled(state)

@@ -48,6 +48,7 @@ SOLVER = Schema(
     had_impulse=flags(),  # it has pushed in this step
     wrong=flags(),  # its speed is far from what it asks
     soft=floats(unit="1"),  # share of its impulse that it gives back in the pass that pushes
+    fixed=flags(),  # it has several points, and one of its bodies cannot be moved
     hard=flags(),
     any_hard=flag(),
     has_friction=flag(),

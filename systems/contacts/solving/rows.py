@@ -148,11 +148,13 @@ def excess_speed(solver, k, arms):
 def update_targets(solver, k, arms, asks):
     """What row k asks, see ``measure``, without a branch; returns whether its speed is far from that.
 
-    asks: (s in which it may close, of a substep, of a step, spring, stiff).
+    asks: (s in which it may close, of a substep, of a step, springs, stiff).
     """
-    ahead, h, dt, (softness, bias_rate), stiff = asks
+    ahead, h, dt, springs, stiff = asks
     room, closing, impulse = separation(solver, k, arms), closing_speed(solver, k, arms), solver.impulse[k]
     extent, hard = solver.extent[k], solver.hard[k]
+    softness = springs[1][0] if solver.fixed[k] else springs[0][0]
+    bias_rate = springs[1][1] if solver.fixed[k] else springs[0][1]
     opening = (room if room > 0.0 else 0.0) / ahead
     deep = -(FULL_PUSH_OVERLAP * extent + solver.loaded[k])
     at_once = room / (h * bias_rate)

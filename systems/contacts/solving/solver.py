@@ -25,6 +25,7 @@ from ..constants import (
     REFINED_PASSES,
     RELAX_PASSES,
     REPORTED_GAIN,
+    STATIC_STIFFNESS,
     TURNING_RELAX_PASSES,
 )  # fmt: skip
 from .chunks import find_chunks, load_masses
@@ -46,14 +47,14 @@ from .turning import integrate_rotation_of_joined
 
 
 @part
-def measure(solver, h, spring, dt, stiff, ends, span, arms):
+def measure(solver, h, springs, dt, stiff, ends, span, arms):
     """What each row asks of the speed along its normal, from where the bodies are now.
 
     opening: at most closing what is open within a substep, or, in the one that ``ends`` the step, within a usual one;
     pushing: in the pass that pushes, overlap is to open as well, softly where ``soft`` says so. Islands are ``struck``
     where the speed of some row is far from what the relaxing passes are to make of it; returns whether any is.
     """
-    asks = dt / solver.usual if ends else h, h, dt, spring, stiff
+    asks = dt / solver.usual if ends else h, h, dt, springs, stiff
     any_struck, islands = False, islands_of(solver, span)
     for t in range(islands[0], islands[1]):
         solver.struck[t] = False
@@ -130,8 +131,8 @@ def rule_of(solver, s, arms):
 
 
 @part
-def solve_substep(solver, spring, times, rule, ends, span, arms):
-    """One substep of a range. spring: see ``contact_spring``; times: s, of a substep and of the step."""
+def solve_substep(solver, springs, times, rule, ends, span, arms):
+    """One substep of a range. springs: see ``contact_spring``; times: s, of a substep and of the step."""
     (h, dt), (_, passes, last, stiff), start, stop = times, rule, span[0], span[1]
     apply_forces(solver, h, span, arms)
     apply_warm_start(solver, span, arms)
@@ -145,7 +146,7 @@ def solve_substep(solver, spring, times, rule, ends, span, arms):
     integrate_positions(solver, h, span, arms)
     if solver.lightened:
         restore_mass(solver, h, span, arms)
-    any_struck = measure(solver, h, spring, dt, stiff, ends, span, arms)
+    any_struck = measure(solver, h, springs, dt, stiff, ends, span, arms)
     if ends and solver.any_hard:
         defer_open_contacts(solver, h, span, arms)
     if len(arms) > 1:  # once: more often, chains give way more
@@ -153,7 +154,7 @@ def solve_substep(solver, spring, times, rule, ends, span, arms):
     solve_passes(solver, False, last if ends else passes, stiff, h, span, arms)
     if len(arms) > 1 and solver.direct.begin < solver.direct.end and start < stop:
         solve_direct(solver, False)
-    finish_substep(solver, spring[1], any_struck, h, dt, span, arms)
+    finish_substep(solver, springs[0][1], any_struck, h, dt, span, arms)
     if solver.lightened:
         restore_mass(solver, 0.0, span, arms)
     for k in range(start, stop):
@@ -204,13 +205,13 @@ def scale_impulses(solver, by, span):
 
 
 @part
-def contact_spring(solver, substeps, h):
+def contact_spring(solver, stiffer, substeps, h):
     """(share of its impulse that a soft row gives back, speed per overlap at which it is pushed out).
 
     Where there are more substeps than usual springs are damped by as much more: for the heavy bodies that they bear,
     and so that overlap is pushed out at the usual rate.
     """
-    omega = 2.0 * math.pi * solver.frequency / h
+    omega = 2.0 * math.pi * stiffer * solver.frequency / h
     damping = 2.0 * DAMPING_RATIO * substeps / solver.usual + h * omega
     return 1.0 / (1.0 + h * omega * damping), omega / damping
 
@@ -221,24 +222,24 @@ def solve_range(solver, s, dt, span, arms):
     rule, special = rule_of(solver, s, arms), s > 0
     substeps, _, _, stiff = rule
     h = dt / substeps
-    spring = contact_spring(solver, substeps, h)
+    springs = contact_spring(solver, 1.0, substeps, h), contact_spring(solver, STATIC_STIFFNESS, substeps, h)
     open_all(solver, span, arms)
     if len(arms) > 0:
         find_chunks(solver, span)
         load_masses(solver, span)
     scale_impulses(solver, 1.0 / substeps, span)
-    sag_of = 1.0 / (2.0 * math.pi * solver.frequency) ** 2  # see SAG
+    turn = 2.0 * math.pi * solver.frequency
     for k in range(span[0], span[1]):
-        sag = sag_of * solver.impulse[k] * h / solver.mass[k]
+        sag = solver.impulse[k] * h / (turn * turn * solver.mass[k])
         solver.loaded[k] = 0.0 if stiff else min(sag, LOAD_SAG_MAX * solver.extent[k])
     if len(arms) > 1:
         start_joints(solver, h, dt / solver.usual)
-    measure(solver, h, spring, dt, stiff, False, span, arms)
+    measure(solver, h, springs, dt, stiff, False, span, arms)
     for step in range(substeps):
         left = substeps - 1 - step
         if special:
             note_impulses(solver, span)
-        solve_substep(solver, spring, (h, dt), rule, left == 0, span, arms)
+        solve_substep(solver, springs, (h, dt), rule, left == 0, span, arms)
         if special and left > 0 and is_still(solver, dt, span, arms):
             repeat_substep(solver, left, h, span, arms)
             break
