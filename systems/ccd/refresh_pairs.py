@@ -102,6 +102,7 @@ def merge_pairs(state, dt):
     """Join two lists in canonical order: candidates whose layers meet, and the pairs that something has come of. New
     candidates are searched for impacts."""
     candidates, old, new, rank = state.candidates, state.pairs, state.merged, state.bodies.rank
+    impacts = state.impacts
     mark_kept(state)
     new.disabled_count = old.disabled_count
     if state.ranks_version != state.version:
@@ -127,11 +128,11 @@ def merge_pairs(state, dt):
         i += 1
         if layers_meet(state, a, b):
             add_pair(state, a, b, found, dt)
-            list_pair(state.impacts, found, state.impacts.until)
+            list_pair(impacts, found, impacts.until)
             found += 1
     new.count = found
     renumber(state)
     keep_events(state)
-    state.impacts.linked, state.impacts.touchdown_pair, state.impacts.touchdown_time = False, -1, 0.0
+    impacts.linked, impacts.touchdown_pair, impacts.touchdown_time = False, -1, 0.0
     state.refreshes_counted += 1
     return OK

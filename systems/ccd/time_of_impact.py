@@ -73,9 +73,10 @@ def first_touch(state, a, b, path, since, until, limits):
     limits: (slop; stride, seconds between looks at concave shapes; approach speed below which these have no touch; by
     how many grazes what turns has to sink in, see touch_of_turning).
     """
-    shape_a, shape_b = state.bodies.shape[a], state.bodies.shape[b]
+    bodies = state.bodies
+    shape_a, shape_b = bodies.shape[a], bodies.shape[b]
     if state.spinning and is_turning(state, until, a, b):
-        spins, near = (state.bodies.spin[a], state.bodies.spin[b]), NEAR_EXTENTS * smaller_extent(state.bodies, a, b)
+        spins, near = (bodies.spin[a], bodies.spin[b]), NEAR_EXTENTS * smaller_extent(bodies, a, b)
         near_limits = limits[0], near, limits[2], limits[3], SHORTER * limits[1]
         address, times = state.links[TURNING_TOUCH], (since, until)
         found, (t, normal, point, at), _ = call_turning_touch(address, state, a, b, path, spins, times, near_limits)
@@ -96,8 +97,8 @@ def first_touch(state, a, b, path, since, until, limits):
     found, t, normal, point, at = advance_conservatively(
         state, a, b, path, (straight, known), (since, t), until, limits[0]
     )
-    if state.spinning and found == TOUCHES and (is_turned(state.bodies, a) or is_turned(state.bodies, b)):
-        near = NEAR_EXTENTS * smaller_extent(state.bodies, a, b)
+    if state.spinning and found == TOUCHES and (is_turned(bodies, a) or is_turned(bodies, b)):
+        near = NEAR_EXTENTS * smaller_extent(bodies, a, b)
         address, met = state.links[CLOSING_POINT], (0.0, normal, point)
         _, point = call_closing_point(address, state, a, b, at, met, near, rate_along(path, t))
     return found, t, normal, point, at

@@ -173,8 +173,8 @@ def put_back(state, dt):
         k = solver.slot[r]
         pairs.impulse[solver.pair[r]] += solver.total[k]
         if solver.had_impulse[k]:
-            bodies.held[solver.body_row[solver.first[k]]] = True
-            bodies.held[solver.body_row[solver.second[k]]] = True
+            for q in (solver.first[k], solver.second[k]):
+                bodies.held[solver.body_row[q]] = True
     for e in range(joints.active):
         j = joints.order[e]
         for i in (joints.row_a[j], joints.row_b[j]):

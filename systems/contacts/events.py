@@ -258,7 +258,7 @@ class ContactEvents(StagedSystem):
             contacts.enabled[contacts.now, : len(enabled)] = enabled
 
     def report_faults(self, dt: float) -> None:
-        """Note what has gone wrong in the step."""
+        """Note what has gone wrong in the step of ``dt``, s."""
         state, impacts, solver = self._state, self._impacts, self._state.solver
         entity = state.bodies.entity
         if state.too_fast_for_discrete:

@@ -96,8 +96,9 @@ def is_affordable(impacts, count):
 def solve_group(state, count):
     """Find the impulses of a group's impacts, into ``ahead``; returns whether there are such."""
     impacts, pairs, inverse_mass = state.impacts, state.pairs, state.bodies.inverse_mass
+    group, ahead, share = impacts.group, impacts.ahead, impacts.share
     for g in range(count):
-        m = impacts.group[g]
+        m = group[g]
         c = impacts.event_pair[impacts.member[m]]
         a, b, heavy = owner_of(state, pairs.a[c]), owner_of(state, pairs.b[c]), 0.0
         if inverse_mass[a] > 0.0:
@@ -105,7 +106,7 @@ def solve_group(state, count):
         if inverse_mass[b] > 0.0:
             heavy += inverse_mass[b] * count_coupled(state, m, b)
         impacts.weight[m] = 1.0 / heavy
-        impacts.share[m] = impacts.ahead[m] = 0.0
+        share[m] = ahead[m] = 0.0
     inertia = 1.0
     for _ in range(min(PASSES, (WORK - impacts.group_visits) // count)):
         impacts.group_visits += count
@@ -116,12 +117,12 @@ def solve_group(state, count):
         inertia = 1.0 if back else inertia
         following = 0.5 * (1.0 + math.sqrt(1.0 + 4.0 * inertia * inertia))
         for g in range(count):
-            m = impacts.group[g]
+            m = group[g]
             swing = 0.0 if back else (inertia - 1.0) / following
-            impacts.ahead[m] = impacts.share[m] + swing * (impacts.share[m] - impacts.before[m])
+            ahead[m] = share[m] + swing * (share[m] - impacts.before[m])
         inertia = following
     for g in range(count):
-        impacts.ahead[impacts.group[g]] = impacts.share[impacts.group[g]]
+        ahead[group[g]] = share[group[g]]
     return keep_energy(state, count)
 
 
@@ -146,22 +147,23 @@ def keep_energy(state, count):
     were enough: then energy is right in any case. False if no impulses can: those of what is squeezed between two that
     cannot be moved cancel each other, however high they are."""
     impacts, terms, size = state.impacts, state.impacts.terms, 0.0
+    group, ahead = impacts.group, impacts.ahead
     push_bodies(state, count, False)
     for g in range(count):
-        m = impacts.group[g]
-        size += impacts.ahead[m] * impacts.ahead[m] / impacts.weight[m]
+        m = group[g]
+        size += ahead[m] * ahead[m] / impacts.weight[m]
     for g in range(count):
-        m = impacts.group[g]
-        terms[g] = impacts.ahead[m] * impacts.event_change[impacts.member[m]]
+        m = group[g]
+        terms[g] = ahead[m] * impacts.event_change[impacts.member[m]]
     wanted = exact_sum(terms, count)
     for g in range(count):
-        terms[g] = impacts.ahead[impacts.group[g]] * gained_along(state, impacts.group[g])
+        terms[g] = ahead[group[g]] * gained_along(state, group[g])
     given = exact_sum(terms, count)
     if not given > CANCELLED * size and size > 0.0:
         return False
     if abs(wanted - given) > SAME_ENERGY * wanted:
         for g in range(count):
-            impacts.ahead[impacts.group[g]] *= wanted / given
+            ahead[group[g]] *= wanted / given
         push_bodies(state, count, False)
     return True
 

@@ -110,23 +110,24 @@ def link_members(state, members):
     till -1. An entry is twice the member for its first body, one more for its second. A pair that is there twice is
     left out once."""
     impacts, pairs, inverse_mass = state.impacts, state.pairs, state.bodies.inverse_mass
+    event_pair, member, firsts = impacts.event_pair, impacts.member, impacts.first_member
     for m in range(members):
-        c = impacts.event_pair[impacts.member[m]]
+        c = event_pair[member[m]]
         for side in range(2):
             i = owner_of(state, pairs.a[c] if side == 0 else pairs.b[c])
-            impacts.first_member[i], impacts.gained[i] = -1, zero_of(state)
+            firsts[i], impacts.gained[i] = -1, zero_of(state)
     for m in range(members):
-        c = impacts.event_pair[impacts.member[m]]
+        c = event_pair[member[m]]
         a, b = owner_of(state, pairs.a[c]), owner_of(state, pairs.b[c])
-        entry = impacts.first_member[a if inverse_mass[a] > 0.0 else b]
-        while entry >= 0 and impacts.event_pair[impacts.member[entry // 2]] != c:
+        entry = firsts[a if inverse_mass[a] > 0.0 else b]
+        while entry >= 0 and event_pair[member[entry // 2]] != c:
             entry = impacts.next_member[entry]
         impacts.is_left[m] = entry < 0
         for side in range(2 if entry < 0 else 0):
             i = a if side == 0 else b
             if inverse_mass[i] > 0.0:
-                impacts.next_member[2 * m + side] = impacts.first_member[i]
-                impacts.first_member[i] = 2 * m + side
+                impacts.next_member[2 * m + side] = firsts[i]
+                firsts[i] = 2 * m + side
 
 
 @part

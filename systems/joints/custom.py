@@ -72,10 +72,11 @@ def push_custom(solver, j, impulse):
     """Let a row act with an impulse."""
     joints = solver.joints
     a, b = joints.first[j], joints.second[j]
+    velocity, spin = solver.velocity, solver.spin
     w_a, w_b = solver.inverse_mass[a], solver.inverse_mass[b]
     if w_a > 0.0:
-        solver.velocity[a] = add_scaled(solver.velocity[a], joints.along_a[j], impulse * w_a)
-        solver.spin[a] = add(solver.spin[a], change_of_spin(solver, a, scale(joints.turn_a[j], impulse)))
+        velocity[a] = add_scaled(velocity[a], joints.along_a[j], impulse * w_a)
+        spin[a] = add(spin[a], change_of_spin(solver, a, scale(joints.turn_a[j], impulse)))
     if w_b > 0.0:
-        solver.velocity[b] = add_scaled(solver.velocity[b], joints.normal[j], impulse * w_b)
-        solver.spin[b] = add(solver.spin[b], change_of_spin(solver, b, scale(joints.turn_b[j], impulse)))
+        velocity[b] = add_scaled(velocity[b], joints.normal[j], impulse * w_b)
+        spin[b] = add(spin[b], change_of_spin(solver, b, scale(joints.turn_b[j], impulse)))

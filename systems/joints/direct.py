@@ -337,19 +337,20 @@ def bound_push(solver, h):
 def solve_direct(solver, pushes):
     """The joints of a range that are solved at once."""
     direct, zero, what = solver.direct, scale(solver.velocity[solver.bodies], 0.0), PUSH_PASS if pushes else RELAX_PASS
+    velocity, spins = solver.velocity, solver.spin
     note_rows(solver, what)
     back_substitute(solver, freedoms(zero))
     for e in range(direct.begin, direct.end):
         q = direct.body[e]
         v, spin = from_energy_norm(solver, q, zero)
-        solver.velocity[q], solver.spin[q] = add(solver.velocity[q], v), add(solver.spin[q], spin)
+        velocity[q], spins[q] = add(velocity[q], v), add(spins[q], spin)
     note_rows(solver, what + RESULT_OF)
     for e in range(direct.begin, direct.end):  # what the impulses make of it, to the last bit
         q = direct.body[e]
         v, spin = from_energy_norm(solver, q, zero)
         v = sub(scale(direct.push[q], solver.inverse_mass[q]), v)
         spin = sub(change_of_spin(solver, q, direct.twist[q]), spin)
-        solver.velocity[q], solver.spin[q] = add(solver.velocity[q], v), add(solver.spin[q], spin)
+        velocity[q], spins[q] = add(velocity[q], v), add(spins[q], spin)
 
 
 @inlined
@@ -381,7 +382,8 @@ def apply_to_bodies(solver, j, k, impulse):
 def solve_limited(solver, j, pushes):
     """A limit, a motor or a servo whose joint, and all that hang on it, are solved at once: these answer it."""
     joints, direct, zero = solver.joints, solver.direct, scale(solver.velocity[solver.bodies], 0.0)
-    old, missing = joints.impulse[j], (joints.pushing[j] if pushes else joints.target_speed[j]) - speed_of(solver, j)
+    impulse = joints.impulse
+    old, missing = impulse[j], (joints.pushing[j] if pushes else joints.target_speed[j]) - speed_of(solver, j)
     if old == 0.0 and min(joints.greatest[j], max(joints.least[j], missing)) == 0.0:
         return
     for e in range(direct.begin, direct.end):
@@ -395,7 +397,7 @@ def solve_limited(solver, j, pushes):
         direct.push[q], direct.twist[q] = from_energy_norm(solver, q, zero)
     moved = change_at(solver, j, 0)
     new = min(joints.greatest[j], max(joints.least[j], old + missing / moved if moved > 0.0 else old))
-    joints.impulse[j] = new
+    impulse[j] = new
     if new == old:
         return
     apply_to_bodies(solver, j, 0, new - old)
@@ -408,7 +410,7 @@ def solve_limited(solver, j, pushes):
                 if joints.kind[i] == POINT:
                     joints.push[i] = replace(joints.push[i], k, item(joints.push[i], k) + answer)
                 else:
-                    joints.impulse[i] += answer
+                    impulse[i] += answer
                 apply_to_bodies(solver, i, k, answer)
 
 

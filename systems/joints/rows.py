@@ -193,28 +193,24 @@ def angle_of(solver, j):
 @part
 def update_joint_targets(joints, j, value):
     """What a row asks of the speed of its value, m/s or rad/s, and the impulses that it may have."""
-    rule, h = joints.rule[j], joints.step
-    joints.target_speed[j] = joints.pushing[j] = 0.0
-    joints.greatest[j] = joints.most[j] * h
-    joints.least[j] = -joints.greatest[j]
+    rule, h, low, target, most = joints.rule[j], joints.step, joints.low[j], 0.0, joints.most[j] * joints.step
+    least = -most
     if rule == DRIVE:
-        joints.target_speed[j] = joints.pushing[j] = joints.target[j]
+        pushing = target = joints.target[j]
     elif rule == SERVO:
-        joints.pushing[j] = joints.low[j] - value  # see servo_speed
+        pushing = low - value  # see servo_speed
     elif rule != LIMIT:
-        joints.pushing[j] = -joints.push_rate[j] * (value - joints.low[j])
+        pushing = -joints.push_rate[j] * (value - low)
     else:
-        below, above = value - joints.low[j], joints.high[j] - value
+        below, above = value - low, joints.high[j] - value
         lower = below <= above
         room = below if lower else above
         speed = -room / h if room > 0.0 else -joints.push_rate[j] * room
-        joints.pushing[j] = speed if lower else -speed
+        pushing = speed if lower else -speed
         if room > 0.0:
-            joints.target_speed[j] = joints.pushing[j]
-        if lower:
-            joints.least[j] = 0.0
-        else:
-            joints.greatest[j] = 0.0
+            target = pushing
+        least, most = 0.0 if lower else least, most if lower else 0.0
+    joints.target_speed[j], joints.pushing[j], joints.least[j], joints.greatest[j] = target, pushing, least, most
 
 
 @inlined

@@ -71,7 +71,7 @@ def test_an_order_is_kept_while_pairs_are_and_is_that_of_a_new_one(d):
         with World(Physics(d, gravity=(0.0, -9.81, 0.0)[:d]), Rotation()) as world:
             pile(world, d, np.random.default_rng((5, d)), 0.0, 30)
             solver, boxes = world.physics.state.solver, sorted(world.bodies.dynamic.entity)
-            for step in range(160):
+            for step in range(300):
                 if step == 40:
                     world.component_for_entity(boxes[0], RigidBody).mass = 3.0
                 if step in (60, 80):

@@ -232,7 +232,7 @@ def test_one_side_is_solid():
     assert not world.ray_cast((3.0, -0.5), (0, 1), max_distance=1.0)
     create_chain(world, [(10, 0), (14, 0)], thickness=0.5)
     inside = throw(world, (12.0, -0.4), (0, 0), "ball")
-    for _ in range(60):
+    for _ in range(120):
         world.step()
     assert position(world, inside)[1] > 0.39
 

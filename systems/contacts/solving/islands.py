@@ -148,21 +148,22 @@ def number_islands(state, dt, ordered):
     moved. It is that already if rows are ``ordered``. What is known of its bodies is summed up."""
     solver, bodies, island, count = state.solver, state.bodies, state.solver.island, 0
     velocity, start, warm_started = bodies.linear_velocity, bodies.start_velocity, bodies.warm_started
+    number = solver.number
     for q in range(solver.bodies):
         i = solver.body_row[q]
         w = bodies.inverse_mass[i]
         if w == 0.0:
-            solver.number[q] = -1
+            number[q] = -1
             continue
         root = q if ordered else root_of(island, q)
-        t = island[q] if ordered else (solver.number[root] if root < q else count)
+        t = island[q] if ordered else (number[root] if root < q else count)
         if t == count:
             count += 1
             solver.lightest[t], solver.most_change[t], solver.mass_of[t], solver.force_of[t] = math.inf, 0.0, 0.0, 0.0
             solver.stiff[t] = solver.own[t] = solver.approach_extents[t] = solver.taken[t] = 0.0
             solver.size_of[t], solver.driven[t], solver.needs_substeps[t], solver.credit[t] = 0, False, False, 0.0
             solver.jointed[t], solver.at_once[t], solver.sway[t], solver.links[t] = False, False, 0.0, 0
-        solver.number[q] = t
+        number[q] = t
         change = sub(velocity[i], start[i])
         if warm_started[i]:
             change = sub(change, bodies.warm_start_velocity[i])
@@ -172,7 +173,7 @@ def number_islands(state, dt, ordered):
         solver.force_of[t] += speed / w
     solver.islands = count
     for q in range(solver.bodies):
-        island[q] = solver.number[q]
+        island[q] = number[q]
     if solver.joints.active > 0:
         call_joined_islands(state.links[JOINED_ISLANDS], state, dt)
 
@@ -254,25 +255,26 @@ def place_rows(state):
     solver, bodies, pairs, starts = state.solver, state.bodies, state.pairs, state.solver.starts
     row, island, number, range_of = solver.body_row, solver.island, solver.number, solver.range_of
     ends, body_ends = solver.row_ends, solver.body_ends
+    slot, colour, contacts, listed = solver.slot, solver.colour, solver.contacts, solver.listed
     for k in range(2 * COLOURS + 1):
         starts[k] = 0
-    for r in range(solver.contacts):
-        starts[solver.colour[r] + 1] += 1
+    for r in range(contacts):
+        starts[colour[r] + 1] += 1
     for k in range(1, 2 * COLOURS + 1):
         starts[k] += starts[k - 1]
-    for r in range(solver.contacts):
-        e = starts[solver.colour[r]]
-        starts[solver.colour[r]] += 1
-        solver.slot[r], solver.listed[e] = e, r
-    ends[0], body_ends[0] = solver.contacts, solver.bodies
+    for r in range(contacts):
+        e = starts[colour[r]]
+        starts[colour[r]] += 1
+        slot[r], listed[e] = e, r
+    ends[0], body_ends[0] = contacts, solver.bodies
     if solver.ranges == 1:
         return
     for s in range(solver.ranges):
         ends[s] = body_ends[s] = 0
-    for r in range(solver.contacts):
+    for r in range(contacts):
         c = solver.pair[r]
         t = island_of_rows(state, pairs.a[c], pairs.b[c])
-        solver.slot[r] = range_of[t]
+        slot[r] = range_of[t]
         ends[range_of[t]] += 1
     for q in range(solver.bodies):
         body_ends[range_of[island[q]] if island[q] >= 0 else 0] += 1
@@ -280,10 +282,10 @@ def place_rows(state):
     for s in range(solver.ranges):  # from how many to where each begins
         rows, ends[s] = rows + ends[s], rows
         places, body_ends[s] = places + body_ends[s], places
-    for e in range(solver.contacts):
-        r = solver.listed[e]
-        s = solver.slot[r]
-        solver.slot[r] = ends[s]
+    for e in range(contacts):
+        r = listed[e]
+        s = slot[r]
+        slot[r] = ends[s]
         ends[s] += 1
     for q in range(solver.bodies):
         s = range_of[island[q]] if island[q] >= 0 else 0

@@ -42,17 +42,18 @@ def find_support(solver, span, arms):
     """What pushes an island from outside in a substep: (direction, speed of that along it, what the heavy bodies have
     of the momentum that it gives: 0 to 1)."""
     total = scale(solver.velocity[span[2]], 0.0)
+    velocity, before, mass = solver.velocity, solver.velocity_before, solver.solver_mass
     motion = given = work = 0.0
     for q in range(span[2], span[3]):  # among themselves they give none
-        total = add_scaled(total, sub(solver.velocity[q], solver.velocity_before[q]), solver.solver_mass[q])
-        motion += solver.solver_mass[q] * length(solver.velocity_before[q])
+        total = add_scaled(total, sub(velocity[q], before[q]), mass[q])
+        motion += mass[q] * length(before[q])
     size = length(total)
     if not size > GAIN_ROUNDING * motion:
         return total, 0.0, 0.0
     way = scale(total, 1.0 / size)
     for q in range(span[2], span[3]):
         if solver.mass_ratio[q] < 1.0:
-            given += max(0.0, dot(way, sub(solver.velocity[q], solver.velocity_before[q]))) * solver.solver_mass[q]
+            given += max(0.0, dot(way, sub(velocity[q], before[q]))) * mass[q]
     for k in range(span[0], span[1] if solver.movers > 0 or solver.surfaces_run else span[0]):
         work += work_of_row(solver, k, arms)
     for e in range(solver.joints.begin, solver.joints.end if len(arms) > 1 and solver.movers > 0 else 0):
@@ -75,23 +76,24 @@ def restore_mass(solver, h, span, arms):
     What is outside of the island stops them as if it were so: it can bear anything. It throws none.
     """
     way, speed, held = find_support(solver, span, arms)
+    velocity, spins = solver.velocity, solver.spin
     for q in range(span[2], span[3]):
         rest = 1.0 - solver.mass_ratio[q]
         if rest > 0.0:
-            change = sub(solver.velocity[q], solver.velocity_before[q])
+            change = sub(velocity[q], solver.velocity_before[q])
             along = max(0.0, dot(change, way))
-            stop = braking_share(rest, held, along * (dot(solver.velocity[q], way) - speed), along * along)
+            stop = braking_share(rest, held, along * (dot(velocity[q], way) - speed), along * along)
             change = add_scaled(scale(way, stop * along), change, -rest)
             if h > 0.0:
                 solver.shift[q] = add_scaled(solver.shift[q], change, h)
             else:
-                solver.velocity[q] = add(solver.velocity[q], change)
+                velocity[q] = add(velocity[q], change)
         if rest > 0.0 and len(arms) > 0:
-            change = sub(solver.spin[q], solver.spin_before[q])
+            change = sub(spins[q], solver.spin_before[q])
             momentum = momentum_of_spin(solver, q, change)
-            stop = braking_share(rest, held, dot(momentum, solver.spin[q]), dot(momentum, change))
+            stop = braking_share(rest, held, dot(momentum, spins[q]), dot(momentum, change))
             change = scale(change, stop - rest)
             if h > 0.0:
                 rotate_body(solver, q, add_scaled(solver.turn[q], change, h))
             else:
-                solver.spin[q] = add(solver.spin[q], change)
+                spins[q] = add(spins[q], change)

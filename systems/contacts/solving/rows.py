@@ -252,18 +252,19 @@ def most_turned(solver, q):
 def solve_rolling(solver, span):
     """Stop what rolls on each other, with a torque of at most ``rolling`` times the normal impulse, from one substep
     alone."""
+    spins = solver.spin
     for k in range(span[0], span[1]):
         limit, old = solver.rolling[k] * solver.impulse[k], solver.rolled[k]
         if limit > 0.0 or dot(old, old) > 0.0:
             a, b = solver.first[k], solver.second[k]
             light = most_turned(solver, a) + most_turned(solver, b)
-            turn = add_scaled(old, sub(solver.spin[b], solver.spin[a]), -1.0 / light) if light > 0.0 else old
+            turn = add_scaled(old, sub(spins[b], spins[a]), -1.0 / light) if light > 0.0 else old
             strength = math.sqrt(dot(turn, turn))
             if strength > limit:
                 turn = scale(turn, limit / strength)
             solver.rolled[k] = turn
-            solver.spin[a] = sub(solver.spin[a], change_of_spin(solver, a, sub(turn, old)))
-            solver.spin[b] = add(solver.spin[b], change_of_spin(solver, b, sub(turn, old)))
+            spins[a] = sub(spins[a], change_of_spin(solver, a, sub(turn, old)))
+            spins[b] = add(spins[b], change_of_spin(solver, b, sub(turn, old)))
 
 
 @part

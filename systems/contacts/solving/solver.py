@@ -278,6 +278,7 @@ def solve_substeps(state, dt, arms):
     solver.visits, solver.usual = 0, state.substeps
     select_rigid(state, dt, zero_of(state), arms)
     start, begin, solver.lightened = 0, 0, False
+    joints, direct = solver.joints, solver.direct
     for s in range(solver.ranges):
         span = start, solver.row_ends[s], begin, solver.body_ends[s]
         t, special = solver.special[s], s > 0
@@ -292,11 +293,11 @@ def solve_substeps(state, dt, arms):
                 cap_mass_ratio(solver, t, dt, span, arms)
         any_joint = False
         if len(arms) > 1:
-            solver.joints.begin = solver.joints.end if special else 0
-            solver.joints.end = solver.joint_ends[s]
-            solver.direct.begin = solver.direct.end if special else 0
-            solver.direct.end = solver.direct.body_ends[s]
-            any_joint = solver.joints.begin < solver.joints.end
+            joints.begin = joints.end if special else 0
+            joints.end = solver.joint_ends[s]
+            direct.begin = direct.end if special else 0
+            direct.end = direct.body_ends[s]
+            any_joint = joints.begin < joints.end
         if span[1] > start or any_joint:
             solve_range(solver, s, dt, span, arms)
         start, begin = span[1], span[3]

@@ -87,8 +87,9 @@ def integrate_free_rotation(solver, q, h):
     """Body q turns by itself for a time. What its momentum was before the impulses of the substep stays that, so that
     less of them may act in the end, see guard; but that has no more energy than it had, and what it has less is no
     gain of theirs."""
+    frames = solver.frame
     spin, before, inverse = solver.spin[q], solver.spin_before[q], components_of(solver.inverse_moments[q])
-    frame = solver.frame[q, 0], solver.frame[q, 1], solver.frame[q, 2], solver.frame[q, 3]
+    frame = frames[q, 0], frames[q, 1], frames[q, 2], frames[q, 3]
     m = momentum_along(frame, inverse, spin)
     momentum = triple(spin, rotate(frame, momentum_along(frame, inverse, before), False))
     little = h * h * dot(spin, spin) < SERIES and dot(solver.turn[q], solver.turn[q]) < SERIES
@@ -98,7 +99,7 @@ def integrate_free_rotation(solver, q, h):
         to, m, gained = turn_freely(frame, m, inverse, h)
     to, m = turn_to_energy(to, m, inverse, gained)
     for k in range(4):
-        solver.frame[q, k] = to[k]
+        frames[q, k] = to[k]
     xx, yy, zz, xy, xz, yz = turned_tensor(to, (inverse[0], inverse[1], inverse[2], 0.0, 0.0, 0.0))
     solver.inverse_inertia[q], solver.inverse_products[q] = triple(spin, (xx, yy, zz)), triple(spin, (xy, xz, yz))
     solver.spin[q] = triple(spin, rotate(to, (m[0] * inverse[0], m[1] * inverse[1], m[2] * inverse[2]), False))
