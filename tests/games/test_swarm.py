@@ -19,7 +19,7 @@ def test_recorded_keys_kill_the_queen():
         most = max(most, len(world.bodies.dynamic))
         if game.state != "play":
             break
-    assert (game.state, game.wave) == ("won", 6)
+    assert (game.state, game.wave) == ("won", 7)
     assert min(most / 150, game.kills / 300, game.level / 6) > 1
     assert 50 < game.health <= 100
     assert not world.faults

@@ -11,11 +11,11 @@ import pytest
 from carom import scenes
 
 HASHES = {
-    "pile2d": ({"n": 40}, "e4d685007faf3bd9cdaf4ecfcdd7ec3c53664da884e0bb84be816b37b274673f"),
-    "pile3d": ({"n": 27}, "9230a04c971390150c906985c8dacbf885fb40bfdbf4990f712682dc69b8fdb1"),
+    "pile2d": ({"n": 40}, "43cad55e233dbe63bd82c89017d8282e26d8072413c54e968be12d8dc9a2a35c"),
+    "pile3d": ({"n": 27}, "059dd8c48f9f797f3533fa59e5bceeddae6a99cdc98004a8e40695ee056e280a"),
     "tumbler": ({"n": 12}, "0c1980139e89fde1c589cce28d44e01f52c316eeab435314c4e599fccb103c62"),
-    "bridge": ({"n": 8, "crates": 2}, "ee27fc35ff4b83300c83f279bf423fee1cd0569e0b9f5b5f1173ebc6ac0a59a2"),
-    "ragdoll": ({"n": 1}, "9d5e25f64f2ddc11f5b1493a06547beea1a3641496428055a5ae422d78771a9e"),
+    "bridge": ({"n": 8, "crates": 2}, "8e60f0e627b5bfbe4e9ecc74e197dd58b15335f1f6d23bfbc530ada4c5a90775"),
+    "ragdoll": ({"n": 1}, "a2cb76e518cd3313c77f8fe557cdebc26f4a88a6f7fc091ee8835e6cb1ccdd16"),
 }
 STEPS = 60
 
