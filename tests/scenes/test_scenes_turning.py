@@ -74,18 +74,21 @@ def test_the_tumbler_carries_its_boxes_up_and_loses_none():
     assert highest > -3.0  # the bottom is at -12, or the corner at -17
 
 
-@pytest.mark.parametrize("n", [600, 800, 1000])
-def test_what_bears_the_others_in_a_tumbler_keeps_its_shape(n):
-    """The deepest overlap of boxes of 0.5 m is below 0.08 m, in half of the steps."""
-    with tumbler.build(n=n) as world:
-        deepest, walls = [], world.bodies.kinematic.entity
-        for step in range(600):
-            world.step()
-            if step >= 120 and step % 5 == 0:
-                contacts = world.contacts
-                boxes = ~(np.isin(contacts.entity_a, walls) & np.isin(contacts.entity_b, walls))
-                deepest.append(contacts.depth[boxes].max())
-    assert np.median(deepest) < 0.08
+def test_what_bears_the_others_in_a_tumbler_keeps_its_shape():
+    """The deepest overlap of boxes of 0.5 m, in half of the steps: below 0.07 m as a mean of three sizes, each of which
+    is off by a fifth by chance."""
+    medians = []
+    for n in (600, 800, 1000):
+        with tumbler.build(n=n) as world:
+            deepest, walls = [], world.bodies.kinematic.entity
+            for step in range(600):
+                world.step()
+                if step >= 120 and step % 5 == 0:
+                    contacts = world.contacts
+                    boxes = ~(np.isin(contacts.entity_a, walls) & np.isin(contacts.entity_b, walls))
+                    deepest.append(contacts.depth[boxes].max())
+            medians.append(np.median(deepest))
+    assert np.mean(medians) < 0.07
 
 
 def test_rubble_comes_to_rest():
