@@ -59,6 +59,7 @@ def test_other_processes_with_a_cold_and_a_warm_cache_get_the_same_bits(folder):
     assert cold[0] == warm[0] == world.state_hash()
 
 
+@pytest.mark.long
 def test_no_kernel_leaves_its_arrays(folder):
     """Whatever stands in any column of some bodies of each scene; the others are as test_quarantine asks."""
     assert run_checked(folder, POISON, 8, "2D") == ""

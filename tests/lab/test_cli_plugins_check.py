@@ -295,7 +295,9 @@ class Rope(Joint):
 
 
 @pytest.mark.parametrize(
-    ("factor", "code"), [("1.0", 0), ("(1.0 if length(way) < 2.0 else 2.0)", 1), ("2.0", 2)], ids=["right", "far", "2"]
+    ("factor", "code"),
+    [pytest.param("1.0", 0, marks=pytest.mark.long), ("(1.0 if length(way) < 2.0 else 2.0)", 1), ("2.0", 2)],
+    ids=["right", "far", "2"],
 )
 def test_joints_are_compared_with_the_change_of_their_value(carom, tmp_path, factor, code):
     (tmp_path / "ropes.py").write_text(ROPE.replace("FACTOR", factor))

@@ -211,7 +211,7 @@ def stack_error(settings: Settings) -> float:
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "wanted", "verify"), [
     ("jump", {"norms": ("apex",), "max_error": 0.1, "absolute": True, "seconds": 1.0}, apex_error),  # pixels
-    ("spring", {"max_error": 1e-3}, spring_error),
+    pytest.param("spring", {"max_error": 1e-3}, spring_error, marks=pytest.mark.long),
     pytest.param("stack", {"max_error": 1e-3}, stack_error, marks=pytest.mark.long),
 ])  # fmt: skip
 def test_the_choice_keeps_the_error_in_runs_that_share_nothing_with_the_lab(name, wanted, verify):

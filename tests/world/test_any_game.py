@@ -442,7 +442,7 @@ def play_for(steps):
 
 @pytest.mark.slow
 def test_games_of_some_thousand_steps():
-    play_for(3_000)
+    play_for(2_000)
 
 
 @pytest.mark.long
