@@ -142,7 +142,7 @@ main()
 @needs_signals
 def test_ctrl_c_ends_all_processes_and_says_what_is_kept(tmp_path):
     pytest.importorskip("joblib")
-    scene_file(tmp_path, COUNTING.replace("seconds = 1.7", "seconds = 500"))
+    scene_file(tmp_path, COUNTING.replace("seconds = 1.7", "seconds = 5000"))
     words = ["trade", "mine.py", "--no-timing", "--workers", "2"]
     process = subprocess.Popen(
         [sys.executable, "-c", ENDED, *words], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,

@@ -133,7 +133,9 @@ def test_without_matplotlib_everything_but_pictures(carom, monkeypatch):
 
 @pytest.mark.parametrize(("target", "words"), [
     (("--max-error", "1e-4", "--integrators", "explicit_euler"), "no settings keep the position error below 0.0001"),
-    (("--max-error", "1e-14"), "no reference is exact enough for a position error of 1e-14"),
+    pytest.param(
+        ("--max-error", "1e-14"), "no reference is exact enough for a position error of 1e-14", marks=pytest.mark.long
+    ),
 ])  # fmt: skip
 def test_a_target_that_nothing_meets(carom, target, words):
     result = carom("spring", *target, *SHORT)
