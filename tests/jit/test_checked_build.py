@@ -12,7 +12,7 @@ import pytest
 from helpers_determinism import Facade, mixed_scene, settled
 from helpers_processes import NATIVE, output_of
 
-pytestmark = [pytest.mark.slow, pytest.mark.early]  # compiles everything
+pytestmark = [pytest.mark.long, pytest.mark.early]  # compiles everything
 
 MIXED = """
 from helpers_determinism import Facade, mixed_scene, settled
@@ -59,13 +59,11 @@ def test_other_processes_with_a_cold_and_a_warm_cache_get_the_same_bits(folder):
     assert cold[0] == warm[0] == world.state_hash()
 
 
-@pytest.mark.long
 def test_no_kernel_leaves_its_arrays(folder):
     """Whatever stands in any column of some bodies of each scene; the others are as test_quarantine asks."""
     assert run_checked(folder, POISON, 8, "2D") == ""
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("names", [EXTREMES, LAWS], ids=["extremes", "laws"])
 def test_extremes_and_random_worlds_stay_in_their_arrays(folder, names):
     """Gravity, masses, sizes and speeds far apart, caught bodies, bodies that come and go, scattered shapes."""

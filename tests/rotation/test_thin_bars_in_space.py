@@ -167,7 +167,7 @@ def throws():
 
 
 @pytest.mark.parametrize("mode", MODES[1:])
-@pytest.mark.parametrize(("seed", "rate"), throws())
+@pytest.mark.parametrize(("seed", "rate"), list(throws()))
 def test_no_arrow_passes_a_thin_wall(seed, rate, mode):
     """At restitution 0 each strike turns it: about its length by the speed over its width, at some 1,000 rad/s."""
     assert beyond_wall(mode, rate, seed)[0] == 0
