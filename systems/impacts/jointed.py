@@ -51,7 +51,7 @@ def respond_joined(state, sides, met, motion, e, mu):
         if length(tangent) > 0.0:
             answer(state, rows, touch, 0.0, tangent, TAKE_NOTHING)
             nt, tt = dot(parted, tangent), dot(parted_by(state, touch), tangent)
-            if tt > HELD * light:
+            if tt > HELD * light and nn * tt > nt * nt:  # else the answers are no more than rounding
                 pushed, pulled = impulses_of((nn, nt, tt), (speed, dot(slip, tangent)), e, mu)
                 smooth, pull = pushed * light, scale(tangent, pulled * light)
     state.impacts.now = now

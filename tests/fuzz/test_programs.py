@@ -6,8 +6,9 @@ import pytest
 from fuzz.programs import run
 
 # Once failed: a static body measured before anything turned; a push out of an overlap; a joint that was moved before a
-# restore, and before a load; a hash before code's writing into a sleeper was noticed.
-FOUND = 3831, 4818, 40165, 43525, 100602
+# restore, and before a load; a hash before code's writing into a sleeper was noticed;
+# an impact on jointed bodies whose answers along two directions were rounding.
+FOUND = 3831, 4818, 40165, 43525, 100602, 200318
 
 
 @pytest.mark.slow
