@@ -21,6 +21,7 @@ from .impacts.jointed import bend_struck, respond_joined, strike_joined
 from .impacts.together import resolve_simultaneous
 from .impacts.turning import respond_at_arms, turn_by_impact
 from .integration.system import Integration
+from .joints.solving import solve_joined_range
 from .linking.parts import (
     ARMS_AT_REST,
     BOUND_SEARCHES,
@@ -30,6 +31,7 @@ from .linking.parts import (
     JOINED_BODIES,
     JOINED_IMPACT,
     JOINED_ISLANDS,
+    JOINED_RANGE,
     JOINED_RESPONSE,
     JOINED_START,
     TAKE_TOGETHER,
@@ -118,7 +120,7 @@ WITH_COLLIDERS = frozenset((
     "contacts are read early",
 ))  # fmt: skip
 CONDITIONS = (
-    "", "dynamic bodies", *sorted(WITH_COLLIDERS), "bodies spin", "bodies spin, no joints", "joints", "parts",
+    "", "dynamic bodies", *sorted(WITH_COLLIDERS), "bodies spin or joints", "joints", "parts",
     "one-way colliders", "standard", "sleeping", "stages of plugins", "stages query", "on demand",
 )  # fmt: skip
 # What a failed step puts back, in this order: the bit of state.kept that says that the copy is made; the column, its
@@ -164,6 +166,7 @@ LINKED_PARTS = {
     CLOSING_POINT: closing_point, ARMS_AT_REST: lay_arms, TURNING_RESPONSE: respond_at_arms,
     TURN_BY_IMPACT: turn_by_impact, JOINED_ISLANDS: measure_joined_islands, JOINED_BODIES: gather_joined,
     JOINED_RESPONSE: respond_joined, JOINED_IMPACT: strike_joined, JOINED_START: bend_struck,
+    JOINED_RANGE: solve_joined_range,
 }  # fmt: skip
 
 # The system of each stage; "" for those that open and close a step.

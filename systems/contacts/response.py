@@ -21,7 +21,7 @@ from .response_stages import begin_response
 from .resting import find_resting, find_touching, linearise
 from .solving.prediction import ROOM_FOR_SUPPORT, predict_rest
 from .solving.records import RESTED
-from .solving.solver import solve_contacts, solve_joined_contacts, solve_turning_contacts
+from .solving.solver import solve_contacts, solve_turning_contacts
 from .solving.warm_start import ROOM_TO_STORE, match_warm_start, store_warm_start
 from .static_penetration import resolve_static_penetration
 
@@ -70,12 +70,9 @@ class Response(StagedSystem):
             "no body spins, no joints", REST,
         ),
         Stage(
-            solve_turning_contacts, "the same, with the arms of the contacts", ("solver",), ("solver",),
-            "bodies spin, no joints", REST,
-        ),
-        Stage(
-            solve_joined_contacts, "the same, with joints before the contacts", ("solver",), ("solver",),
-            "joints", room=(Rows("solver.direct", ("values",), lambda s: s.solver.direct.blocks),),
+            solve_turning_contacts, "the same, with the arms of the contacts, and joints before these", ("solver",),
+            ("solver",), "bodies spin or joints", REST,
+            (Rows("solver.direct", ("values",), lambda s: s.solver.direct.blocks),),
         ),
         Stage(put_back, "where the resting bodies are at the end", ("solver",), MOVED_COLUMNS, RESTING_OR_JOINED, REST),
         Stage(

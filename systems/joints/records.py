@@ -76,6 +76,7 @@ JOINTS = Schema(
     axes_b=vectors(unit="1"),
     torn=integer(),  # joints that are wide open, and the first
     torn_joint=integer(),
+    solver=integer(),  # address of what solves them, see calls
     # in a range
     begin=integer(),  # places in ``order``
     end=integer(),

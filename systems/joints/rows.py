@@ -11,7 +11,7 @@ push; limits are not soft, so that no motor is stronger. Springs are solved in t
 swings faster than substeps can follow holds its value. Rows of one joint are solved together, see coupling.
 
 Joints come before the contacts of their range, in the pass that pushes and once in those that do not. Their bodies have
-the columns of bodies that spin, as contacts of such bodies have: see solving.rows.JOINTED.
+the columns of bodies that spin, as contacts of such bodies have.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ from typing import Any
 
 from ...framework.jit.kinds import BOOL, FLOAT, INT, Kind, Signature, floats, record_kind, tuple_of
 from ...framework.jit.linking import Linked
+from ..contacts.solving.records import SOLVER
 from ..records import STATE
 from ..shapes.linking.signatures import call_in_dimension
 
@@ -16,11 +17,12 @@ from ..shapes.linking.signatures import call_in_dimension
 (
     BOUND_SEARCHES, FIRST_TOUCH, TAKE_TOGETHER, FREE_TURN, TURNING_TOUCH, TOUCH_OF_TURN, CLOSING_POINT, ARMS_AT_REST,
     TURNING_RESPONSE, TURN_BY_IMPACT, JOINED_ISLANDS, JOINED_BODIES, JOINED_RESPONSE, JOINED_IMPACT,
-    JOINED_START,
-) = PLACES = range(15)  # fmt: skip
+    JOINED_START, JOINED_RANGE,
+) = PLACES = range(16)  # fmt: skip
 SWEPT_PARTS, IMPACT_PARTS = (BOUND_SEARCHES, FIRST_TOUCH), (FIRST_TOUCH,)
 TURNING_PARTS = (FREE_TURN, TURNING_TOUCH, TOUCH_OF_TURN, CLOSING_POINT, ARMS_AT_REST, TURNING_RESPONSE, TURN_BY_IMPACT)
-JOINT_PARTS, JOINT_IMPACT_PARTS = (JOINED_ISLANDS, JOINED_BODIES), (JOINED_RESPONSE, JOINED_IMPACT, JOINED_START)
+JOINT_PARTS = (JOINED_ISLANDS, JOINED_BODIES, JOINED_RANGE)
+JOINT_IMPACT_PARTS = (JOINED_RESPONSE, JOINED_IMPACT, JOINED_START)
 IN_SPACE = (FREE_TURN,)  # in a plane nothing calls it
 
 
@@ -95,14 +97,20 @@ def _turn_by_impact(dimensions: int) -> Signature:
     return INT(record_kind(STATE, dimensions), INT, f, floats(dimensions), f)
 
 
+@cache
+def _joined_range(dimensions: int) -> Signature:
+    return FLOAT(record_kind(SOLVER, dimensions), INT, floats(2), tuple_of(*(INT,) * 4))
+
+
 SIGNATURES = (
     _bound_searches, _first_touch, _take_together, _free_turn, _turning_touch, _touch_of_turn, _closing_point, _of_step,
-    _turning_response, _turn_by_impact, _of_step, _of_step, _turning_response, _turn_by_impact, _of_step,
+    _turning_response, _turn_by_impact, _of_step, _of_step, _turning_response, _turn_by_impact, _of_step, _joined_range,
 )  # fmt: skip
 (
     call_bound_searches, call_first_touch, call_take_together, call_free_turn, call_turning_touch, call_touch_of_turn,
     call_closing_point, call_arms, call_turning_response, call_turn_by_impact, call_joined_islands, call_joined_bodies,
-) = map(call_in_dimension, SIGNATURES[:JOINED_RESPONSE])  # fmt: skip
+    call_joined_range,
+) = map(call_in_dimension, (*SIGNATURES[:JOINED_RESPONSE], _joined_range))  # fmt: skip
 
 
 def needed_places(dimensions: int, sweeps: bool, bounces: bool, turns: bool, joined: bool) -> list[int]:

@@ -65,7 +65,7 @@ def kind_of_world(scene: Scene, integration: Integration, program: Program) -> K
     if linked is not None and scene.sweeps_asked:
         conditions |= {QUERYING}
     if any(plugin.name == "joints" for plugin in registry.plugins):  # which may come at any time
-        conditions |= {"joints", "colliders or joints", "contacts may rest or joints"}
+        conditions |= {"joints", "colliders or joints", "contacts may rest or joints", "bodies spin or joints"}
     if scene.state.parts.count > 0:
         conditions |= {"parts"}
     if linked is None:
@@ -77,7 +77,7 @@ def kind_of_world(scene: Scene, integration: Integration, program: Program) -> K
     if scene.state.sleeping:
         conditions |= {"sleeping"}
     if any("spin" in stage.writes for stage in stages if stage.plugin):
-        conditions |= {"bodies spin", "bodies spin, no joints"}
+        conditions |= {"bodies spin or joints"}
     return dimensions, stages, conditions | WITH_COLLIDERS, linked, queries, own_joints(registry, dimensions)
 
 
@@ -94,7 +94,7 @@ def needed_functions(
     has_shapes = linked is not None
     yield from (run_stages, ticks_now, copy_blocks, move_rows)
     joined = "joints" in conditions
-    turns = has_shapes and (joined or "bodies spin" in conditions)
+    turns = has_shapes and "bodies spin or joints" in conditions
     places = needed_places(dimensions, has_shapes, has_shapes, turns, joined)
     for place in (*places, *((TAKE_TOGETHER,) if has_shapes else ())):
         yield linked_part(place, LINKED_PARTS[place], dimensions)

@@ -123,7 +123,7 @@ class StepLinks:
     def _link_stages(self, conditions: dict[str, bool]) -> None:
         """The stages whose condition is met, and what these call."""
         state = self._state
-        self._turns = conditions["bodies spin"] or conditions["joints"]
+        self._turns = conditions["bodies spin or joints"]
         state.rest_ready = conditions["contacts may rest"]
 
         def wanted(stage: Stage) -> bool:

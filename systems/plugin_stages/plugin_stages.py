@@ -151,7 +151,7 @@ class PluginStages:
         return {
             NEEDED: any(needed.values()), **needed,
             QUERYING: any(needed[stage.name] for stage in self.stages if "tree" in stage.reads),
-            "bodies spin": spins, "bodies spin, no joints": spins and not met["joints"],
+            "bodies spin or joints": spins or met["joints"],
             "no body spins, no joints": met["contacts may rest"] and not spins and not met["joints"],
         }  # fmt: skip
 

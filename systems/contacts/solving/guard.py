@@ -11,10 +11,8 @@ import math
 
 from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, dot, scale, sub
-from ...integration.turning import cross_spin, momentum_of_spin
-from ...joints.custom import rates_of_custom
-from ...joints.records import CUSTOM, POINT, TURN
-from ...joints.rows import relax_open
+from ...integration.turning import momentum_of_spin
+from ...joints.calls import ADD_WORK, CLOSE, FADE, OPEN, RELAX_OPEN, for_joints
 from ..constants import (
     FINER_PASSES,
     FULL_PUSH_OVERLAP,
@@ -26,6 +24,8 @@ from ..constants import (
     SWEEPS_PER_LOOK,
 )  # fmt: skip
 from .rows import excess_speed, relax_listed, velocity_at
+
+NO_NUMBERS = 0.0, 0.0
 
 
 @part
@@ -45,35 +45,26 @@ def islands_of(solver, span):
 @part
 def open_all(solver, span, arms):
     """All islands of a range are open: further passes may go over them."""
-    joints, islands, opened = solver.joints, islands_of(solver, span), 0
+    islands, opened = islands_of(solver, span), 0
     for t in range(islands[0], islands[1]):
         solver.listed_of[t] = 1
     for q in range(span[2], span[3]):
         solver.open_body[opened] = q
         opened += solver.island[q] >= 0
     solver.opened = opened
-    if len(arms) > 1:
-        joints.opened = joints.end - joints.begin
-        for e in range(joints.opened):
-            joints.open_row[e] = joints.order[joints.begin + e]
+    for_joints(solver, OPEN, NO_NUMBERS, span, arms)
 
 
 @part
-def close_solved(solver, arms):
+def close_solved(solver, span, arms):
     """Islands without rows in ``listed`` are closed: no pass goes over their joints, nor is their energy weighed."""
-    joints, island, opened = solver.joints, solver.island, 0
+    opened = 0
     for e in range(solver.opened):
         q = solver.open_body[e]
         solver.open_body[opened] = q
-        opened += solver.listed_of[island[q]] > 0
+        opened += solver.listed_of[solver.island[q]] > 0
     solver.opened = opened
-    if len(arms) > 1:
-        opened = 0
-        for e in range(joints.opened):
-            j = joints.open_row[e]
-            joints.open_row[opened] = j
-            opened += solver.listed_of[max(island[joints.first[j]], island[joints.second[j]])] > 0
-        joints.opened = opened
+    for_joints(solver, CLOSE, NO_NUMBERS, span, arms)
 
 
 @part
@@ -94,33 +85,13 @@ def work_of_row(solver, k, arms):
 
 
 @part
-def work_of_joint(solver, j):
-    """The same, of a row of joints."""
-    joints, island = solver.joints, solver.island
-    a, b = joints.first[j], joints.second[j]
-    if island[a] >= 0 and island[b] >= 0:
-        return 0.0
-    q, arm, away = (a, joints.arm_a[j], -1.0) if island[a] < 0 else (b, joints.arm_b[j], 1.0)
-    if joints.kind[j] == CUSTOM:
-        at_a, at_b = rates_of_custom(solver, j)
-        return joints.impulse[j] * (at_a if q == a else at_b)
-    if joints.kind[j] >= TURN:
-        return away * joints.impulse[j] * dot(joints.normal[j], solver.spin[q])
-    push = joints.push[j] if joints.kind[j] == POINT else scale(joints.normal[j], joints.impulse[j])
-    return away * dot(push, add(solver.velocity[q], cross_spin(solver.spin[q], arm)))
-
-
-@part
 def add_work(solver, span, arms):
     """What moves by itself gives its work to open islands: it is no gain of contacts."""
-    joints, island = solver.joints, solver.island
     for k in range(span[0], span[1] if solver.movers > 0 or solver.surfaces_run else span[0]):
         t = island_of(solver, k)
         if solver.listed_of[t] > 0:
             solver.slope[t] += work_of_row(solver, k, arms)
-    for e in range(joints.opened if len(arms) > 1 and solver.movers > 0 else 0):
-        j = joints.open_row[e]
-        solver.slope[max(island[joints.first[j]], island[joints.second[j]])] += work_of_joint(solver, j)
+    for_joints(solver, ADD_WORK, NO_NUMBERS, span, arms)
 
 
 @part
@@ -146,9 +117,6 @@ def measure_energy(solver, span, arms, islands):
             curvature[t] += dot(momentum_of_spin(solver, q, change), change)
             energy[t] += dot(momentum, before)
     add_work(solver, span, arms)
-    for t in range(islands[0], islands[1] if len(arms) > 1 else islands[0]):
-        if solver.driven[t]:
-            slope[t] = -math.inf
 
 
 @part
@@ -177,17 +145,17 @@ def energy_budget(solver, bias_rate, h, dt, span, arms, islands):
         energy = max(0.0, solver.energy[t] - dot(motion[t], motion[t]) / mass)
         rate = dt / h if solver.size_of[t] > 0 else 1.0
         allowed[t] = (0.5 + GAIN_WEIGHT * rate) * force * force / mass
-        allowed[t] += solver.credit[t] if solver.jointed[t] else share * GAIN_MOTION * energy
+        allowed[t] += solver.credit[t] if solver.links[t] > 0 else share * GAIN_MOTION * energy
     for k in range(start, stop):
         t, speed = island_of(solver, k), bias_rate * FULL_PUSH_OVERLAP * solver.extent[k]
-        if len(arms) < 2 or not solver.jointed[t]:
+        if solver.links[t] == 0:
             allowed[t] += share * GAIN_PUSH * solver.mass[k] * speed * speed
 
 
 @inlined
 def gains_by_contacts(solver, t):
     """Whether further passes may take what island t has gained: those of contacts do not take what joints give."""
-    return exceeds_budget(solver, t) and not solver.jointed[t]
+    return exceeds_budget(solver, t) and solver.links[t] == 0
 
 
 @inlined
@@ -216,19 +184,19 @@ def find_unsolved_rows(solver, turn, any_struck, dt, span, arms, islands):
                 solver.listed[count] = k
                 solver.listed_of[t] += 1
                 count += 1
-    close_solved(solver, arms)
+    close_solved(solver, span, arms)
     return count
 
 
 @part
-def note_changed(solver, turn, count, arms):
+def note_changed(solver, turn, count):
     """``used`` of the bodies that further passes have changed becomes the number of these passes."""
     for e in range(count):
         k = solver.listed[e]
         for q in (solver.first[k], solver.second[k]):
             if solver.island[q] >= 0:
                 solver.used[q] = turn
-    for e in range(solver.opened if len(arms) > 1 else 0):
+    for e in range(solver.opened if solver.joints.begin < solver.joints.end else 0):
         solver.used[solver.open_body[e]] = turn
 
 
@@ -243,7 +211,7 @@ def limit_energy(solver, span, arms, islands):
         if exceeds_budget(solver, t):
             slope, curvature = solver.slope[t] - solver.allowed[t], solver.curvature[t]
             most = -slope / curvature
-            if solver.jointed[t]:  # all that is allowed, as joints are to hold
+            if solver.links[t] > 0:  # all that is allowed, as joints are to hold
                 root = math.sqrt(solver.slope[t] * solver.slope[t] + 2.0 * curvature * solver.allowed[t])
                 most = (root - solver.slope[t]) / curvature
             share[t] = min(1.0, max(0.0, most)) if curvature < math.inf else 0.0
@@ -258,8 +226,8 @@ def limit_energy(solver, span, arms, islands):
             if len(arms) > 0:
                 turned = sub(solver.spin[q], solver.spin_before[q])
                 solver.spin[q] = add_scaled(solver.spin_before[q], turned, share[t])
-    if len(arms) > 1 and any_gain:
-        fade_joint_impulses(solver)
+    if any_gain:
+        for_joints(solver, FADE, NO_NUMBERS, span, arms)
     for k in range(start, stop if any_gain else start):
         kept = share[island_of(solver, k)]
         if kept < 1.0:
@@ -268,22 +236,11 @@ def limit_energy(solver, span, arms, islands):
 
 
 @part
-def fade_joint_impulses(solver):
-    """Joints of islands that the guard has restrained begin the next substep with as much less."""
-    joints = solver.joints
-    for e in range(joints.begin, joints.end):
-        j = joints.order[e]
-        kept = solver.share[max(solver.island[joints.first[j]], solver.island[joints.second[j]])]
-        if kept < 1.0:
-            joints.impulse[j], joints.push[j] = kept * joints.impulse[j], scale(joints.push[j], kept)
-
-
-@part
 def carry_budget(solver, islands):
     """What joints have taken in a substep they may give back later in the step."""
     for t in range(islands[0], islands[1]):
         s = solver.share[t]
-        if solver.jointed[t] and not solver.driven[t]:
+        if solver.links[t] > 0 and not solver.driven[t]:
             solver.credit[t] = max(0.0, solver.credit[t] - s * (solver.slope[t] + 0.5 * s * solver.curvature[t]))
         else:
             solver.credit[t] = 0.0
@@ -304,12 +261,11 @@ def finish_substep(solver, bias_rate, any_struck, h, dt, span, arms):
     turn, count = 0, find_unsolved_rows(solver, 0, any_struck, dt, span, arms, islands)
     while count > 0:
         for _ in range(SWEEPS_PER_LOOK):
-            if len(arms) > 1:
-                relax_open(solver)
+            for_joints(solver, RELAX_OPEN, NO_NUMBERS, span, arms)
             relax_listed(solver, count, arms)
         measure_energy(solver, span, arms, islands)
         turn += SWEEPS_PER_LOOK
-        note_changed(solver, turn, count, arms)
+        note_changed(solver, turn, count)
         count = find_unsolved_rows(solver, turn, any_struck, dt, span, arms, islands)
     limit_energy(solver, span, arms, islands)
     carry_budget(solver, islands)

@@ -133,7 +133,6 @@ def measure_joint(state, j, dt):
     solver, joints, spin = state.solver, state.solver.joints, state.bodies.spin
     a, b = joints.row_a[j], joints.row_b[j]
     t = island_of_rows(state, a, b)
-    solver.jointed[t] = True
     solver.links[t] += 1
     solver.driven[t] |= joints.rule[j] > LIMIT
     if joints.kind[j] >= TURN and joints.rule[j] == LIMIT:
@@ -162,7 +161,7 @@ def number_islands(state, dt, ordered):
             solver.lightest[t], solver.most_change[t], solver.mass_of[t], solver.force_of[t] = math.inf, 0.0, 0.0, 0.0
             solver.stiff[t] = solver.own[t] = solver.approach_extents[t] = solver.taken[t] = 0.0
             solver.size_of[t], solver.driven[t], solver.needs_substeps[t], solver.credit[t] = 0, False, False, 0.0
-            solver.jointed[t], solver.at_once[t], solver.sway[t], solver.links[t] = False, False, 0.0, 0
+            solver.at_once[t], solver.sway[t], solver.links[t] = False, 0.0, 0
         number[q] = t
         change = sub(velocity[i], start[i])
         if warm_started[i]:
@@ -205,7 +204,7 @@ def measure_islands(state, dt):
         stiff = (w_a + w_b) * inverse_extent
         solver.stiff[t], solver.own[t] = max(solver.stiff[t], stiff), max(solver.own[t], stiff / max(w_a, w_b))
         strike = dot(sub(v_a, v_b), pairs.normal[c]) * dt * inverse_extent
-        if solver.jointed[t]:
+        if solver.links[t] > 0:
             arms = arms_to(bodies, a, b, pairs.normal[c], pairs.point[c], centre_offset_at_start(bodies, a, b))
             speed = length(add(sub(v_b, v_a), velocity_by_spin(bodies, a, b, arms)))
             solver.needs_substeps[t] |= speed * dt * inverse_extent > LIMIT_STRIKE

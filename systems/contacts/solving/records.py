@@ -135,7 +135,6 @@ SOLVER = Schema(
     taken=floats(unit="J"),  # that the guard has taken in this step
     struck=flags(),  # some row is far from solved
     listed_of=ints("int32"),  # rows of it that further passes go over
-    jointed=flags(),
     driven=flags(),  # by motors or springs, which give energy
     needs_substeps=flags(),  # so fast struck that its joints need more substeps
     credit=floats(unit="J"),  # that joints have taken in this step, and may give back

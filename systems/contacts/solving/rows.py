@@ -2,8 +2,7 @@
 ``chunks`` for many at once.
 
 Where bodies spin, each row has an arm to each of its bodies. ``arms`` is ARMS or NO_ARMS, which differ in type: each
-part is compiled as if there were no other, and a world without rotation pays nothing for it. Where bodies are joined
-it is JOINTED, one longer than ARMS: substeps solve the joints of their range, too.
+part is compiled as if there were no other, and a world without rotation pays nothing for it.
 
 A range of rows is a span (first row, end of the rows, first body, end of the bodies). ``arms`` is an argument by itself
 wherever it is asked for: then what is not meant is not even compiled.
@@ -27,7 +26,7 @@ from ...integration.turning import (
 )  # fmt: skip
 from ..constants import FULL_PUSH_OVERLAP, NEGLIGIBLE, STRUCK_EXCESS
 
-NO_ARMS, ARMS, JOINTED = (), (True,), (True, True)
+NO_ARMS, ARMS = (), (True,)
 
 
 @inlined

@@ -15,8 +15,19 @@ from ....framework.compilation import packed, part
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add, add_scaled, dot, scale
 from ...codes import OK
-from ...joints.direct import solve_direct
-from ...joints.rows import add_joints, keep_joints, measure_joints, solve_joints, start_joints, warm_start_joints
+from ...joints.calls import (
+    ADD,
+    KEEP,
+    PUSH,
+    PUSH_AGAIN,
+    RELAX,
+    RELAX_AGAIN,
+    START,
+    TURN_BODIES,
+    WARM_START,
+    for_joints,
+)  # fmt: skip
+from ...linking.parts import JOINED_RANGE, call_joined_range
 from ..constants import (
     DAMPING_RATIO,
     LAST_RELAX_PASSES,
@@ -35,7 +46,6 @@ from .overload import cap_mass_ratio, restore_mass
 from .passes import close_nearest_first, note_impulses, solve_passes
 from .rows import (
     ARMS,
-    JOINTED,
     NO_ARMS,
     apply_impulse,
     compute_effective_mass,
@@ -43,7 +53,6 @@ from .rows import (
     rotate_body,
     update_targets,
 )
-from .turning import integrate_rotation_of_joined
 
 
 @part
@@ -63,8 +72,6 @@ def measure(solver, h, springs, dt, stiff, ends, span, arms):
     for k in range(span[0], span[1] if any_struck else span[0]):
         if solver.wrong[k]:
             solver.struck[island_of(solver, k)] = True
-    if len(arms) > 1:
-        measure_joints(solver)
     return any_struck
 
 
@@ -79,10 +86,9 @@ def apply_forces(solver, h, span, arms):
 
 
 @part
-def apply_warm_start(solver, span, arms):
+def apply_warm_start(solver, times, span, arms):
     """The impulses of the last substep act again."""
-    if len(arms) > 1:
-        warm_start_joints(solver)
+    for_joints(solver, WARM_START, times, span, arms)
     for k in range(span[0], span[1] if len(arms) > 0 and solver.has_rolling else span[0]):
         solver.rolled[k] = scale(solver.normal[k], 0.0)
     for k in range(span[0], span[1]):
@@ -109,8 +115,8 @@ def integrate_positions(solver, h, span, arms):
 @part
 def integrate_rotations(solver, h, span, arms):
     """Bodies go on turning for a time."""
-    if len(arms) > 1 and len(solver.velocity[solver.bodies]) == 3:  # of the world, where there are joints
-        integrate_rotation_of_joined(solver, span[2], span[3], h)
+    if len(arms) > 0 and solver.joints.active > 0 and len(solver.velocity[span[2]]) == 3:
+        call_joined_range(solver.joints.solver, solver, TURN_BODIES, (h, h), span)
         load_masses(solver, span)
     elif len(arms) > 0:
         integrate_rotation(solver, span[2], span[3], h)
@@ -125,7 +131,7 @@ def rule_of(solver, s, arms):
         passes = last = TURNING_RELAX_PASSES
     if s == 0:
         return solver.usual, passes, last, False
-    if not (len(arms) > 1 and solver.jointed[t]):
+    if solver.links[t] == 0:
         passes = last = REFINED_PASSES
     return solver.substeps_of[t], passes, last, solver.hard_of[t]
 
@@ -135,33 +141,28 @@ def solve_substep(solver, springs, times, rule, ends, span, arms):
     """One substep of a range. springs: see ``contact_spring``; times: s, of a substep and of the step."""
     (h, dt), (_, passes, last, stiff), start, stop = times, rule, span[0], span[1]
     apply_forces(solver, h, span, arms)
-    apply_warm_start(solver, span, arms)
+    apply_warm_start(solver, times, span, arms)
     if stiff:
         close_nearest_first(solver, h, span, arms)
-    if len(arms) > 1:
-        solve_joints(solver, True)
+    for_joints(solver, PUSH, times, span, arms)
     solve_passes(solver, True, 1, stiff, h, span, arms)
-    if len(arms) > 1 and solver.direct.begin < solver.direct.end and start < stop:
-        solve_direct(solver, True)
+    for_joints(solver, PUSH_AGAIN, times, span, arms)
     integrate_positions(solver, h, span, arms)
     if solver.lightened:
         restore_mass(solver, h, span, arms)
     any_struck = measure(solver, h, springs, dt, stiff, ends, span, arms)
     if ends and solver.any_hard:
         defer_open_contacts(solver, h, span, arms)
-    if len(arms) > 1:  # once: more often, chains give way more
-        solve_joints(solver, False)
+    for_joints(solver, RELAX, times, span, arms)
     solve_passes(solver, False, last if ends else passes, stiff, h, span, arms)
-    if len(arms) > 1 and solver.direct.begin < solver.direct.end and start < stop:
-        solve_direct(solver, False)
+    for_joints(solver, RELAX_AGAIN, times, span, arms)
     finish_substep(solver, springs[0][1], any_struck, h, dt, span, arms)
     if solver.lightened:
         restore_mass(solver, 0.0, span, arms)
     for k in range(start, stop):
         solver.total[k] += solver.impulse[k]
         solver.had_impulse[k] |= solver.impulse[k] > 0.0
-    if len(arms) > 1:
-        add_joints(solver)
+    for_joints(solver, ADD, times, span, arms)
 
 
 @part
@@ -169,7 +170,7 @@ def is_still(solver, dt, span, arms):
     """Whether an island rests, and its last substep has changed nothing that matters: those that follow would not."""
     start, stop, begin, end = span
     extent, fastest = math.inf, 0.0
-    if len(arms) > 1 and solver.joints.begin < solver.joints.end:
+    if len(arms) > 0 and solver.joints.begin < solver.joints.end:
         return False
     for q in range(begin, end):
         fastest = max(fastest, dot(solver.velocity[q], solver.velocity[q]))
@@ -232,8 +233,7 @@ def solve_range(solver, s, dt, span, arms):
     for k in range(span[0], span[1]):
         sag = solver.impulse[k] * h / (turn * turn * solver.mass[k])
         solver.loaded[k] = 0.0 if stiff else min(sag, LOAD_SAG_MAX * solver.extent[k])
-    if len(arms) > 1:
-        start_joints(solver, h, dt / solver.usual)
+    for_joints(solver, START, (h, dt), span, arms)
     measure(solver, h, springs, dt, stiff, False, span, arms)
     for step in range(substeps):
         left = substeps - 1 - step
@@ -244,8 +244,7 @@ def solve_range(solver, s, dt, span, arms):
             repeat_substep(solver, left, h, span, arms)
             break
     scale_impulses(solver, float(substeps), span)
-    if len(arms) > 1:
-        keep_joints(solver, dt)
+    for_joints(solver, KEEP, (h, dt), span, arms)
 
 
 @part
@@ -291,14 +290,10 @@ def solve_substeps(state, dt, arms):
             solver.lightened = solver.load_share[t] < 1.0
             if solver.lightened:
                 cap_mass_ratio(solver, t, dt, span, arms)
-        any_joint = False
-        if len(arms) > 1:
-            joints.begin = joints.end if special else 0
-            joints.end = solver.joint_ends[s]
-            direct.begin = direct.end if special else 0
-            direct.end = direct.body_ends[s]
-            any_joint = joints.begin < joints.end
-        if span[1] > start or any_joint:
+        joints.begin, joints.end = joints.end if special else 0, solver.joint_ends[s]
+        if joints.active > 0:
+            direct.begin, direct.end = direct.end if special else 0, direct.body_ends[s]
+        if span[1] > start or joints.begin < joints.end:
             solve_range(solver, s, dt, span, arms)
         start, begin = span[1], span[3]
     count_work(state, dt)
@@ -314,15 +309,9 @@ def solve_contacts(state, dt):
 
 @packed
 def solve_turning_contacts(state, dt):
-    """The contacts of bodies of which some spin."""
-    if state.solver.contacts > 0:
+    """The contacts and joints of bodies of which some spin."""
+    joints = state.solver.joints
+    joints.solver = state.links[JOINED_RANGE]
+    if state.solver.contacts > 0 or joints.active > 0:
         solve_substeps(state, dt, ARMS)
-    return OK
-
-
-@packed
-def solve_joined_contacts(state, dt):
-    """The joints of bodies, and the contacts where there are joints."""
-    if state.solver.contacts > 0 or state.solver.joints.active > 0:
-        solve_substeps(state, dt, JOINTED)
     return OK

@@ -1,0 +1,21 @@
+"""What the solver of contacts asks of the joints of a range, by address: worlds without joints link none of them."""
+
+from __future__ import annotations
+
+from ...framework.compilation import inlined
+from ..linking.parts import call_joined_range
+
+# See solving.solve_joined_range, which does it.
+(
+    START, WARM_START, PUSH, RELAX, PUSH_AGAIN, RELAX_AGAIN, TURN_BODIES, ADD, KEEP, OPEN, CLOSE, RELAX_OPEN, ADD_WORK,
+    SUM_WORK, FADE,
+) = range(15)  # fmt: skip
+
+
+@inlined
+def for_joints(solver, what, numbers, span, arms):
+    """Ask it of the joints of a range, if there are some. numbers: two that it needs, most often s of a substep and of
+    the step; returns the first one, or what joints add to it."""
+    if len(arms) > 0 and solver.joints.begin < solver.joints.end:
+        return call_joined_range(solver.joints.solver, solver, what, numbers, span)
+    return numbers[0]

@@ -1,0 +1,152 @@
+"""What joints do in the substeps of a range: one function for all that the solver of contacts asks, see calls."""
+
+from __future__ import annotations
+
+import math
+
+from ...framework.compilation import packed, part
+from ...framework.vectors import add, dot, scale
+from ..contacts.solving.turning import integrate_rotation_of_joined
+from ..integration.turning import cross_spin
+from .calls import (
+    ADD,
+    ADD_WORK,
+    CLOSE,
+    FADE,
+    KEEP,
+    OPEN,
+    PUSH,
+    PUSH_AGAIN,
+    RELAX,
+    RELAX_AGAIN,
+    RELAX_OPEN,
+    START,
+    SUM_WORK,
+    TURN_BODIES,
+    WARM_START,
+)  # fmt: skip
+from .custom import rates_of_custom
+from .direct import solve_direct
+from .records import CUSTOM, POINT, TURN
+from .rows import (
+    add_joints,
+    keep_joints,
+    measure_joints,
+    relax_open,
+    solve_joints,
+    start_joints,
+    warm_start_joints,
+)  # fmt: skip
+
+
+@part
+def island_of_joint(solver, j):
+    """The island of row j."""
+    return max(solver.island[solver.joints.first[j]], solver.island[solver.joints.second[j]])
+
+
+@part
+def open_joints(joints):
+    """Further passes may go over all joints of a range."""
+    joints.opened = joints.end - joints.begin
+    for e in range(joints.opened):
+        joints.open_row[e] = joints.order[joints.begin + e]
+
+
+@part
+def close_joints(solver):
+    """No further pass goes over joints of islands without rows in ``listed``."""
+    joints, opened = solver.joints, 0
+    for e in range(joints.opened):
+        j = joints.open_row[e]
+        joints.open_row[opened] = j
+        opened += solver.listed_of[island_of_joint(solver, j)] > 0
+    joints.opened = opened
+
+
+@part
+def work_of_joint(solver, j):
+    """The work of a row on what moves by itself, J: minus what that gives to the island."""
+    joints, island = solver.joints, solver.island
+    a, b = joints.first[j], joints.second[j]
+    if island[a] >= 0 and island[b] >= 0:
+        return 0.0
+    q, arm, away = (a, joints.arm_a[j], -1.0) if island[a] < 0 else (b, joints.arm_b[j], 1.0)
+    if joints.kind[j] == CUSTOM:
+        at_a, at_b = rates_of_custom(solver, j)
+        return joints.impulse[j] * (at_a if q == a else at_b)
+    if joints.kind[j] >= TURN:
+        return away * joints.impulse[j] * dot(joints.normal[j], solver.spin[q])
+    push = joints.push[j] if joints.kind[j] == POINT else scale(joints.normal[j], joints.impulse[j])
+    return away * dot(push, add(solver.velocity[q], cross_spin(solver.spin[q], arm)))
+
+
+@part
+def add_joint_work(solver):
+    """What moves by itself gives its work to open islands; what is driven may gain anything."""
+    joints = solver.joints
+    for e in range(joints.opened):
+        j = joints.open_row[e]
+        t = island_of_joint(solver, j)
+        if solver.driven[t]:
+            solver.slope[t] = -math.inf
+        elif solver.movers > 0:
+            solver.slope[t] += work_of_joint(solver, j)
+
+
+@part
+def sum_joint_work(solver, work):
+    """``work`` and that of all joints of a range."""
+    joints = solver.joints
+    for e in range(joints.begin, joints.end if solver.movers > 0 else joints.begin):
+        work += work_of_joint(solver, joints.order[e])
+    return work
+
+
+@part
+def fade_joints(solver):
+    """Joints of islands that the guard has restrained begin the next substep with as much less."""
+    joints = solver.joints
+    for e in range(joints.begin, joints.end):
+        j = joints.order[e]
+        kept = solver.share[island_of_joint(solver, j)]
+        if kept < 1.0:
+            joints.impulse[j], joints.push[j] = kept * joints.impulse[j], scale(joints.push[j], kept)
+
+
+@packed
+def solve_joined_range(solver, what, numbers, span):
+    """Whatever calls asks of the joints of a range."""
+    h, dt = numbers
+    if what == START:
+        start_joints(solver, h, dt / solver.usual)
+        measure_joints(solver)
+    elif what == WARM_START:
+        warm_start_joints(solver)
+    elif what == PUSH:
+        solve_joints(solver, True)
+    elif what == RELAX:  # once: more often, chains give way more
+        measure_joints(solver)
+        solve_joints(solver, False)
+    elif what in (PUSH_AGAIN, RELAX_AGAIN):  # after the contacts
+        if solver.direct.begin < solver.direct.end and span[0] < span[1]:
+            solve_direct(solver, what == PUSH_AGAIN)
+    elif what == TURN_BODIES:
+        integrate_rotation_of_joined(solver, span[2], span[3], h)
+    elif what == ADD:
+        add_joints(solver)
+    elif what == KEEP:
+        keep_joints(solver, dt)
+    elif what == OPEN:
+        open_joints(solver.joints)
+    elif what == CLOSE:
+        close_joints(solver)
+    elif what == RELAX_OPEN:
+        relax_open(solver)
+    elif what == ADD_WORK:
+        add_joint_work(solver)
+    elif what == SUM_WORK:
+        return sum_joint_work(solver, h)
+    elif what == FADE:
+        fade_joints(solver)
+    return h
