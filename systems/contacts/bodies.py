@@ -28,7 +28,6 @@ from ..records import (
 )
 from ..shapes.surfaces import any_surface_runs
 from ..step_stages import KEEPS_HOLD
-from .constants import FREQUENCY, TIPPING_FREQUENCY
 from .points import points_of
 from .solving.islands import order_joints, order_rows
 from .solving.prediction import drop_support
@@ -75,7 +74,6 @@ def list_rows(state):
             same &= solver.point[r] == e
             solver.pair[r], solver.point[r] = c, e
             r += 1
-    solver.frequency = TIPPING_FREQUENCY if solver.tips else FREQUENCY
     return same
 
 

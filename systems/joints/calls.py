@@ -7,7 +7,7 @@ from ..linking.parts import call_joined_range
 
 # See solving.solve_joined_range, which does it.
 (
-    START, WARM_START, PUSH, RELAX, PUSH_AGAIN, RELAX_AGAIN, TURN_BODIES, ADD, KEEP, OPEN, CLOSE, RELAX_OPEN, ADD_WORK,
+    START, WARM_START, PUSH, RELAX, PUSH_AGAIN, RELAX_AGAIN, TURN, ADD, KEEP, OPEN, CLOSE, RELAX_OPEN, ADD_WORK,
     SUM_WORK, FADE,
 ) = range(15)  # fmt: skip
 

@@ -44,11 +44,10 @@ def speed_of_custom(solver, j):
 
 
 @part
-def measure_custom(solver, j):
+def measure_custom(solver, j, moved_for):
     """The value of a row now. Its sum of changes takes the mean of those before and after a substep."""
     joints = solver.joints
     a, b = joints.first[j], joints.second[j]
-    moved_for = joints.moved_for
     before = speed_of_custom(solver, j) if moved_for > 0.0 else 0.0
     joints.asked = joints.joint[j]
     value, along_a, turn_a, along_b, turn_b = call_given(joints.function[j], solver, j)

@@ -221,16 +221,22 @@ def note_push(direct, q, push, turn, impulse):
 
 
 @inlined
+def speed_between(solver, j):
+    """The velocity of b's anchor as that of a sees it."""
+    joints, a, b = solver.joints, solver.joints.first[j], solver.joints.second[j]
+    v_a = add(solver.velocity[a], cross_spin(solver.spin[a], joints.arm_a[j]))
+    return sub(add(solver.velocity[b], cross_spin(solver.spin[b], joints.arm_b[j])), v_a)
+
+
+@inlined
 def speed_of(solver, j):
     """How fast the value of a row that is no POINT changes."""
-    joints, a, b = solver.joints, solver.joints.first[j], solver.joints.second[j]
+    joints = solver.joints
     if joints.kind[j] == CUSTOM:
         return speed_of_custom(solver, j)
-    turning = sub(solver.spin[b], solver.spin[a])
     if joints.kind[j] >= TURN:
-        return dot(joints.normal[j], turning)
-    v_a = add(solver.velocity[a], cross_spin(solver.spin[a], joints.arm_a[j]))
-    return dot(joints.normal[j], sub(add(solver.velocity[b], cross_spin(solver.spin[b], joints.arm_b[j])), v_a))
+        return dot(joints.normal[j], sub(solver.spin[joints.second[j]], solver.spin[joints.first[j]]))
+    return dot(joints.normal[j], speed_between(solver, j))
 
 
 @part
@@ -250,9 +256,7 @@ def note_rows(solver, what):
             continue
         a, b, weight = joints.first[j], joints.second[j], inverse_mass_of(solver, j)
         if joints.kind[j] == POINT:
-            v_a = add(solver.velocity[a], cross_spin(solver.spin[a], joints.arm_a[j]))
-            speed = sub(add(solver.velocity[b], cross_spin(solver.spin[b], joints.arm_b[j])), v_a)
-            speed = scale(speed, 0.0) if errors else speed
+            speed = scale(speed_between(solver, j), 0.0 if errors else 1.0)
             if pushes:
                 speed = add_scaled(speed, joints.gap[j], direct.share * joints.push_rate[j])
             change = scale(speed, -weight)

@@ -83,7 +83,6 @@ JOINTS = Schema(
     step=number(unit="s"),  # of a substep
     fastest=number(unit="Hz"),  # springs above it hold
     stiffness=number(unit="1"),  # of what holds
-    moved_for=number(unit="s"),  # since the joints were measured
     asked=integer(),  # the joint whose function runs now; 0: none
     push_rate=floats(unit="1/s"),  # at which error is pushed out,
     mass_scale=floats(unit="1"),  # and what makes it soft

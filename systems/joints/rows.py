@@ -34,8 +34,8 @@ from .coupling import (
     response_at,
     symmetric_product,
 )
-from .custom import measure_custom, push_custom, speed_of_custom
-from .direct import bound_push, factorise, solve_all_limited, solve_direct
+from .custom import measure_custom, push_custom
+from .direct import bound_push, factorise, solve_all_limited, solve_direct, speed_between, speed_of
 from .order import is_rigid
 from .records import ALIGN, BY_PASSES, CUSTOM, DRIVE, HELD_AT_ONCE, LIMIT, POINT, SERVO, SLIDE, TURN, TWIST
 
@@ -90,7 +90,7 @@ def start_joints(solver, h, period):
     """The joints of a range start with the forces that they had, in substeps of h. They are as stiff as in the usual
     ``period``, whatever contacts ask for: changes of it would give energy to what is stretched."""
     joints = solver.joints
-    joints.step, joints.moved_for, joints.fastest = h, 0.0, SPRING_FREQUENCY / period
+    joints.step, joints.fastest = h, SPRING_FREQUENCY / period
     omega = 2.0 * math.pi * FREQUENCY / period
     damping = 2.0 * JOINT_DAMPING_RATIO + h * omega
     joints.stiffness = stiffness = h * omega * damping
@@ -222,8 +222,8 @@ def servo_speed(joints, j):
 
 
 @part
-def measure_joints(solver):
-    """Where the joints of a range hold their bodies now, and what they ask."""
+def measure_joints(solver, moved_for):
+    """Where the joints of a range hold their bodies now, and what they ask. moved_for: s since they were measured."""
     joints, shift, order = solver.joints, solver.shift, solver.joints.order
     kinds, first, second, base_a, base_b = joints.kind, joints.first, joints.second, joints.base_a, joints.base_b
     between, arms_a, arms_b, gap = joints.between, joints.arm_a, joints.arm_b, joints.gap
@@ -233,7 +233,7 @@ def measure_joints(solver):
         j = order[e]
         kind, a, b = kinds[j], first[j], second[j]
         if kind == CUSTOM:
-            update_joint_targets(joints, j, measure_custom(solver, j))
+            update_joint_targets(joints, j, measure_custom(solver, j, moved_for))
             continue
         if kind >= TURN:
             axis, angle = angle_of(solver, j)
@@ -274,7 +274,6 @@ def measure_joints(solver):
     for e in range(joints.begin, joints.end):
         if joints.rule[order[e]] == SERVO:
             servo_speed(joints, order[e])
-    joints.moved_for = joints.step
 
 
 @inlined
@@ -349,25 +348,10 @@ def warm_start_joints(solver):
 
 
 @inlined
-def speed_between(solver, j):
-    """The velocity of b's anchor as that of a sees it."""
-    joints = solver.joints
-    a, b = joints.first[j], joints.second[j]
-    v_a = add(solver.velocity[a], cross_spin(solver.spin[a], joints.arm_a[j]))
-    return sub(add(solver.velocity[b], cross_spin(solver.spin[b], joints.arm_b[j])), v_a)
-
-
-@inlined
 def solve_row(solver, j, pushes):
     """The value of a row changes as it asks, as far as its impulses allow."""
     joints, old = solver.joints, solver.joints.impulse[j]
-    if joints.kind[j] == CUSTOM:
-        speed = speed_of_custom(solver, j)
-    elif joints.kind[j] >= TURN:
-        speed = dot(joints.normal[j], sub(solver.spin[joints.second[j]], solver.spin[joints.first[j]]))
-    else:
-        speed = dot(joints.normal[j], speed_between(solver, j))
-    asked = (joints.pushing[j] if pushes else joints.target_speed[j]) - speed
+    asked = (joints.pushing[j] if pushes else joints.target_speed[j]) - speed_of(solver, j)
     least, greatest = joints.least[j], joints.greatest[j]
     if old == 0.0:
         if asked <= 0.0 == least or asked >= 0.0 == greatest:

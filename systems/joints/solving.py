@@ -8,35 +8,11 @@ from ...framework.compilation import packed, part
 from ...framework.vectors import add, dot, scale
 from ..contacts.solving.turning import integrate_rotation_of_joined
 from ..integration.turning import cross_spin
-from .calls import (
-    ADD,
-    ADD_WORK,
-    CLOSE,
-    FADE,
-    KEEP,
-    OPEN,
-    PUSH,
-    PUSH_AGAIN,
-    RELAX,
-    RELAX_AGAIN,
-    RELAX_OPEN,
-    START,
-    SUM_WORK,
-    TURN_BODIES,
-    WARM_START,
-)  # fmt: skip
+from . import calls
 from .custom import rates_of_custom
 from .direct import solve_direct
 from .records import CUSTOM, POINT, TURN
-from .rows import (
-    add_joints,
-    keep_joints,
-    measure_joints,
-    relax_open,
-    solve_joints,
-    start_joints,
-    warm_start_joints,
-)  # fmt: skip
+from .rows import add_joints, keep_joints, measure_joints, relax_open, solve_joints, start_joints, warm_start_joints
 
 
 @part
@@ -118,35 +94,35 @@ def fade_joints(solver):
 def solve_joined_range(solver, what, numbers, span):
     """Whatever calls asks of the joints of a range."""
     h, dt = numbers
-    if what == START:
+    if what == calls.START:
         start_joints(solver, h, dt / solver.usual)
-        measure_joints(solver)
-    elif what == WARM_START:
+        measure_joints(solver, 0.0)
+    elif what == calls.WARM_START:
         warm_start_joints(solver)
-    elif what == PUSH:
+    elif what == calls.PUSH:
         solve_joints(solver, True)
-    elif what == RELAX:  # once: more often, chains give way more
-        measure_joints(solver)
+    elif what == calls.RELAX:  # once: more often, chains give way more
+        measure_joints(solver, h)
         solve_joints(solver, False)
-    elif what in (PUSH_AGAIN, RELAX_AGAIN):  # after the contacts
+    elif what in (calls.PUSH_AGAIN, calls.RELAX_AGAIN):  # after the contacts
         if solver.direct.begin < solver.direct.end and span[0] < span[1]:
-            solve_direct(solver, what == PUSH_AGAIN)
-    elif what == TURN_BODIES:
+            solve_direct(solver, what == calls.PUSH_AGAIN)
+    elif what == calls.TURN:
         integrate_rotation_of_joined(solver, span[2], span[3], h)
-    elif what == ADD:
+    elif what == calls.ADD:
         add_joints(solver)
-    elif what == KEEP:
+    elif what == calls.KEEP:
         keep_joints(solver, dt)
-    elif what == OPEN:
+    elif what == calls.OPEN:
         open_joints(solver.joints)
-    elif what == CLOSE:
+    elif what == calls.CLOSE:
         close_joints(solver)
-    elif what == RELAX_OPEN:
+    elif what == calls.RELAX_OPEN:
         relax_open(solver)
-    elif what == ADD_WORK:
+    elif what == calls.ADD_WORK:
         add_joint_work(solver)
-    elif what == SUM_WORK:
+    elif what == calls.SUM_WORK:
         return sum_joint_work(solver, h)
-    elif what == FADE:
+    elif what == calls.FADE:
         fade_joints(solver)
     return h

@@ -34,25 +34,24 @@ make_chunk = stack_record(CHUNK, ROW_CHUNK)
 
 @part
 def find_chunks(solver, span):
-    """The chunks of a range, which are behind those of the one before."""
-    c = solver.end_chunk if span[0] > 0 else 0
-    solver.first_chunk = c
-    while c < solver.chunks and solver.ends[c] <= span[1]:
+    """The first chunk of a range, behind those of the one before."""
+    c = solver.first_chunk if span[0] > 0 else 0
+    while c < solver.chunks and solver.ends[c] <= span[0]:
         c += 1
-    solver.end_chunk = c
+    solver.first_chunk = c
 
 
 @part
 def load_masses(solver, span):
     """The masses of the bodies of the pairs of a range."""
-    start = span[0]
-    for c in range(solver.first_chunk, solver.end_chunk):
+    start, c = span[0], solver.first_chunk
+    while start < span[1]:
         for k in range(start, start + (solver.ends[c] - start) // solver.points[c]):
             a, b = solver.first[k], solver.second[k]
             solver.mass_a[k], solver.mass_b[k] = solver.inverse_mass[a], solver.inverse_mass[b]
             solver.inertia_a[k], solver.products_a[k] = solver.inverse_inertia[a], solver.inverse_products[a]
             solver.inertia_b[k], solver.products_b[k] = solver.inverse_inertia[b], solver.inverse_products[b]
-        start = solver.ends[c]
+        start, c = solver.ends[c], c + 1
 
 
 @inlined
@@ -216,11 +215,11 @@ def solve_rows(solver, chunk, bias, pushes, start, pairs, points):
 @part
 def solve_chunks(solver, bias, pushes, span):
     """One pass over the rows of a range. bias, pushes: see ``solve_normals``."""
-    start, chunk = span[0], make_chunk(scale(solver.velocity[0], 0.0))
-    for c in range(solver.first_chunk, solver.end_chunk):
+    start, c, chunk = span[0], solver.first_chunk, make_chunk(scale(solver.velocity[0], 0.0))
+    while start < span[1]:
         points = solver.points[c]
         pairs = (solver.ends[c] - start) // points
         gather_motion(solver, chunk, start, pairs)
         solve_rows(solver, chunk, bias, pushes, start, pairs, points)
         scatter_motion(solver, chunk, start, pairs)
-        start = solver.ends[c]
+        start, c = solver.ends[c], c + 1

@@ -12,7 +12,8 @@ import math
 from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, dot, scale, sub
 from ...integration.turning import momentum_of_spin
-from ...joints.calls import ADD_WORK, CLOSE, FADE, OPEN, RELAX_OPEN, for_joints
+from ...joints import calls
+from ...joints.calls import for_joints
 from ..constants import (
     FINER_PASSES,
     FULL_PUSH_OVERLAP,
@@ -52,7 +53,7 @@ def open_all(solver, span, arms):
         solver.open_body[opened] = q
         opened += solver.island[q] >= 0
     solver.opened = opened
-    for_joints(solver, OPEN, NO_NUMBERS, span, arms)
+    for_joints(solver, calls.OPEN, NO_NUMBERS, span, arms)
 
 
 @part
@@ -64,7 +65,7 @@ def close_solved(solver, span, arms):
         solver.open_body[opened] = q
         opened += solver.listed_of[solver.island[q]] > 0
     solver.opened = opened
-    for_joints(solver, CLOSE, NO_NUMBERS, span, arms)
+    for_joints(solver, calls.CLOSE, NO_NUMBERS, span, arms)
 
 
 @part
@@ -91,7 +92,7 @@ def add_work(solver, span, arms):
         t = island_of(solver, k)
         if solver.listed_of[t] > 0:
             solver.slope[t] += work_of_row(solver, k, arms)
-    for_joints(solver, ADD_WORK, NO_NUMBERS, span, arms)
+    for_joints(solver, calls.ADD_WORK, NO_NUMBERS, span, arms)
 
 
 @part
@@ -227,7 +228,7 @@ def limit_energy(solver, span, arms, islands):
                 turned = sub(solver.spin[q], solver.spin_before[q])
                 solver.spin[q] = add_scaled(solver.spin_before[q], turned, share[t])
     if any_gain:
-        for_joints(solver, FADE, NO_NUMBERS, span, arms)
+        for_joints(solver, calls.FADE, NO_NUMBERS, span, arms)
     for k in range(start, stop if any_gain else start):
         kept = share[island_of(solver, k)]
         if kept < 1.0:
@@ -261,7 +262,7 @@ def finish_substep(solver, bias_rate, any_struck, h, dt, span, arms):
     turn, count = 0, find_unsolved_rows(solver, 0, any_struck, dt, span, arms, islands)
     while count > 0:
         for _ in range(SWEEPS_PER_LOOK):
-            for_joints(solver, RELAX_OPEN, NO_NUMBERS, span, arms)
+            for_joints(solver, calls.RELAX_OPEN, NO_NUMBERS, span, arms)
             relax_listed(solver, count, arms)
         measure_energy(solver, span, arms, islands)
         turn += SWEEPS_PER_LOOK

@@ -9,7 +9,8 @@ from __future__ import annotations
 from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, dot, length, scale, sub
 from ...integration.turning import momentum_of_spin
-from ...joints.calls import SUM_WORK, for_joints
+from ...joints import calls
+from ...joints.calls import for_joints
 from ..constants import GAIN_ROUNDING
 from .guard import work_of_row
 from .rows import compute_effective_mass, rotate_body
@@ -57,7 +58,7 @@ def find_support(solver, span, arms):
             given += max(0.0, dot(way, sub(velocity[q], before[q]))) * mass[q]
     for k in range(span[0], span[1] if solver.movers > 0 or solver.surfaces_run else span[0]):
         work += work_of_row(solver, k, arms)
-    work = for_joints(solver, SUM_WORK, (work, 0.0), span, arms)
+    work = for_joints(solver, calls.SUM_WORK, (work, 0.0), span, arms)
     return way, -work / size, size / max(size, given)
 
 

@@ -10,7 +10,6 @@ from ....framework.jit.records.schema import (
     floats,
     integer,
     ints,
-    number,
     table,
     vectors,
 )  # fmt: skip
@@ -76,8 +75,7 @@ SOLVER = Schema(
     ends=ints("int32"),  # where each chunk ends,
     points=ints("int8"),  # and how many rows each of its pairs has
     chunks=integer(),
-    first_chunk=integer(),  # of a range,
-    end_chunk=integer(),  # and the one behind its last
+    first_chunk=integer(),  # of a range
     visits=integer(),  # rows solved in this step
     starts=ints(),  # where each colour begins
     # bodies, in the order of their ranges
@@ -144,7 +142,6 @@ SOLVER = Schema(
     # ranges: the ordinary islands, then each special one
     ranges=integer(),
     usual=integer(),  # substeps,
-    frequency=number(unit="1"),  # of the springs, times the rate of the substeps
     special=ints("int32"),  # island of a range
     row_ends=ints("int32"),
     body_ends=ints("int32"),
@@ -152,7 +149,6 @@ SOLVER = Schema(
     # faults: how many bodies, and the row of the first
     squeezed=integer(),  # there is no room where they are pushed
     squeezed_row=integer(),
-    lightened=flag(),  # the range has some
     overloaded=integer(),  # they count as lighter than they are
     overloaded_row=integer(),
     restrained=integer(),  # first bodies of islands to which contacts would have given much energy

@@ -11,25 +11,16 @@ from __future__ import annotations
 
 import math
 
-from ....framework.compilation import packed, part
+from ....framework.compilation import inlined, packed, part
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add, add_scaled, dot, scale
 from ...codes import OK
-from ...joints.calls import (
-    ADD,
-    KEEP,
-    PUSH,
-    PUSH_AGAIN,
-    RELAX,
-    RELAX_AGAIN,
-    START,
-    TURN_BODIES,
-    WARM_START,
-    for_joints,
-)  # fmt: skip
+from ...joints import calls
+from ...joints.calls import for_joints
 from ...linking.parts import JOINED_RANGE, call_joined_range
 from ..constants import (
     DAMPING_RATIO,
+    FREQUENCY,
     LAST_RELAX_PASSES,
     LOAD_SAG_MAX,
     NEGLIGIBLE,
@@ -37,6 +28,7 @@ from ..constants import (
     RELAX_PASSES,
     REPORTED_GAIN,
     STATIC_STIFFNESS,
+    TIPPING_FREQUENCY,
     TURNING_RELAX_PASSES,
 )  # fmt: skip
 from .chunks import find_chunks, load_masses
@@ -88,7 +80,7 @@ def apply_forces(solver, h, span, arms):
 @part
 def apply_warm_start(solver, times, span, arms):
     """The impulses of the last substep act again."""
-    for_joints(solver, WARM_START, times, span, arms)
+    for_joints(solver, calls.WARM_START, times, span, arms)
     for k in range(span[0], span[1] if len(arms) > 0 and solver.has_rolling else span[0]):
         solver.rolled[k] = scale(solver.normal[k], 0.0)
     for k in range(span[0], span[1]):
@@ -116,7 +108,7 @@ def integrate_positions(solver, h, span, arms):
 def integrate_rotations(solver, h, span, arms):
     """Bodies go on turning for a time."""
     if len(arms) > 0 and solver.joints.active > 0 and len(solver.velocity[span[2]]) == 3:
-        call_joined_range(solver.joints.solver, solver, TURN_BODIES, (h, h), span)
+        call_joined_range(solver.joints.solver, solver, calls.TURN, (h, h), span)
         load_masses(solver, span)
     elif len(arms) > 0:
         integrate_rotation(solver, span[2], span[3], h)
@@ -125,44 +117,45 @@ def integrate_rotations(solver, h, span, arms):
 @part
 def rule_of(solver, s, arms):
     """(substeps, passes in each that take back the speed that pushing has given, the same in the last one, whether
-    they go on until they agree) of a range. More passes would pull joints apart, which have one."""
+    they go on until they agree, whether masses are capped) of a range. More passes would pull joints apart, which have
+    one."""
     t, passes, last = solver.special[s], RELAX_PASSES, LAST_RELAX_PASSES
     if len(arms) > 0:
         passes = last = TURNING_RELAX_PASSES
     if s == 0:
-        return solver.usual, passes, last, False
+        return solver.usual, passes, last, False, False
     if solver.links[t] == 0:
         passes = last = REFINED_PASSES
-    return solver.substeps_of[t], passes, last, solver.hard_of[t]
+    return solver.substeps_of[t], passes, last, solver.hard_of[t], solver.load_share[t] < 1.0
 
 
 @part
 def solve_substep(solver, springs, times, rule, ends, span, arms):
     """One substep of a range. springs: see ``contact_spring``; times: s, of a substep and of the step."""
-    (h, dt), (_, passes, last, stiff), start, stop = times, rule, span[0], span[1]
+    (h, dt), (_, passes, last, stiff, capped), start, stop = times, rule, span[0], span[1]
     apply_forces(solver, h, span, arms)
     apply_warm_start(solver, times, span, arms)
     if stiff:
         close_nearest_first(solver, h, span, arms)
-    for_joints(solver, PUSH, times, span, arms)
+    for_joints(solver, calls.PUSH, times, span, arms)
     solve_passes(solver, True, 1, stiff, h, span, arms)
-    for_joints(solver, PUSH_AGAIN, times, span, arms)
+    for_joints(solver, calls.PUSH_AGAIN, times, span, arms)
     integrate_positions(solver, h, span, arms)
-    if solver.lightened:
+    if capped:
         restore_mass(solver, h, span, arms)
     any_struck = measure(solver, h, springs, dt, stiff, ends, span, arms)
     if ends and solver.any_hard:
         defer_open_contacts(solver, h, span, arms)
-    for_joints(solver, RELAX, times, span, arms)
+    for_joints(solver, calls.RELAX, times, span, arms)
     solve_passes(solver, False, last if ends else passes, stiff, h, span, arms)
-    for_joints(solver, RELAX_AGAIN, times, span, arms)
+    for_joints(solver, calls.RELAX_AGAIN, times, span, arms)
     finish_substep(solver, springs[0][1], any_struck, h, dt, span, arms)
-    if solver.lightened:
+    if capped:
         restore_mass(solver, 0.0, span, arms)
     for k in range(start, stop):
         solver.total[k] += solver.impulse[k]
         solver.had_impulse[k] |= solver.impulse[k] > 0.0
-    for_joints(solver, ADD, times, span, arms)
+    for_joints(solver, calls.ADD, times, span, arms)
 
 
 @part
@@ -205,6 +198,12 @@ def scale_impulses(solver, by, span):
         solver.tangent[k] = scale(solver.tangent[k], by)
 
 
+@inlined
+def spring_frequency(solver):
+    """That of contacts, times the rate of the substeps."""
+    return TIPPING_FREQUENCY if solver.tips else FREQUENCY
+
+
 @part
 def contact_spring(solver, stiffer, substeps, h):
     """(share of its impulse that a soft row gives back, speed per overlap at which it is pushed out).
@@ -212,7 +211,7 @@ def contact_spring(solver, stiffer, substeps, h):
     Where there are more substeps than usual springs are damped by as much more: for the heavy bodies that they bear,
     and so that overlap is pushed out at the usual rate.
     """
-    omega = 2.0 * math.pi * stiffer * solver.frequency / h
+    omega = 2.0 * math.pi * stiffer * spring_frequency(solver) / h
     damping = 2.0 * DAMPING_RATIO * substeps / solver.usual + h * omega
     return 1.0 / (1.0 + h * omega * damping), omega / damping
 
@@ -221,19 +220,21 @@ def contact_spring(solver, stiffer, substeps, h):
 def solve_range(solver, s, dt, span, arms):
     """The substeps of a range."""
     rule, special = rule_of(solver, s, arms), s > 0
-    substeps, _, _, stiff = rule
+    substeps, _, _, stiff, capped = rule
     h = dt / substeps
+    if capped:
+        cap_mass_ratio(solver, solver.special[s], dt, span, arms)
     springs = contact_spring(solver, 1.0, substeps, h), contact_spring(solver, STATIC_STIFFNESS, substeps, h)
     open_all(solver, span, arms)
     if len(arms) > 0:
         find_chunks(solver, span)
         load_masses(solver, span)
     scale_impulses(solver, 1.0 / substeps, span)
-    turn = 2.0 * math.pi * solver.frequency
+    turn = 2.0 * math.pi * spring_frequency(solver)
     for k in range(span[0], span[1]):
         sag = solver.impulse[k] * h / (turn * turn * solver.mass[k])
         solver.loaded[k] = 0.0 if stiff else min(sag, LOAD_SAG_MAX * solver.extent[k])
-    for_joints(solver, START, (h, dt), span, arms)
+    for_joints(solver, calls.START, (h, dt), span, arms)
     measure(solver, h, springs, dt, stiff, False, span, arms)
     for step in range(substeps):
         left = substeps - 1 - step
@@ -244,7 +245,7 @@ def solve_range(solver, s, dt, span, arms):
             repeat_substep(solver, left, h, span, arms)
             break
     scale_impulses(solver, float(substeps), span)
-    for_joints(solver, KEEP, (h, dt), span, arms)
+    for_joints(solver, calls.KEEP, (h, dt), span, arms)
 
 
 @part
@@ -276,20 +277,17 @@ def solve_substeps(state, dt, arms):
         solver.total[k], solver.had_impulse[k] = 0.0, False
     solver.visits, solver.usual = 0, state.substeps
     select_rigid(state, dt, zero_of(state), arms)
-    start, begin, solver.lightened = 0, 0, False
+    start = begin = 0
     joints, direct = solver.joints, solver.direct
     for s in range(solver.ranges):
         span = start, solver.row_ends[s], begin, solver.body_ends[s]
-        t, special = solver.special[s], s > 0
+        special = s > 0
         if special:
             for m in range(solver.movers):
                 q = solver.mover[m]
                 solver.shift[q] = zero_of(state)
                 if len(arms) > 0:
                     rotate_body(solver, q, scale(solver.spin[q], -dt))
-            solver.lightened = solver.load_share[t] < 1.0
-            if solver.lightened:
-                cap_mass_ratio(solver, t, dt, span, arms)
         joints.begin, joints.end = joints.end if special else 0, solver.joint_ends[s]
         if joints.active > 0:
             direct.begin, direct.end = direct.end if special else 0, direct.body_ends[s]
