@@ -13,7 +13,7 @@ from ..integration.turning import size_of_turn
 from ..joints.bodies import build_joint_rows
 from ..joints.order import order_direct
 from ..joints.records import DIRECT_BODIES
-from ..linking.parts import JOINED_BODIES, JOINED_START, call_joined_bodies, call_joined_islands
+from ..linking.parts import JOINED_BODIES, JOINED_START, call_of_step
 from ..parts.rows import next_row, owner_of
 from ..parts.stages import copy_to_parts
 from ..records import (
@@ -143,7 +143,7 @@ def gather(state, dt):
         solver.inverse_inertia[q] = bodies.inverse_inertia[i]
         solver.inverse_products[q] = bodies.inverse_products[i]
     if solver.joints.active > 0:
-        call_joined_bodies(state.links[JOINED_BODIES], state, dt)
+        call_of_step(state.links[JOINED_BODIES], state, dt)
     return OK
 
 
@@ -157,7 +157,7 @@ def gather_joined(state, dt):
             rotate_body(solver, q, nothing)
             integrate_rotation_of_joined(solver, q, q + 1, -dt)
     if state.impacts.active and state.impacts.logged > 0:
-        call_joined_islands(state.links[JOINED_START], state, dt)
+        call_of_step(state.links[JOINED_START], state, dt)
     order_joints(state)
     order_direct(solver)
     build_joint_rows(state)

@@ -13,7 +13,7 @@ from ..codes import NEED_REST, OK
 from ..forces.stages import is_zero
 from ..impacts.impulses import STOPPED, is_beyond_cap, is_trapped
 from ..integration.turning import arms_to, closing_by_spin, size_of_turn
-from ..linking.parts import ARMS_AT_REST, TOUCH_OF_TURN, call_arms, call_touch_of_turn
+from ..linking.parts import ARMS_AT_REST, TOUCH_OF_TURN, call_of_step, call_touch_of_turn
 from ..narrow_phase.manifolds import (
     centre_offset,
     centre_offset_at_start,
@@ -275,7 +275,7 @@ def linearise(state, dt):
             solver.apart[k], solver.varies[k], solver.parting[k] = apart, varies, parts
     solver.has_friction, solver.surfaces_run = has_friction, any_surface_runs(state) and find_surface_slips(state)
     solver.has_rolling = False
-    return call_arms(state.links[ARMS_AT_REST], state, dt) if state.spinning else OK
+    return call_of_step(state.links[ARMS_AT_REST], state, dt) if state.spinning else OK
 
 
 @inlined

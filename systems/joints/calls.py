@@ -7,9 +7,9 @@ from ..linking.parts import call_joined_range
 
 # See solving.solve_joined_range, which does it.
 (
-    START, WARM_START, PUSH, RELAX, PUSH_AGAIN, RELAX_AGAIN, TURN, ADD, KEEP, OPEN, CLOSE, RELAX_OPEN, ADD_WORK,
-    SUM_WORK, FADE,
-) = range(15)  # fmt: skip
+    START, WARM_START, PUSH, RELAX, PUSH_AGAIN, RELAX_AGAIN, TURN, ADD, KEEP, OPEN, RELAX_OPEN, ADD_WORK, SUM_WORK,
+    FADE,
+) = range(14)  # fmt: skip
 
 
 @inlined

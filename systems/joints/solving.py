@@ -22,21 +22,12 @@ def island_of_joint(solver, j):
 
 
 @part
-def open_joints(joints):
-    """Further passes may go over all joints of a range."""
-    joints.opened = joints.end - joints.begin
-    for e in range(joints.opened):
-        joints.open_row[e] = joints.order[joints.begin + e]
-
-
-@part
-def close_joints(solver):
-    """No further pass goes over joints of islands without rows in ``listed``."""
+def list_open_joints(solver):
+    """Further passes go over the joints of islands with rows in ``listed``."""
     joints, opened = solver.joints, 0
-    for e in range(joints.opened):
-        j = joints.open_row[e]
-        joints.open_row[opened] = j
-        opened += solver.listed_of[island_of_joint(solver, j)] > 0
+    for e in range(joints.begin, joints.end):
+        joints.open_row[opened] = joints.order[e]
+        opened += solver.listed_of[island_of_joint(solver, joints.order[e])] > 0
     joints.opened = opened
 
 
@@ -114,9 +105,7 @@ def solve_joined_range(solver, what, numbers, span):
     elif what == calls.KEEP:
         keep_joints(solver, dt)
     elif what == calls.OPEN:
-        open_joints(solver.joints)
-    elif what == calls.CLOSE:
-        close_joints(solver)
+        list_open_joints(solver)
     elif what == calls.RELAX_OPEN:
         relax_open(solver)
     elif what == calls.ADD_WORK:

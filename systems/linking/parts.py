@@ -4,10 +4,10 @@ of what turns and of joints. They take seconds to compile; many worlds never nee
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
-from ...framework.jit.kinds import BOOL, FLOAT, INT, Kind, Signature, floats, record_kind, tuple_of
+from ...framework.jit.kinds import BOOL, FLOAT, INT, Signature, floats, record_kind, tuple_of
 from ...framework.jit.linking import Linked
 from ..contacts.solving.records import SOLVER
 from ..records import STATE
@@ -27,90 +27,31 @@ IN_SPACE = (FREE_TURN,)  # in a plane nothing calls it
 
 
 @cache
-def _bound_searches(dimensions: int) -> Signature:
-    return INT(record_kind(STATE, dimensions), FLOAT, FLOAT)
-
-
-@cache
-def _first_touch(dimensions: int) -> Signature:
-    vector, i, f = floats(dimensions), INT, FLOAT
+def signature_of(place: int, dimensions: int) -> Signature:
+    """That of the part of a place."""
+    state, vector, i, f = record_kind(STATE, dimensions), floats(dimensions), INT, FLOAT
     path = tuple_of(*(vector,) * 4)  # (x0, x1, x2, x3), see trajectory
-    found = tuple_of(i, f, vector, vector, vector)
-    return found(record_kind(STATE, dimensions), i, i, path, f, f, floats(4))
+    touch = tuple_of(f, vector, vector, vector)  # (time, normal, point, from a's centre to b's)
+    of_step, turn_by_impact = i(state, f), i(state, i, f, vector, f)
+    response = tuple_of(f, vector)(state, tuple_of(i, i), touch, tuple_of(vector, f), f, f)
+    return (
+        i(state, f, f),
+        tuple_of(i, f, vector, vector, vector)(state, i, i, path, f, f, floats(4)),
+        i(state, i, f),
+        vector(state, i, vector, f),
+        tuple_of(i, touch, f)(state, i, i, path, tuple_of(vector, vector), floats(2), floats(5)),
+        tuple_of(BOOL, f, f, vector, vector, vector, vector)(state, f, i, i),
+        tuple_of(f, vector)(state, i, i, vector, tuple_of(f, vector, vector), f, vector),
+        of_step, response, turn_by_impact,
+        of_step, of_step, response, turn_by_impact, of_step,
+        f(record_kind(SOLVER, dimensions), i, floats(2), tuple_of(i, i, i, i)),
+    )[place]  # fmt: skip
 
 
-@cache
-def _take_together(dimensions: int) -> Signature:
-    return INT(record_kind(STATE, dimensions), INT, FLOAT)
-
-
-@cache
-def _free_turn(dimensions: int) -> Signature:
-    vector = floats(dimensions)
-    return vector(record_kind(STATE, dimensions), INT, vector, FLOAT)
-
-
-@cache
-def _touch(dimensions: int) -> Kind:
-    vector = floats(dimensions)
-    return tuple_of(FLOAT, vector, vector, vector)  # (time, normal, point, from a's centre to b's)
-
-
-@cache
-def _turning_touch(dimensions: int) -> Signature:
-    vector, i, f = floats(dimensions), INT, FLOAT
-    spins, times, limits = tuple_of(*(vector,) * 2), floats(2), floats(5)
-    found = tuple_of(i, _touch(dimensions), f)
-    return found(record_kind(STATE, dimensions), i, i, tuple_of(*(vector,) * 4), spins, times, limits)
-
-
-@cache
-def _touch_of_turn(dimensions: int) -> Signature:
-    vector, i, f = floats(dimensions), INT, FLOAT
-    found = tuple_of(BOOL, f, f, vector, vector, vector, vector)
-    return found(record_kind(STATE, dimensions), f, i, i)
-
-
-@cache
-def _closing_point(dimensions: int) -> Signature:
-    vector, i, f = floats(dimensions), INT, FLOAT
-    met = tuple_of(f, vector, vector)
-    return tuple_of(f, vector)(record_kind(STATE, dimensions), i, i, vector, met, f, vector)
-
-
-@cache
-def _of_step(dimensions: int) -> Signature:
-    return INT(record_kind(STATE, dimensions), FLOAT)
-
-
-@cache
-def _turning_response(dimensions: int) -> Signature:
-    vector, f = floats(dimensions), FLOAT
-    change, motion = tuple_of(f, vector), tuple_of(vector, f)
-    sides = tuple_of(*(INT,) * 2)
-    return change(record_kind(STATE, dimensions), sides, _touch(dimensions), motion, f, f)
-
-
-@cache
-def _turn_by_impact(dimensions: int) -> Signature:
-    f = FLOAT
-    return INT(record_kind(STATE, dimensions), INT, f, floats(dimensions), f)
-
-
-@cache
-def _joined_range(dimensions: int) -> Signature:
-    return FLOAT(record_kind(SOLVER, dimensions), INT, floats(2), tuple_of(*(INT,) * 4))
-
-
-SIGNATURES = (
-    _bound_searches, _first_touch, _take_together, _free_turn, _turning_touch, _touch_of_turn, _closing_point, _of_step,
-    _turning_response, _turn_by_impact, _of_step, _of_step, _turning_response, _turn_by_impact, _of_step, _joined_range,
-)  # fmt: skip
 (
     call_bound_searches, call_first_touch, call_take_together, call_free_turn, call_turning_touch, call_touch_of_turn,
-    call_closing_point, call_arms, call_turning_response, call_turn_by_impact, call_joined_islands, call_joined_bodies,
-    call_joined_range,
-) = map(call_in_dimension, (*SIGNATURES[:JOINED_RESPONSE], _joined_range))  # fmt: skip
+    call_closing_point, call_of_step, call_turning_response, call_turn_by_impact, call_joined_range,
+) = (call_in_dimension(partial(signature_of, place)) for place in (*PLACES[:JOINED_ISLANDS], JOINED_RANGE))  # fmt: skip
 
 
 def needed_places(dimensions: int, sweeps: bool, bounces: bool, turns: bool, joined: bool) -> list[int]:
@@ -125,4 +66,4 @@ def needed_places(dimensions: int, sweeps: bool, bounces: bool, turns: bool, joi
 @cache
 def linked_part(place: int, function: Callable[..., Any], dimensions: int) -> Linked:
     """The function that belongs to a place in ``state.links``, one for the process."""
-    return Linked(function, SIGNATURES[place](dimensions), f"{function.__name__}, {dimensions}D,")
+    return Linked(function, signature_of(place, dimensions), f"{function.__name__}, {dimensions}D,")

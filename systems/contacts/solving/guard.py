@@ -44,28 +44,24 @@ def islands_of(solver, span):
 
 
 @part
-def open_all(solver, span, arms):
-    """All islands of a range are open: further passes may go over them."""
-    islands, opened = islands_of(solver, span), 0
-    for t in range(islands[0], islands[1]):
-        solver.listed_of[t] = 1
+def list_open(solver, span, arms):
+    """Islands with rows in ``listed`` are open: further passes go over their joints, and their energy is weighed."""
+    opened = 0
     for q in range(span[2], span[3]):
+        t = solver.island[q]
         solver.open_body[opened] = q
-        opened += solver.island[q] >= 0
+        opened += t >= 0 and solver.listed_of[t] > 0
     solver.opened = opened
     for_joints(solver, calls.OPEN, NO_NUMBERS, span, arms)
 
 
 @part
-def close_solved(solver, span, arms):
-    """Islands without rows in ``listed`` are closed: no pass goes over their joints, nor is their energy weighed."""
-    opened = 0
-    for e in range(solver.opened):
-        q = solver.open_body[e]
-        solver.open_body[opened] = q
-        opened += solver.listed_of[solver.island[q]] > 0
-    solver.opened = opened
-    for_joints(solver, calls.CLOSE, NO_NUMBERS, span, arms)
+def open_all(solver, span, arms):
+    """All islands of a range are open."""
+    islands = islands_of(solver, span)
+    for t in range(islands[0], islands[1]):
+        solver.listed_of[t] = 1
+    list_open(solver, span, arms)
 
 
 @part
@@ -185,7 +181,7 @@ def find_unsolved_rows(solver, turn, any_struck, dt, span, arms, islands):
                 solver.listed[count] = k
                 solver.listed_of[t] += 1
                 count += 1
-    close_solved(solver, span, arms)
+    list_open(solver, span, arms)
     return count
 
 

@@ -21,7 +21,7 @@ from ...integration.turning import arms_to, velocity_by_spin
 from ...islands import join_roots, root_of
 from ...joints.order import choose_direct
 from ...joints.records import LIMIT, TURN
-from ...linking.parts import JOINED_ISLANDS, call_joined_islands
+from ...linking.parts import JOINED_ISLANDS, call_of_step
 from ...narrow_phase.manifolds import centre_offset_at_start
 from ...parts.rows import owner_of, place_of
 from ...shapes.tolerances import smaller_extent
@@ -174,7 +174,7 @@ def number_islands(state, dt, ordered):
     for q in range(solver.bodies):
         island[q] = number[q]
     if solver.joints.active > 0:
-        call_joined_islands(state.links[JOINED_ISLANDS], state, dt)
+        call_of_step(state.links[JOINED_ISLANDS], state, dt)
 
 
 def measure_joined_islands(state, dt):
