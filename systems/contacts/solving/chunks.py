@@ -120,19 +120,17 @@ def pull_in_chunk(old, slip, normal, mass, limit):
 
 
 @inlined
-def terms_at(solver, one, k, motion, bias, pushes):
+def terms_at(solver, one, k, motion, bias, softly):
     """Of row k of the pair whose first row is ``one``: (normal, what an impulse of 1 along it twists of each body, how
     that changes their spins, 1 / kg that it moves, what a soft row keeps, how much faster than it may it closes)."""
-    n, (v_a, s_a, v_b, s_b), keep = solver.normal[k], motion, 1.0
+    n, (v_a, s_a, v_b, s_b), soft = solver.normal[k], motion, softly * solver.soft[k]
     t_a, t_b = twist(solver.arm_a[k], n), twist(solver.arm_b[k], n)
     x_a = symmetric(solver.inertia_a[one], solver.products_a[one], t_a)
     x_b = symmetric(solver.inertia_b[one], solver.products_b[one], t_b)
     own = SEVERAL * (solver.mass_a[one] + solver.mass_b[one] + (dot(t_a, x_a) + dot(t_b, x_b)))
     excess = dot(sub(v_a, v_b), n) + (dot(s_a, t_a) - dot(s_b, t_b)) - bias[k]
-    if pushes:  # a soft row gives a share of its impulse back: all of its equation times what it keeps
-        keep = 1.0 - solver.soft[k]
-        excess = keep * excess - solver.soft[k] * own * solver.impulse[k]
-    return n, t_a, t_b, x_a, x_b, own, keep, excess
+    keep = 1.0 - soft  # it gives a share of its impulse back: all of its equation times what it keeps
+    return n, t_a, t_b, x_a, x_b, own, keep, keep * excess - soft * own * solver.impulse[k]
 
 
 @inlined
@@ -147,15 +145,15 @@ def rub_at(solver, one, k, impulse, motion):
 
 
 @inlined
-def solve_two(solver, one, k, m, motion, bias, pushes):
+def solve_two(solver, one, k, m, motion, bias, softly):
     """(motion, impulses) after two points k and m of the pair whose first row is ``one`` have been solved along their
     normals both at once, so that neither is the first: what falls flat stays so.
 
     With impulses p, q the points may close no faster than they may, and do so as fast where they push: of the four
     cases, each of the two pushes or not, one is right.
     """
-    n, t_a, t_b, x_a, x_b, own, keep, e = terms_at(solver, one, k, motion, bias, pushes)
-    o, _, _, y_a, y_b, other, keeps, f = terms_at(solver, one, m, motion, bias, pushes)
+    n, t_a, t_b, x_a, x_b, own, keep, e = terms_at(solver, one, k, motion, bias, softly)
+    o, _, _, y_a, y_b, other, keeps, f = terms_at(solver, one, m, motion, bias, softly)
     w_a, w_b, old, before = solver.mass_a[one], solver.mass_b[one], solver.impulse[k], solver.impulse[m]
     mixed = (w_a + w_b) * dot(n, o) + (dot(t_a, y_a) + dot(t_b, y_b))
     on_first, on_second = keep * mixed, keeps * mixed
@@ -173,12 +171,11 @@ def solve_two(solver, one, k, m, motion, bias, pushes):
 
 
 @inlined
-def solve_one(solver, one, motion, bias, pushes):
+def solve_one(solver, one, motion, bias, softly):
     """The only point of a pair, along its normal, then along its surface."""
     n, arm_a, arm_b, old = solver.normal[one], solver.arm_a[one], solver.arm_b[one], solver.impulse[one]
     excess = solver.mass[one] * (-dot(parting_at(motion, arm_a, arm_b), n) - bias[one])
-    if pushes:
-        excess -= solver.soft[one] * (excess + old)
+    excess -= softly * solver.soft[one] * (excess + old)
     new = old + excess if old + excess > 0.0 else 0.0
     solver.impulse[one] = new
     return rub_at(solver, one, one, new, pushed(solver, one, motion, arm_a, arm_b, scale(n, new - old)))
@@ -194,18 +191,18 @@ def rub_rows(solver, chunk, impulses, start, first, pairs):
 
 
 @part
-def solve_rows(solver, chunk, bias, pushes, start, pairs, points):
+def solve_rows(solver, chunk, bias, softly, start, pairs, points):
     """The rows of the pairs of a chunk, without a branch for single ones; of four points those across first, as on
     two of them what lies flat is in balance."""
     if points == 1:
         for q in range(pairs):
-            store_motion(chunk, q, solve_one(solver, start + q, chunk_motion(chunk, q), bias, pushes))
+            store_motion(chunk, q, solve_one(solver, start + q, chunk_motion(chunk, q), bias, softly))
     for e in range(points // 2):
         first, second = start + e * pairs, start + (e + points // 2) * pairs
         for q in range(pairs):  # it stores nothing where it reads: else no two pairs would be solved together
             motion = chunk_motion(chunk, q)
             motion, chunk.impulse[q], chunk.other[q] = solve_two(
-                solver, start + q, first + q, second + q, motion, bias, pushes
+                solver, start + q, first + q, second + q, motion, bias, softly
             )
             store_motion(chunk, q, motion)
         rub_rows(solver, chunk, chunk.impulse, start, first, pairs)
@@ -214,12 +211,14 @@ def solve_rows(solver, chunk, bias, pushes, start, pairs, points):
 
 @part
 def solve_chunks(solver, bias, pushes, span):
-    """One pass over the rows of a range. bias, pushes: see ``solve_normals``."""
-    start, c, chunk = span[0], solver.first_chunk, make_chunk(scale(solver.velocity[0], 0.0))
+    """One pass over the rows of a range. bias, pushes: see ``solve_normals``; without a branch for the latter, or no
+    two pairs would be solved together."""
+    start, c, softly = span[0], solver.first_chunk, 1.0 if pushes else 0.0
+    chunk = make_chunk(scale(solver.velocity[0], 0.0))
     while start < span[1]:
         points = solver.points[c]
         pairs = (solver.ends[c] - start) // points
         gather_motion(solver, chunk, start, pairs)
-        solve_rows(solver, chunk, bias, pushes, start, pairs, points)
+        solve_rows(solver, chunk, bias, softly, start, pairs, points)
         scatter_motion(solver, chunk, start, pairs)
         start, c = solver.ends[c], c + 1
