@@ -14,13 +14,16 @@ import math
 
 from ...framework.compilation import part
 from ...framework.elementary import atan2, cos, sin
+from ...framework.jit.stack_arrays import stack_array
 from .quaternions import product
 
 JACOBI_SWEEPS = 16  # of Jacobi rotations: each squares what is off the diagonal
 SPHERICAL = 1e-24  # square of the sine between momentum and angular velocity: less is none
-ENERGY_ROUNDING = 1e-14  # of the energy
 DIAGONAL = 1e-15  # of the trace: what is off the diagonal by less is rounding
-PIECE, MOST_PIECES = 0.25, 64  # rad: as far as unlike moments turn a body in one of the pieces of its way
+SMALL_TURN, ALIKE = 1e-4, 1e-12  # rad: by what unlike moments add splitting is right; by that little they are alike
+MOST_MEANS, SAME_MEANS = 16, 1e-8  # of each other: the next arithmetic and geometric mean are the same number
+MOST_DOUBLINGS, NEAR_MEAN, SERIES = 64, 2e-3, 1e-8  # of their mean: what is nearer has a series of six terms
+SEPARATRIX = 1e-32  # least square of the complementary modulus
 
 
 @part
@@ -48,25 +51,15 @@ def of_axis(v, k):
 
 
 @part
-def energy_of(m, inverse):
-    """Twice the kinetic energy."""
-    return m[0] * m[0] * inverse[0] + m[1] * m[1] * inverse[1] + m[2] * m[2] * inverse[2]
+def replaced(v, k, value):
+    """Three numbers with another k-th one."""
+    return value if k == 0 else v[0], value if k == 1 else v[1], value if k == 2 else v[2]
 
 
 @part
-def turn_about_one(q, m, inverse, gained):
-    """As :func:`turn_to_energy`, but about one axis of the body: the one that takes the least of the momentum along
-    another. What swings far about two axes has states of its energy that no turn towards its velocity leads to."""
-    axis, least, angle = 0, math.inf, 0.0
-    for k in range(3):
-        a, b = (k + 1) % 3, (k + 2) % 3
-        x, y, steep = of_axis(m, a), of_axis(m, b), of_axis(inverse, a) - of_axis(inverse, b)
-        change = gained / steep if steep != 0.0 else math.inf
-        if abs(change) < least and -y * y <= change <= x * x:
-            axis, least = k, abs(change)
-            to_x, to_y = math.sqrt(x * x - change), math.sqrt(y * y + change)
-            angle = atan2(y, x) - atan2(math.copysign(to_y, y), math.copysign(to_x, x))
-    return turned_about(q, m, axis, angle)
+def energy_of(m, inverse):
+    """Twice the kinetic energy."""
+    return m[0] * m[0] * inverse[0] + m[1] * m[1] * inverse[1] + m[2] * m[2] * inverse[2]
 
 
 @part
@@ -89,12 +82,8 @@ def turn_to_energy(q, m, inverse, gained):
     share, half = tangent * cosine / steep, math.sqrt(0.5 + 0.5 * cosine)
     back = -share / (2.0 * half * square)
     axis = back * (m[1] * z - m[2] * y), back * (m[2] * x - m[0] * z), back * (m[0] * y - m[1] * x)
-    turned, wanted = product(q, (half, axis[0], axis[1], axis[2])), energy_of(m, inverse) - gained
     m = m[0] * cosine + x * share, m[1] * cosine + y * share, m[2] * cosine + z * share
-    excess = energy_of(m, inverse) - wanted
-    if left >= 0.0 or abs(excess) <= ENERGY_ROUNDING * wanted:
-        return turned, m
-    return turn_about_one(turned, m, inverse, excess)
+    return product(q, (half, axis[0], axis[1], axis[2])), m
 
 
 @part
@@ -113,21 +102,139 @@ def tensor_size(v, factor):
 
 
 @part
+def elliptic_functions(u, complement):
+    """(sn, cn, dn) of u, k^2 = 1 - complement, by the arithmetic-geometric mean (R. Bulirsch, 1965)."""
+    means, roots = stack_array(MOST_MEANS, 0.0), stack_array(MOST_MEANS, 0.0)
+    mean, factor, dn, c, last = 1.0, complement, 1.0, 1.0, 0
+    for i in range(MOST_MEANS):
+        root = math.sqrt(factor)
+        means[i], roots[i], last, c = mean, root, i, 0.5 * (mean + root)
+        if abs(mean - root) <= SAME_MEANS * mean:
+            break
+        factor, mean = root * mean, c
+    sn, cn = sin(c * u), cos(c * u)
+    if sn == 0.0:
+        return sn, cn, dn
+    ratio = cn / sn
+    c *= ratio
+    for i in range(last, -1, -1):
+        ratio *= c
+        c *= dn
+        dn = (roots[i] + ratio) / (means[i] + ratio)
+        ratio = c / means[i]
+    sn = math.copysign(1.0 / math.sqrt(c * c + 1.0), sn)
+    return sn, c * sn, dn
+
+
+@part
+def elliptic_integrals(sn, cn, complement, nu):
+    """(of du, of du / (1 + nu sn^2)) from 0 to where sn and cn >= 0 of u are these, by duplication (B. C. Carlson,
+    "Numerical computation of real or complex elliptic integrals", 1995)."""
+    square = sn * sn
+    x, y, z, p = cn * cn, cn * cn + complement * square, 1.0, 1.0 + nu * square
+    far, share, sum_of = (p - x) * (p - y) * (p - z), 1.0, 0.0
+    for _ in range(MOST_DOUBLINGS):
+        mean = 0.2 * (x + y + z + 2.0 * p)
+        if max(abs(mean - x), abs(mean - y), abs(mean - z), abs(mean - p)) <= NEAR_MEAN * mean:
+            break
+        rx, ry, rz, rp = math.sqrt(x), math.sqrt(y), math.sqrt(z), math.sqrt(p)
+        product_of, more = (rp + rx) * (rp + ry) * (rp + rz), rx * ry + rx * rz + ry * rz
+        root = math.sqrt(share * share * share * far) / product_of
+        sum_of += share / product_of * (atan2(root, 1.0) / root if root > SERIES else 1.0 - root * root / 3.0)
+        share *= 0.25
+        x, y, z, p = 0.25 * (x + more), 0.25 * (y + more), 0.25 * (z + more), 0.25 * (p + more)
+    mean = (x + y + z) / 3.0
+    a, b = 1.0 - x / mean, 1.0 - y / mean
+    c = -(a + b)
+    e2, e3 = a * b - c * c, a * b * c
+    first = (1.0 - e2 / 10.0 + e3 / 14.0 + e2 * e2 / 24.0 - 3.0 * e2 * e3 / 44.0) / math.sqrt(mean)
+    mean = 0.2 * (x + y + z + 2.0 * p)
+    a, b, c = 1.0 - x / mean, 1.0 - y / mean, 1.0 - z / mean
+    d = -0.5 * (a + b + c)
+    e2 = a * b + a * c + b * c - 3.0 * d * d
+    volume = a * b * c
+    e3, e4 = volume + 2.0 * e2 * d + 4.0 * d * d * d, (2.0 * volume + e2 * d + 3.0 * d * d * d) * d
+    series = 1.0 - 3.0 * e2 / 14.0 + e3 / 6.0 + 9.0 * e2 * e2 / 88.0 - 3.0 * e4 / 22.0 - 9.0 * e2 * e3 / 52.0
+    third = share * (series + 3.0 * volume * d * d / 26.0) / (mean * math.sqrt(mean)) + 6.0 * sum_of
+    return sn * first, sn * (first - nu / 3.0 * square * third)
+
+
+@part
+def axes_of_way(m, inverse):
+    """(p, y, o): the axis that the momentum goes round, that of the middle moment, and the other one."""
+    x, y, z = inverse
+    middle = 0 if y <= x <= z or z <= x <= y else (1 if x <= y <= z or z <= y <= x else 2)
+    p, o = (middle + 1) % 3, (middle + 2) % 3
+    steep, gentle = of_axis(inverse, middle) - of_axis(inverse, p), of_axis(inverse, o) - of_axis(inverse, middle)
+    if abs(steep) * of_axis(m, p) * of_axis(m, p) < abs(gentle) * of_axis(m, o) * of_axis(m, o):
+        return o, middle, p
+    return p, middle, o
+
+
+@part
+def turn_far(q, m, inverse, h):
+    """As :func:`turn_freely`, exactly: the momentum by Jacobi's elliptic functions, and how far the body has gone round
+    it by the integral of the third kind (E. T. Whittaker, "Analytical dynamics", 69; R. van Zon and J. Schofield,
+    "Numerical implementation of the exact dynamics of free rigid bodies", 2007)."""
+    p, y, o = axes_of_way(m, inverse)
+    steep, gentle = of_axis(inverse, y) - of_axis(inverse, p), of_axis(inverse, o) - of_axis(inverse, y)
+    a, b, c = of_axis(m, p), of_axis(m, y), of_axis(m, o)
+    both, size = steep + gentle, math.sqrt(a * a + b * b + c * c)
+    around, along = b * b * steep + c * c * both, a * a * both + b * b * gentle
+    if not around / both > 0.0:
+        return turned_about(q, m, p, of_axis(inverse, p) * a * h)
+    most_p, most_y, most_o = math.sqrt(along / both), math.sqrt(around / steep), math.sqrt(around / both)
+    complement = max(SEPARATRIX, both * (steep * a * a - gentle * c * c) / (steep * along))
+    nu, rate = gentle / steep, math.sqrt(along * steep)
+    if (a < 0.0) == (of_axis(inverse, (y + 2) % 3) > of_axis(inverse, (y + 1) % 3)):
+        rate = -rate
+    u, s0, c0 = rate * h, b / most_y, c / most_o
+    sn, cn, dn = elliptic_functions(u, complement)
+    s1, c1 = s0 * cn * dn + sn * c0 * abs(a) / most_p, c0 * cn - s0 * abs(a) / most_p * sn * dn  # by addition
+    unit = math.sqrt(s1 * s1 + c1 * c1)
+    s1, c1 = s1 / unit, c1 / unit
+    a1 = math.copysign(most_p * math.sqrt(c1 * c1 + complement * s1 * s1), a)
+    to = replaced(replaced(replaced(m, p, a1), y, most_y * s1), o, most_o * c1)
+    begun, angle_begun = elliptic_integrals(math.copysign(s0, s0 * c0), abs(c0), complement, nu)
+    ended, angle_ended = elliptic_integrals(math.copysign(s1, s1 * c1), abs(c1), complement, nu)
+    angle, halves = angle_ended - angle_begun, begun + u - ended
+    if abs(halves) > 1.0:  # whole half periods between them, each pi or longer
+        half, angle_half = elliptic_integrals(1.0, 0.0, complement, nu)
+        angle += 2.0 * math.floor(0.5 * halves / half + 0.5) * angle_half
+    angle = size * (of_axis(inverse, p) * h + both / rate * angle)
+    from_pole, azimuth = angles_from(m, p)
+    q, _ = turned_about(q, m, p, azimuth)
+    q, _ = turned_about(q, m, (p + 2) % 3, from_pole)
+    q, _ = turned_about(q, m, p, angle)
+    from_pole, azimuth = angles_from(to, p)
+    q, _ = turned_about(q, m, (p + 2) % 3, -from_pole)
+    q, _ = turned_about(q, m, p, -azimuth)
+    return q, to
+
+
+@part
+def angles_from(m, p):
+    """(angle from the axis p, angle about it) of a momentum."""
+    x, y = of_axis(m, (p + 1) % 3), of_axis(m, (p + 2) % 3)
+    return atan2(math.sqrt(x * x + y * y), of_axis(m, p)), atan2(y, x)
+
+
+@part
 def turn_freely(q, m, inverse, h):
     """(rotation, momentum in its frame, what splitting has added to :func:`energy_of`) after h seconds. q: unit
     quaternion of the principal axes; m: angular momentum along them; inverse: 1 / principal moments."""
     energy, (j, k, other) = energy_of(m, inverse), most_similar(inverse)
     about_j, about_other = of_axis(inverse, j) - of_axis(inverse, k), of_axis(inverse, other) - of_axis(inverse, k)
-    turned = tensor_size(m, about_j * h) / PIECE
-    pieces = 1 + (int(turned) if turned < MOST_PIECES else MOST_PIECES)
-    share, half = h / pieces, 0.5 * of_axis(inverse, k) * h
+    if tensor_size(m, about_j * h) > ALIKE and tensor_size(m, about_other * h) > SMALL_TURN:
+        q, m = turn_far(q, m, inverse, h)
+        return q, m, 0.0
+    half = 0.5 * of_axis(inverse, k) * h
     size = tensor_size(m, half)
     sine = sin(size) / size * half if size > 0.0 else 0.0
     q = product(q, (cos(size), sine * m[0], sine * m[1], sine * m[2]))
-    for _ in range(pieces):
-        q, m = turned_about(q, m, j, 0.5 * share * about_j * of_axis(m, j))
-        q, m = turned_about(q, m, other, share * about_other * of_axis(m, other))
-        q, m = turned_about(q, m, j, 0.5 * share * about_j * of_axis(m, j))
+    q, m = turned_about(q, m, j, 0.5 * h * about_j * of_axis(m, j))
+    q, m = turned_about(q, m, other, h * about_other * of_axis(m, other))
+    q, m = turned_about(q, m, j, 0.5 * h * about_j * of_axis(m, j))
     return q, m, energy_of(m, inverse) - energy
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
@@ -18,7 +17,6 @@ from carom.plugins.rotation import BoxCollider, Spin
 pytestmark = pytest.mark.plain
 METHODS = {"explicit_euler": 1, "semi_implicit_euler": 1, "velocity_verlet": 2, "yoshida4": 4, "rk4": 4}
 # Of the free top: splitting is of order 2 whatever the order of torques.
-FREE_ORDER = {"explicit_euler": 2, "semi_implicit_euler": 2, "velocity_verlet": 2, "yoshida4": 4, "rk4": 4}
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.7])
@@ -92,12 +90,11 @@ def spin_top(dt, seconds, systems=(), **settings):
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("method", METHODS)
-def test_the_free_top_is_that_of_jacobis_functions_at_the_order_of_the_method(method):
-    """Three steps of a third each: the slope of the error over dt is the order within .15."""
-    steps, exact = (1 / 15, 1 / 30, 1 / 60), top_at(MOMENTS, START, 4.0)
-    errors = [np.linalg.norm(spin_top(dt, 4.0, integrator=method)[0] - exact) for dt in steps]
-    orders = [math.log2(one / two) for one, two in itertools.pairwise(errors)]
-    assert orders[-1] == pytest.approx(FREE_ORDER[method], abs=0.15), (errors, orders)
+def test_the_free_top_is_that_of_jacobis_functions(method):
+    """Whatever the step."""
+    exact = top_at(MOMENTS, START, 4.0)
+    for dt in (1 / 2, 1 / 15, 1 / 60):
+        assert np.linalg.norm(spin_top(dt, 4.0, integrator=method)[0] - exact) < 1e-12
 
 
 @pytest.mark.compiled
