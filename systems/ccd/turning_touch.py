@@ -13,7 +13,7 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.stack_arrays import stack_array
-from ...framework.vectors import add, add_scaled, dot, length, negative, row, scale, sub
+from ...framework.vectors import add, add_scaled, dot, length, negative, replace, row, scale, sub
 from ..integration.trajectory import ROUNDING, along, path_of, rate_along, travel_of
 from ..integration.turning import arms_to, closing_by_spin, is_turned, size_of_turn
 from ..joints.groups import is_joined
@@ -34,6 +34,7 @@ MOST_STRIDES = 4096  # looks in a search, and at shapes whose gap does not tell 
 STRIDE, SHORTER = 0.02, 0.1  # extents between these; of the stride of others: that of a thin box which is turned is
 # the extent of the box around it
 FOLLOWED_TURN = 0.5  # rad in a step: up to that the end of the step tells where what turns touches
+UNSURE = 64.0 * ROUNDING  # of speeds, also those by which spins move places: slower nothing closes
 MOST_SUNK = 0.5  # slops, or a graze: deeper nothing sinks in before a touch
 GRAZE = 0.125  # slops: as far as points move between looks at a pair that touches and parts, or after EXACT_LOOKS,
 THIN = 0.1  # of the widths of both: or no farther than that, or one may be behind the other at the next look
@@ -75,12 +76,20 @@ def clear_along(state, a, b, d, normal):
 
 
 @part
-def thin_along(state, a, b, normal, slop):
-    """How far points may move between two looks at a pair that is near along a normal; infinity if one has no end."""
-    out = negative(normal)
-    width = reach_along(state, a, normal) + reach_along(state, a, out)
-    width += reach_along(state, b, normal) + reach_along(state, b, out)
-    return max(THIN * width, GRAZE * slop)
+def thickness_of(state, i):
+    """The least width of a shape along the axes of its body, however that is turned; infinity if it has no end."""
+    axes, axis, d, least = state.bodies.axes, zero_of(state), len(zero_of(state)), math.inf
+    for j in range(d):
+        for k in range(d):
+            axis = replace(axis, k, axes[(i * d + k) * d + j])
+        least = min(least, reach_along(state, i, axis) + reach_along(state, i, negative(axis)))
+    return least
+
+
+@part
+def thin_of(state, a, b, slop):
+    """How far points may move between two looks at a pair that is near; infinity if one has no end."""
+    return max(THIN * (thickness_of(state, a) + thickness_of(state, b)), GRAZE * slop)
 
 
 @part
@@ -110,11 +119,13 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
     turning = way_of_turning(bodies, a, spin_a) + way_of_turning(bodies, b, spin_b)
     way = turning * (until - since) + travel_of(path, until)
     graze = max(GRAZE * slop, way / (COARSE_LOOKS + strides))
+    rates, places = size_of_turn(spin_a) + size_of_turn(spin_b), length(bodies.origin[a]) + length(bodies.origin[b])
+    rounding = UNSURE * (turning + rates * places + length(bodies.path_velocity[a]) + length(bodies.path_velocity[b]))
     bend = 2.0 * length(path[2]) + 6.0 * length(path[3]) * until
     corners = threshold < 0.0 or (is_turned(bodies, a) and is_turned(bodies, b))  # of others, too
     poses = pose_of(state, a), pose_of(state, b)
     touch, found, gap, crept, ended = (until, zero_of(state), zero_of(state), zero_of(state)), False, 0.0, 0, False
-    t, least, begun, low, high = since, 0.0, 0.0, since, math.inf
+    t, least, begun, low, high, thin = since, 0.0, 0.0, since, math.inf, thin_of(state, a, b, slop)
     for look in range(MOST_STRIDES + strides):
         turn_to(state, a, poses[0], spin_a, until, t)
         turn_to(state, b, poses[1], spin_b, until, t)
@@ -123,37 +134,40 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
         w = rate_along(path, t)
         if look == 0 and grazes > -math.inf:
             sunk = depth + min(grazes * graze, max(graze, MOST_SUNK * slop))
-            least = max(0.0, depth, min(sunk, thin_along(state, a, b, normal, slop)))
+            least = max(0.0, depth, min(sunk, thin))
         if look == 0 and not 0.0 < grazes < math.inf:  # else it has sunk in by plastic impacts, which add up
             begun = max(0.0, depth)
         depth -= least
         if crept == EXACT_LOOKS:
-            near = max(near, min(graze, thin_along(state, a, b, normal, slop)))
+            near = max(near, min(graze, thin))
         fastest, touches = turning + length(w) + bend * (until - t), -depth <= near
         if touches:
             rate = 0.0
             if threshold > -math.inf:
                 met, address = (depth + least, normal, point), state.links[CLOSING_POINT]
                 rate, point = call_closing_point(address, state, a, b, d, met, near - least, w)
-            closes, there = rate < -threshold or (rate < 0.0 and not found), (depth + least, normal)
+            fast, there = rate < -(threshold + rounding), (depth + least, normal)
+            closes = fast or (rate < -rounding and not found)
             if closes and (corners or not is_corner_touch(state, shape_a, a, shape_b, b, d, there, slop)):
                 touch, found, gap = (t, normal, point, d), True, -depth
-                high = t if rate < -threshold - ROUNDING * fastest else high
+                high = t if fast else high
         elif convex:
             fastest += max(0.0, -dot(w, normal)) - length(w)
         low = low if high <= t else t
-        ended = (holds or (high - low) * fastest <= near) if high < math.inf else t >= until
+        exact = (holds and depth <= near) or (high - low) * fastest <= near  # else the touch is bisected
+        ended = exact if high < math.inf else t >= until
         if ended:
             break
         clear = max(-depth - 0.5 * near, 0.5 * near)
         if touches:
-            inwards = thin_along(state, a, b, normal, slop) - (depth + least - begun)
-            clear = max(-depth, GRAZE * slop, min(graze, inwards))
+            clear = max(-depth, GRAZE * slop, min(graze, thin - (depth + least - begun)))
         further = t + clear / fastest
         crept += 1 if holds or further < t + stride else 0
-        if not holds:
-            further = min(further, t + stride) if high == math.inf else 0.5 * (low + high)
-            if convex and high == math.inf:  # what is beside the other one is looked at when it may be there
+        if high < math.inf:
+            further = 0.5 * (low + high)
+        elif not holds:
+            further = min(further, t + stride)
+            if convex:  # what is beside the other one is looked at when it may be there
                 further = max(further, t + clear_along(state, a, b, d, normal) / (fastest + abs(dot(w, normal))))
         if not (found or ended):
             touch = t, normal, point, d

@@ -78,7 +78,7 @@ def penetration_of(state, dt, c, a, b):
         searched = along(relative_path(state, a, b), dt)
         pushed = sub(d, searched)
         unseen = state.impacts.sweeps and max(a, b) >= state.moving  # by searches; what turns by itself sweeps it up
-        if unseen and length(pushed) > FAST * extent:
+        if unseen and length(pushed) > FAST * extent and not evaluate_pair(state, a, b, searched)[0]:
             found, gap, normal = first_touch_on_segment(state, a, b, searched, pushed, FAST * extent)
             if found:
                 return -gap - dot(pushed, normal) - allowed, normal

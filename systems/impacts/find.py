@@ -204,7 +204,7 @@ def approach_speed(state, c, path, touch, kind, dt):
         slides &= not turns
     if slides and turns:  # what tips over on another body lands on its next corner while the one before holds it
         slides = state.pairs.early[c] and restitution_at(state, a, b, (point, normal, apart)) == 0.0
-        slides &= -speed * dt <= smaller_extent(bodies, a, b)
+        slides &= turning_travel(state, dt - t, a, b) - speed * dt <= smaller_extent(bodies, a, b)
     elif slides:
         slides = is_held_by_edge(state, a, b, path, touch, speed, dt)
     if slides:
