@@ -34,6 +34,8 @@ from carom.plugins.rotation import BoxCollider, Rotation
 G = 30.0  # m/s^2
 SKIN = 0.01  # m, that a character keeps
 JUMP = 9.0  # m/s, and so 1.35 m high
+TOP = JUMP**2 / (2 * G)  # m
+STEP = 1 / 60  # s
 FAR = 900.0  # m, where one of each shape waits
 
 
@@ -75,7 +77,7 @@ def plugins_of(d: int, gravity: float) -> list[Any]:
     return [physics, Rotation(), Parts(), *(each.plugin for each in shapes), Characters()]
 
 
-def world_of(d: int, dt: float = 1 / 60, gravity: float = G, **settings: Any) -> World:
+def world_of(d: int, dt: float = STEP, gravity: float = G, **settings: Any) -> World:
     """The recipe: with one of each shape far away, and a crate on a floor."""
     world = World(*plugins_of(d, gravity), settings=Settings(dt=dt, on_fault="ignore", **settings))
     x = np.arange(2.0)
@@ -144,7 +146,7 @@ class Stage:
     WIDE = 30.0
 
     def __init__(
-        self, figure: Figure, x: float = 0.0, y: float | None = None, dt: float = 1 / 60, gravity: float = G,
+        self, figure: Figure, x: float = 0.0, y: float | None = None, dt: float = STEP, gravity: float = G,
         settings: dict[str, Any] | None = None, **character: Any,
     ) -> None:  # fmt: skip
         self.figure, self.d, self.half = figure, figure.d, figure.half
@@ -179,6 +181,10 @@ class Stage:
         lower, upper = (x - half[0], top - 2 * half[1]), (x + half[0], top)
         return self.box(lower, upper, RigidBody(kind="kinematic", **body))
 
+    def one_way(self, left: float, right: float, height: float, *more: Any) -> int:
+        """A platform that holds from above only, with its top there."""
+        return self.box((left, height - 0.2), (right, height), *more, one_way=self.at(0, 1))
+
     def wedge(self, points: Any, **material: Any) -> int:
         """A static prism over a convex outline of the x-y plane."""
         outline = np.array(points, float)
@@ -206,6 +212,19 @@ class Stage:
     def velocity_of(self, entity: int) -> np.ndarray:
         return self.world.component_for_entity(entity, RigidBody).linear_velocity.copy()
 
+    def walk(self, speed: float) -> Callable[[int], object]:
+        """For :meth:`run`: it wants to walk along x in each step."""
+        return lambda step: self.move(speed)
+
+    def hold(self, steps: int = 10**9, **wishes: Any) -> Callable[[int], object]:
+        """For :meth:`run`: these wishes for so many steps, then none."""
+
+        def act(step: int) -> None:
+            for name, value in wishes.items():
+                setattr(self.me, name, value if step < steps else type(value)(0))
+
+        return act
+
     def each(self, act: Callable[[float], object]) -> None:
         self.world.add_system(Each(act))
 
@@ -228,3 +247,7 @@ class Stage:
 def slope(angle: float, length: float = 6.0, x: float = 0.0) -> tuple[tuple[float, float], ...]:
     """The outline of a ramp that rises to the right by this angle, in degrees."""
     return (x, 0.0), (x + length, 0.0), (x + length, length * math.tan(math.radians(angle)))
+
+
+def is_walking(states: list[str]) -> bool:
+    return set(states) == {"floor"}
