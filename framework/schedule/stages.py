@@ -131,6 +131,7 @@ class Stage:
         return tuple(rows for rows in self.room if rows.count is not asked)
 
 
+@functools.cache  # reading the code takes long, and each world makes stages of it
 def answers(function: Callable[..., Any]) -> set[bool]:
     """Of the paths through a function: True if one returns something, False if one ends without, or returns None."""
     found, before = set(), None
