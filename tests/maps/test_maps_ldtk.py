@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers_maps import quiet_world_for_maps
 from helpers_maps_ldtk import CELLS, entity, field, level, project, write
 
 from carom import AABBCollider, Component, Path, RigidBody, SphereCollider, TileGridCollider, Transform, column, maps
@@ -25,13 +24,6 @@ class Gate(Component): ...
 
 
 NOBODY = field("target", "EntityRef", {"entityIid": "q"})
-
-
-@pytest.fixture
-def world():
-    made = quiet_world_for_maps()
-    yield made
-    made.close()
 
 
 def test_a_level_becomes_a_world(tmp_path, world):

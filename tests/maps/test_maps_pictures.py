@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from helpers_folders import ROOT, imported
-from helpers_maps import FLIPPED, map_of, objects_of, quiet_world_for_maps, thing, tile, tiles_of, tileset, write
+from helpers_maps import FLIPPED, map_of, objects_of, thing, tile, tiles_of, tileset, write
 
 from carom import maps
 
@@ -38,13 +38,6 @@ def image_of(path, pixels):
 
 def pixels_of(surface):
     return pygame.surfarray.array3d(surface).transpose(1, 0, 2)
-
-
-@pytest.fixture
-def world():
-    made = quiet_world_for_maps()
-    yield made
-    made.close()
 
 
 def test_tiles_are_drawn_in_all_eight_ways(tmp_path, world):
