@@ -59,15 +59,7 @@ class Places:
     def of(cls, first: int, position: Floats, angle: Floats, style: Any, entity: Rows, spins: Any) -> Places:
         d = position.shape[1]
         turned = angle.any() if d == 2 else angle[:, 1:].any()
-        return cls(first, position, angle, matrices(angle) if turned else None, style, entity, spins)
-
-
-def matrices(angle: Floats) -> Floats:
-    """Rotation matrices of angles (m,) or quaternions (m, 4)."""
-    if angle.ndim == 2:
-        return axes_of(angle, 3)
-    c, s = np.cos(angle), np.sin(angle)
-    return np.stack((c, -s, s, c), axis=1).reshape(-1, 2, 2)
+        return cls(first, position, angle, axes_of(angle, d) if turned else None, style, entity, spins)
 
 
 def watched_of(world: Any, rows: slice) -> dict[str, bytes]:

@@ -23,7 +23,7 @@ from .schedule.profile_report import Stats
 from .settings import Settings
 from .typing import Vector
 from .world.contacts import Contact, Contacts, ContactsBetween
-from .world.hits import CastHit, CastHits, Hits, NearestHit, NearestHits, Neighbours, OverlapHit, OverlapHits
+from .world.queries.hits import CastHit, CastHits, Hits, NearestHit, NearestHits, Neighbours, OverlapHit, OverlapHits
 from .world.rollback import Rollback
 from .world.snapshots import Snapshot
 from .world.world import World

@@ -28,6 +28,7 @@ KINDS: dict[Any, Kind] = {"int": INT, "float": FLOAT}  # of arguments, by the wo
 # not decide how that is compiled, as it does where that is left to numba.
 _OPTIONS = {
     "nopython": True, "boundscheck": None, "error_model": "numpy", "no_cfunc_wrapper": True, "forceinline": False,
+    "_nrt": CHECKED,
 }  # fmt: skip
 
 
@@ -38,24 +39,19 @@ def kernel(function: Function) -> Function:
 
     IEEE semantics throughout (no fastmath: same input, same bits); division by zero gives inf or nan. The function
     cannot make arrays: without numba's reference counting, which costs more than the work itself where arrays are
-    passed in tuples. Use :func:`allocating_kernel` for those that must.
+    passed in tuples.
     """
-    return _kept(Kernel, function, _nrt=CHECKED)
+    return _kept(Kernel, function)
 
 
 def untimed_kernel(function: Function) -> Function:
     """Like :func:`kernel`, for what is called so often that :func:`time_calls` must add nothing to the call."""
-    return _kept(Compiled, function, _nrt=CHECKED)
+    return _kept(Compiled, function)
 
 
 def entry_point(kernel: Function) -> Function:
     """What to call in place of a kernel of :func:`untimed_kernel`, without a detour."""
     return getattr(kernel, "made", kernel)
-
-
-def allocating_kernel(function: Function) -> Function:
-    """Like :func:`kernel`, for functions that make arrays; keep hot loops out of them."""
-    return _kept(Kernel, function)
 
 
 def part(function: Function) -> Function:
@@ -87,7 +83,7 @@ def allocating_part(function: Any) -> Any:
 
 def linked_dispatcher(function: Any, what: str) -> Any:
     """For functions that are called through their address alone, see :mod:`~carom.framework.jit.linking`."""
-    options = {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": CHECKED}
+    options = {**_OPTIONS, "no_cpython_wrapper": True}
     return _dispatcher(function, options, what, named=True)
 
 
@@ -101,12 +97,12 @@ def _dispatcher(function: Any, options: dict[str, Any], what: str, named: bool =
         raise libraries.missing(what) from error
 
 
-def _kept(kind: type[Compiled], function: Any, **options: Any) -> Any:
-    return kind(function, {**_OPTIONS, **options}) if JIT else function
+def _kept(kind: type[Compiled], function: Any) -> Any:
+    return kind(function, _OPTIONS) if JIT else function
 
 
 def _part(function: Any, **options: Any) -> Any:
-    options = {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": CHECKED, **options}
+    options = {**_OPTIONS, "no_cpython_wrapper": True, **options}
     return Part(function, options) if JIT else function
 
 

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import MissingComponentError
-from .change_log import Arrival
 from .component import Component
+from .contents.change_log import Arrival
 from .esper_bridge import Contents
 from .handles import Contained, bind_handles, write_handles
 from .interpolation import restart

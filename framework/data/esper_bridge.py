@@ -11,9 +11,9 @@ from typing import Any
 import esper
 import numpy as np
 
-from .change_log import ChangeLog, Stores
-from .entities import Entities, among
-from .members import Counter, WatchedComponents
+from .contents.change_log import ChangeLog, Stores
+from .contents.entities import Entities, among
+from .contents.members import Counter, WatchedComponents
 
 _NONE: dict[type[Any], Any] = {}
 _NAMES = (

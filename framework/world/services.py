@@ -13,8 +13,8 @@ from ..jit.records.record import Record
 from ..jit.records.schema import Schema
 from ..schedule.stages import Program
 from .contacts import Contacts
-from .hits import CastHits, Hits, NearestHits, Neighbours, OverlapHits
-from .query_arguments import Wanted
+from .queries.arguments import Wanted
+from .queries.hits import CastHits, Hits, NearestHits, Neighbours, OverlapHits
 
 
 class QueryServices(Protocol):

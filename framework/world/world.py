@@ -32,7 +32,7 @@ from .attributes import KnownAttributes
 from .contacts import Contacts
 from .entities import EntityVerbs
 from .events import Events
-from .queries import QueryVerbs
+from .queries.queries import QueryVerbs
 from .services import PhysicsServices
 from .state_verbs import StateVerbs
 

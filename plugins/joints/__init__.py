@@ -12,15 +12,14 @@ from ...components.part_of import Changes as PartChanges
 from ...components.part_of import PartOf
 from ...components.spin import Spin
 from ...framework import Plugin, World
-from ...framework.elementary import cos, sin
-from ...framework.matrices import unit
 from ...systems.double_buffers import BEFORE_STEP
 from ...systems.joints.own import Placed, rows_of
-from ...systems.joints.records import CUSTOM, FREE, HOLD, JOINTS, POINT, TURN
+from ...systems.joints.records import CUSTOM, FREE, HOLD, JOINTS, TURN
 from ...systems.joints.records import DRIVE as DRIVE  # for those who write a joint
 from ...systems.joints.records import LIMIT as LIMIT
 from ...systems.joints.records import SERVO as SERVO
 from ...systems.joints.records import SPRING as SPRING
+from ...systems.shapes.rotation import axes_of
 from .arms import arm_of as arm_of
 from .arms import moment as moment
 from .joint import WORLD, Joint, Place, whole_body
@@ -28,7 +27,7 @@ from .joint import Driven as Driven
 from .joint import Row as Row
 from .kinds import KINDS as KINDS
 from .kinds import Ball, Cone, Distance, Hinge, Motor, MousePull, Slider, Weld, Wheel
-from .measures import Holds, anchors, holds, measure, moving
+from .measures import Holds, anchors, borne, holds, measure, moving
 from .rows import KEPT, KEY, OF_PLUGINS, JointRows, by_row
 
 BREAKING = "breaking_force", "breaking_torque"
@@ -168,23 +167,8 @@ class Joints(Plugin):
 
     def _bears(self, rows: Any) -> dict[str, np.ndarray]:
         """What the joints of these rows have done in the last step."""
-        record, dt = self._record, self.world.settings.dt if self.world else 1.0
-        starts = np.flatnonzero(np.diff(record.joint[rows], prepend=WORLD))  # the first row of each
-        impulses, torques = self._given(rows)
-        if len(starts):
-            impulses, torques = np.add.reduceat(impulses, starts), np.add.reduceat(torques, starts)
-        force, turn = (np.linalg.norm(done, axis=1) / dt for done in (impulses, torques))
-        load = np.maximum(force / record.breaking_force[rows][starts], turn / record.breaking_torque[rows][starts])
-        torque = torques[:, 0] if self._physics.dimensions == 2 else torques
-        return {"entity": record.joint[rows][starts], "impulse": impulses, "torque": torque, "load": load}
-
-    def _given(self, rows: Any) -> tuple[np.ndarray, np.ndarray]:
-        """The impulses and the torques of some rows, (k, d) each."""
-        record, kind, total = self._record, self._record.kind[rows, None], self._record.total[rows, None]
-        along, given = total * record.normal[rows], kind == CUSTOM
-        impulse = np.where(kind == POINT, record.thrust[rows], np.where((kind < TURN) | given, along, 0.0))
-        turned = np.where(given, total * record.turn_b[rows], along)
-        return impulse, np.where(kind >= TURN, turned, 0.0)
+        dt = self.world.settings.dt if self.world else 1.0
+        return borne(self._record, rows, self._physics.dimensions, dt)
 
     def _measure(self, joints: dict[int, Joint], found: list[Holds]) -> tuple[np.ndarray, np.ndarray]:
         """The values of these joints and their changes per second; of those of plugins what their first rows say."""
@@ -428,11 +412,8 @@ class Joints(Plugin):
         if entity == WORLD:
             return Place(np.zeros(d), np.eye(d), 0.0)
         row = self._row(entity)
-        rotation = table.column("rotation")[row]
-        angle = float(rotation) if d == 2 else 0.0
-        c, s = cos(angle), sin(angle)
-        axes = np.array(((c, -s), (s, c))) if d == 2 else _matrix(rotation)
-        return Place(table.column("position")[row].copy(), axes, angle)
+        rotation, place = table.column("rotation")[row : row + 1], table.column("position")[row].copy()
+        return Place(place, axes_of(rotation, d)[0], float(rotation[0]) if d == 2 else 0.0)
 
     # -- after a step -----------------------------------------------------------------------------
 
@@ -460,16 +441,6 @@ def _fields_of(joint: Joint) -> tuple[Any, ...]:
     values = (joint._values.get(name) for name in joint.columns if name not in ("attached", "changed"))
     plain = (value.tobytes() if type(value) is np.ndarray else value for value in values)
     return type(joint), *(value if value == value else None for value in plain)  # one that is not given is NaN
-
-
-def _matrix(q: Any) -> np.ndarray:
-    """The rotation matrix of a quaternion."""
-    w, x, y, z = unit(q)
-    return np.array((
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    ))  # fmt: skip
 
 
 __all__ = [

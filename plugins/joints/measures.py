@@ -1,4 +1,4 @@
-"""What joints measure: where b is against a, and how fast that changes; of all joints at once."""
+"""What joints measure: where b is against a, how fast that changes, and what they bear; of all joints at once."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...systems.joints.records import CUSTOM, POINT, TURN
 from ...systems.joints.rows import FOLDED, FULL_TURN
-from .joint import Joint
+from .joint import WORLD, Joint
 from .kinds import Cone, Distance, Hinge, Motor, Slider, Weld, Wheel
 
 
@@ -144,3 +145,24 @@ def _dot(u: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
     return u[:, [1, 2, 0]] * v[:, [2, 0, 1]] - u[:, [2, 0, 1]] * v[:, [1, 2, 0]]
+
+
+def borne(record: Any, rows: Any, dimensions: int, dt: float) -> dict[str, np.ndarray]:
+    """What the joints of these rows have done in the last step."""
+    starts = np.flatnonzero(np.diff(record.joint[rows], prepend=WORLD))  # the first row of each
+    impulses, torques = _given(record, rows)
+    if len(starts):
+        impulses, torques = np.add.reduceat(impulses, starts), np.add.reduceat(torques, starts)
+    force, turn = (np.linalg.norm(done, axis=1) / dt for done in (impulses, torques))
+    load = np.maximum(force / record.breaking_force[rows][starts], turn / record.breaking_torque[rows][starts])
+    torque = torques[:, 0] if dimensions == 2 else torques
+    return {"entity": record.joint[rows][starts], "impulse": impulses, "torque": torque, "load": load}
+
+
+def _given(record: Any, rows: Any) -> tuple[np.ndarray, np.ndarray]:
+    """The impulses and the torques of some rows, (k, d) each."""
+    kind, total = record.kind[rows, None], record.total[rows, None]
+    along, given = total * record.normal[rows], kind == CUSTOM
+    impulse = np.where(kind == POINT, record.thrust[rows], np.where((kind < TURN) | given, along, 0.0))
+    turned = np.where(given, total * record.turn_b[rows], along)
+    return impulse, np.where(kind >= TURN, turned, 0.0)

@@ -10,7 +10,7 @@ import numpy as np
 from ...framework.data.component import Component
 from ...framework.jit.records.record import Record, make_record
 from ...framework.plugins.registry import Registry
-from ...framework.world.query_arguments import Wanted
+from ...framework.world.queries.arguments import Wanted
 from ..broad_phase.tree.build import MAX_LEVELS
 from ..shapes.linking.linked_shapes import LinkedShapes, ParameterRecords
 from ..shapes.linking.parameters import bind, make_parameter_record

@@ -13,8 +13,8 @@ from ...framework.data.table import Table
 from ...framework.jit.linking import Linked
 from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Registry
-from ...framework.world.hits import CastHits, Hits, NearestHits, Neighbours, OverlapHits
-from ...framework.world.query_arguments import Wanted
+from ...framework.world.queries.arguments import Wanted
+from ...framework.world.queries.hits import CastHits, Hits, NearestHits, Neighbours, OverlapHits
 from ..broad_phase.search import CandidateSearch
 from ..broad_phase.tree.tree import SpatialTree
 from ..scene import Scene

@@ -13,16 +13,14 @@ from typing import Any
 import numpy as np
 
 from ...components import AABBCollider, Collider, SphereCollider
-from ...framework.data.change_log import Stores
 from ...framework.data.component import Component
+from ...framework.data.contents.change_log import Stores
 from ...framework.data.handles import as_column, stored
 from ...framework.data.table import Table
 from ...framework.errors import UnhandledPairError
 from ...framework.plugins.registry import Registry
 from .linking.linked_shape import half_extents_of
 from .linking.linked_shapes import LinkedShapes
-
-LEVEL_COUNTERS = ("first_level_tests", "first_level_hits", "false_positives")
 
 # Of the outer level's size, which may stick out: sizes that were computed or stored in single precision still enclose.
 TOLERANCE = 1e-6

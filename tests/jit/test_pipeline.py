@@ -10,7 +10,7 @@ import pytest
 from llvmlite.binding import Linkage
 from numba.core.compiler import Compiler
 
-from carom.framework.compilation import allocating_kernel, inlined, kernel, part
+from carom.framework.compilation import inlined, kernel, part
 from carom.framework.jit import pipeline
 from carom.framework.jit.cache import machine_code
 from carom.framework.jit.dispatchers import KeptDispatcher
@@ -79,7 +79,7 @@ def rooted_kernel(x):
     return rooted(x) + halved(x)
 
 
-@allocating_kernel
+@kernel
 def nested(n):
     total = 0
     for k in range(n):
@@ -124,6 +124,7 @@ def test_parts_are_private_to_their_kernel():
 
 @jit
 def test_functions_with_closures_compile_whole():
+    nested.targetoptions = {**nested.targetoptions, "_nrt": True}  # it makes lists
     assert compiled(nested)(4) == nested.py_func(4)
 
 

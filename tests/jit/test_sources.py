@@ -47,7 +47,7 @@ def test_no_modules_import_each_other_in_a_circle():
 
 
 FOLDERS = ("framework", "components", "systems", "plugins")
-DECORATORS = {"kernel", "part", "inlined", "pasted", "allocating_kernel"}
+DECORATORS = {"kernel", "part", "inlined", "pasted"}
 ARGUMENTS, LINES = 8, 85
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..adoption import Adoption
 from ..component import Component
-from ..entities import Entities, among
+from ..contents.entities import Entities, among
 from ..esper_bridge import Contents
 from ..table import HAS_OBJECTS
 from .table import SavedTable

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..data.component import Component, Many
-from ..data.layers import LayerNames, resolved, resolved_rows
-from ..plugins.registry import Registry
-from ..typing import Entities, Excludes, Layers, Masks, Numbers, Vector, Vectors
-from . import query_arguments as check
+from ...data.component import Component, Many
+from ...data.layers import LayerNames, resolved, resolved_rows
+from ...plugins.registry import Registry
+from ...typing import Entities, Excludes, Layers, Masks, Numbers, Vector, Vectors
+from ..services import PhysicsServices
+from . import arguments as check
 from .hits import CastHit, CastHits
-from .services import PhysicsServices
 
 
 class CastVerbs:

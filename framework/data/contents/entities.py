@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from ..component import Component, RowStore
+from ..table import FEW, HAS_OBJECTS
 from .change_log import Arrival, ChangeLog, Stores
-from .component import Component, RowStore
-from .table import FEW, HAS_OBJECTS
 
 TRAIL = 32  # snapshots: a game over a network goes back by fewer
 

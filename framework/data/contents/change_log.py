@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .component import Component, RowStore
+from ..component import Component, RowStore
 
 Stores = Mapping[type[Component], RowStore]
 

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from ..data.component import Component, Many
-from ..typing import Entities, Excludes, Layers, Masks, Numbers, Vector, Vectors
-from . import query_arguments as check
+from ...data.component import Component, Many
+from ...typing import Entities, Excludes, Layers, Masks, Numbers, Vector, Vectors
+from . import arguments as check
 from .casts import CastVerbs
 from .hits import Hits, NearestHit, NearestHits, Neighbours, OverlapHit, OverlapHits
 

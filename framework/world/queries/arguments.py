@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-NO_ENTITY = -1  # in arrays of entities to leave out
 NONE_EXCLUDED = np.empty((1, 0), np.int64)
 
 
@@ -22,7 +21,7 @@ class Wanted(NamedTuple):
     masks
         bits of layers, one for all or (m,)
     excluded
-        (m, k) ids to leave out, NO_ENTITY: none; NONE_EXCLUDED
+        (m, k) ids to leave out, -1: none; NONE_EXCLUDED
     layers, groups
         if colliders ask, theirs, one for all or (m,): masks and groups of bodies count then
     one_way
