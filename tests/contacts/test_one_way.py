@@ -105,10 +105,10 @@ def test_falls_are_stopped_at_any_speed_that_does_not_leap_over_it(shape, speed)
 
 
 @pytest.mark.parametrize("angle", [0.5, *(pytest.param(angle, marks=pytest.mark.long) for angle in (0.0, -2.0))])
-def test_ten_thousand_bodies_from_everywhere(angle):
+def test_thousands_of_bodies_from_everywhere(angle):
     """What was never so high that the end meets it within 60 degrees flies freely, to the bit; what came from the front
     never gets behind."""
-    rng, n, radius, size, seconds = np.random.default_rng(7), 10_000, 0.3, 4.0, 1.0
+    rng, n, radius, size, seconds = np.random.default_rng(7), 4_000, 0.3, 4.0, 1.0
     places, speeds = rng.uniform(-5, 5, (n, 2)), rng.uniform(-8, 8, (n, 2))
     paths = []
     for segment in (True, False):
@@ -127,13 +127,13 @@ def test_ten_thousand_bodies_from_everywhere(angle):
     along, out = np.array((math.cos(angle), math.sin(angle))), np.array((-math.sin(angle), math.cos(angle)))
     low, at = free @ out - radius, free @ along
     behind = (low < -0.5 * radius).all(0)  # all the time
-    assert behind.sum() > 1000
+    assert behind.sum() > 400
     assert np.array_equal(met[:, behind], free[:, behind])
     crosses = (low[:-1] > 0) & (low[1:] < 0)
     first = crosses.argmax(0)
     lands = crosses.any(0) & (low[0] > 0) & (abs(at) < size / 2)[[first, first + 1], np.arange(n)].all(0)
     lands &= abs(met @ along).max(0) < size / 2  # as long as it is over the segment
-    assert lands.sum() > 50
+    assert lands.sum() > 20
     assert (met[:, lands] @ out).min() > radius - 0.01
 
 

@@ -86,8 +86,6 @@ def complaints(build, victims: slice = slice(None), first: int | None = None) ->
         for place, name in enumerate(names):
             for value in VALUES if first is None else VALUES[(first + number + place) % 2 :: 2]:
                 world.restore(start)
-                world.step()  # nobody is out any more
-                world.restore(start)
                 world.faults.clear()
                 if poison(world, name, entity, value):
                     what = f"{name} of entity {entity} = {value}"
