@@ -191,20 +191,20 @@ def approach_speed(state, c, path, touch, kind, dt):
     speed = dot(rate_along(path, t), normal)
     if state.spinning:
         speed += closing_by_spin(bodies, a, b, arms_to(bodies, a, b, normal, point, apart), normal)
-    threshold, rounding = bounce_threshold(state, a, b), 0.0
+    threshold, rounding, turning = bounce_threshold(state, a, b), 0.0, turning_travel(state, 1.0, a, b)
     if impacts.sweeps:  # else a plastic impact would be one again, by a rounding error
         rounding = ROUNDING * (length(bodies.path_velocity[a]) + length(bodies.path_velocity[b]))
     if not speed < -(threshold + rounding):  # a contact at rest
-        if state.spinning and not speed < -ROUNDING * turning_travel(state, 1.0, a, b):  # it has landed
+        if state.spinning and not speed < -ROUNDING * turning:  # it has landed
             return NO_EVENT, speed
         return HAND_OVER if is_missed_by_discrete(state, a, b, path, touch, dt) else NO_EVENT, speed
-    turns = turning_travel(state, dt, a, b) > slop_of(state, a, b)
+    turns = turning * dt > slop_of(state, a, b)
     slides = kind == FOUND_BY_SWEEP and (bodies.warm_started[a] or bodies.warm_started[b])
     if has_corner_rule(state, bodies.shape[a], bodies.shape[b]):  # what turns reaches the edge by that as well
         slides &= not turns
     if slides and turns:  # what tips over on another body lands on its next corner while the one before holds it
         slides = state.pairs.early[c] and restitution_at(state, a, b, (point, normal, apart)) == 0.0
-        slides &= turning_travel(state, dt - t, a, b) - speed * dt <= smaller_extent(bodies, a, b)
+        slides &= turning * (dt - t) - speed * dt <= smaller_extent(bodies, a, b)
     elif slides:
         slides = is_held_by_edge(state, a, b, path, touch, speed, dt)
     if slides:
