@@ -7,8 +7,8 @@ from ..linking.parts import call_joined_range
 
 # See solving.solve_joined_range, which does it.
 (
-    START, WARM_START, PUSH, RELAX, PUSH_AGAIN, RELAX_AGAIN, TURN, ADD, KEEP, OPEN, RELAX_OPEN, ADD_WORK, SUM_WORK,
-    FADE,
+    START, START_WARM, PUSH, RELAX, PUSH_AGAIN, RELAX_AGAIN, TURN_BODIES, ADD, KEEP, OPEN, RELAX_OPEN, ADD_WORK,
+    SUM_WORK, FADE,
 ) = range(14)  # fmt: skip
 
 

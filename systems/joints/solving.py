@@ -88,7 +88,7 @@ def solve_joined_range(solver, what, numbers, span):
     if what == calls.START:
         start_joints(solver, h, dt / solver.usual)
         measure_joints(solver, 0.0)
-    elif what == calls.WARM_START:
+    elif what == calls.START_WARM:
         warm_start_joints(solver)
     elif what == calls.PUSH:
         solve_joints(solver, True)
@@ -98,7 +98,7 @@ def solve_joined_range(solver, what, numbers, span):
     elif what in (calls.PUSH_AGAIN, calls.RELAX_AGAIN):  # after the contacts
         if solver.direct.begin < solver.direct.end and span[0] < span[1]:
             solve_direct(solver, what == calls.PUSH_AGAIN)
-    elif what == calls.TURN:
+    elif what == calls.TURN_BODIES:
         integrate_rotation_of_joined(solver, span[2], span[3], h)
     elif what == calls.ADD:
         add_joints(solver)

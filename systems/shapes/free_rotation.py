@@ -20,9 +20,9 @@ from .quaternions import product
 JACOBI_SWEEPS = 16  # of Jacobi rotations: each squares what is off the diagonal
 SPHERICAL = 1e-24  # square of the sine between momentum and angular velocity: less is none
 DIAGONAL = 1e-15  # of the trace: what is off the diagonal by less is rounding
-SMALL_TURN, ALIKE = 1e-4, 1e-12  # rad: by what unlike moments add splitting is right; by that little they are alike
+SMALL_TURN, NO_TURN = 1e-4, 1e-12  # rad: by what unlike moments add splitting is right; by that little they are alike
 MOST_MEANS, SAME_MEANS = 16, 1e-8  # of each other: the next arithmetic and geometric mean are the same number
-MOST_DOUBLINGS, NEAR_MEAN, SERIES = 64, 2e-3, 1e-8  # of their mean: what is nearer has a series of six terms
+MOST_DOUBLINGS, NEAR_MEAN, ARCTAN_SERIES = 64, 2e-3, 1e-8  # of their mean: what is nearer has a series of six terms
 SEPARATRIX = 1e-32  # least square of the complementary modulus
 
 
@@ -140,7 +140,7 @@ def elliptic_integrals(sn, cn, complement, nu):
         rx, ry, rz, rp = math.sqrt(x), math.sqrt(y), math.sqrt(z), math.sqrt(p)
         product_of, more = (rp + rx) * (rp + ry) * (rp + rz), rx * ry + rx * rz + ry * rz
         root = math.sqrt(share * share * share * far) / product_of
-        sum_of += share / product_of * (atan2(root, 1.0) / root if root > SERIES else 1.0 - root * root / 3.0)
+        sum_of += share / product_of * (atan2(root, 1.0) / root if root > ARCTAN_SERIES else 1.0 - root * root / 3.0)
         share *= 0.25
         x, y, z, p = 0.25 * (x + more), 0.25 * (y + more), 0.25 * (z + more), 0.25 * (p + more)
     mean = (x + y + z) / 3.0
@@ -197,10 +197,12 @@ def turn_far(q, m, inverse, h):
     to = replaced(replaced(replaced(m, p, a1), y, most_y * s1), o, most_o * c1)
     begun, angle_begun = elliptic_integrals(math.copysign(s0, s0 * c0), abs(c0), complement, nu)
     ended, angle_ended = elliptic_integrals(math.copysign(s1, s1 * c1), abs(c1), complement, nu)
-    angle, halves = angle_ended - angle_begun, begun + u - ended
-    if abs(halves) > 1.0:  # whole half periods between them, each pi or longer
+    angle, left = angle_ended - angle_begun, begun + u - ended
+    if abs(left) > 1.0:  # whole half periods between them, each pi or longer
         half, angle_half = elliptic_integrals(1.0, 0.0, complement, nu)
-        angle += 2.0 * math.floor(0.5 * halves / half + 0.5) * angle_half
+        halves = 2.0 * math.floor(0.5 * left / half + 0.5)
+        angle, left = angle + halves * angle_half, left - halves * half
+    angle += left / (1.0 + nu * s1 * s1)  # near the axis of the middle moment sn and cn do not tell where u is
     angle = size * (of_axis(inverse, p) * h + both / rate * angle)
     from_pole, azimuth = angles_from(m, p)
     q, _ = turned_about(q, m, p, azimuth)
@@ -225,7 +227,7 @@ def turn_freely(q, m, inverse, h):
     quaternion of the principal axes; m: angular momentum along them; inverse: 1 / principal moments."""
     energy, (j, k, other) = energy_of(m, inverse), most_similar(inverse)
     about_j, about_other = of_axis(inverse, j) - of_axis(inverse, k), of_axis(inverse, other) - of_axis(inverse, k)
-    if tensor_size(m, about_j * h) > ALIKE and tensor_size(m, about_other * h) > SMALL_TURN:
+    if tensor_size(m, about_j * h) > NO_TURN and tensor_size(m, about_other * h) > SMALL_TURN:
         q, m = turn_far(q, m, inverse, h)
         return q, m, 0.0
     half = 0.5 * of_axis(inverse, k) * h

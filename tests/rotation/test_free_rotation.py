@@ -16,7 +16,6 @@ from carom.plugins.rotation import BoxCollider, Spin
 
 pytestmark = pytest.mark.plain
 METHODS = {"explicit_euler": 1, "semi_implicit_euler": 1, "velocity_verlet": 2, "yoshida4": 4, "rk4": 4}
-# Of the free top: splitting is of order 2 whatever the order of torques.
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.7])
@@ -66,6 +65,20 @@ def top_at(moments, w0, t):
 
 
 MOMENTS, START = (1.0, 2.0, 3.0), (0.4, 1.1, 1.3)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("aside", [0.0, 1e-300, 1e-17, 1e-13, 1e-9])
+@pytest.mark.parametrize("axis", range(3))
+def test_a_turn_about_a_principal_axis_is_of_constant_rate(axis, aside):
+    """What is aside of that of the middle moment grows by 3 in a step at most."""
+    w = 3.0 * np.eye(3)[axis] + aside * np.array((1.0, -2.0, 0.5))
+    with turning_world(3) as world:
+        entity = world.create_entity(Transform((0, 0, 0)), RigidBody(), Spin(w, MOMENTS))
+        run(world, 10)
+        q = np.array(part(world, entity, Transform).rotation)
+    assert q[0] == pytest.approx(math.cos(0.25), abs=1e-14 + 10 * aside)
+    assert q[1 + axis] == pytest.approx(math.sin(0.25), abs=1e-14 + 10 * aside)
 
 
 class Nothing(ForceSystem):

@@ -80,7 +80,7 @@ def apply_forces(solver, h, span, arms):
 @part
 def apply_warm_start(solver, times, span, arms):
     """The impulses of the last substep act again."""
-    for_joints(solver, calls.WARM_START, times, span, arms)
+    for_joints(solver, calls.START_WARM, times, span, arms)
     for k in range(span[0], span[1] if len(arms) > 0 and solver.has_rolling else span[0]):
         solver.rolled[k] = scale(solver.normal[k], 0.0)
     for k in range(span[0], span[1]):
@@ -108,7 +108,7 @@ def integrate_positions(solver, h, span, arms):
 def integrate_rotations(solver, h, span, arms):
     """Bodies go on turning for a time."""
     if len(arms) > 0 and solver.joints.active > 0 and len(solver.velocity[span[2]]) == 3:
-        call_joined_range(solver.joints.solver, solver, calls.TURN, (h, h), span)
+        call_joined_range(solver.joints.solver, solver, calls.TURN_BODIES, (h, h), span)
         load_masses(solver, span)
     elif len(arms) > 0:
         integrate_rotation(solver, span[2], span[3], h)
