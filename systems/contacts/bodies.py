@@ -137,7 +137,7 @@ def gather(state, dt):
         solver.velocity[q], solver.shift[q], solver.acceleration[q] = v, x, a
     for q in range(solver.bodies if state.spinning else 0):
         i = solver.body_row[q]
-        solver.spin[q] = bodies.spin[i]
+        solver.spin[q], solver.middle[q] = bodies.spin[i], nothing
         rotate_body(solver, q, scale(turn_of_path(state, i, dt), -1.0))  # to where the step starts
         solver.reach[q] = reach_from_centre(state, i) if state.collides else 0.0
         solver.inverse_inertia[q] = bodies.inverse_inertia[i]

@@ -112,6 +112,30 @@ def is_ball(state, i, way):
     return is_same(support_by_address(shape, way), support_by_address(shape, scale(way, -1.0)))
 
 
+@inlined
+def middle_of(state, i, normal):
+    """From the mass centre of body i to the middle of its shape if that is a ball which contacts turn; else 0."""
+    offset, nothing = state.bodies.offset[i], zero_of(state)
+    if dot(offset, offset) > 0.0 and is_turned(state.bodies, i) and is_ball(state, i, normal):
+        return offset
+    return nothing
+
+
+@part
+def note_middles(state, r, all_alike):
+    """The middle about which each body of a contact rolls. all_alike: none where another of its contacts, which are all
+    noted by now, has another one."""
+    solver, pairs = state.solver, state.pairs
+    c, k = solver.pair[r], solver.slot[r]
+    for i, q in ((pairs.a[c], solver.first[k]), (pairs.b[c], solver.second[k])):
+        middle = middle_of(state, i, solver.normal[k])
+        if all_alike:
+            other = sub(solver.middle[q], middle)
+            solver.middle[q] = scale(middle, 0.0) if dot(other, other) > 0.0 else middle
+        elif dot(middle, middle) > 0.0:
+            solver.middle[q], solver.lopsided = middle, True
+
+
 @part
 def lies_on_face(state, sides, d, turn, normal):
     """Whether of two bodies, of which one is a ball, the other is touched on a face that turns on by little.
@@ -198,11 +222,15 @@ def lay_first_touch(state, dt, r):
 def lay_arms(state, dt):
     """The points of all contacts at rest."""
     solver, pairs = state.solver, state.pairs
+    solver.lopsided = False
     for r in range(solver.contacts):
         if solver.point[r] == 0:
             build_arms(state, dt, r, solver.gap[solver.slot[r]])
+            note_middles(state, r, False)
             if turns_far(state, pairs.a[solver.pair[r]], pairs.b[solver.pair[r]]):
                 lay_first_touch(state, dt, r)
+    for r in range(solver.contacts if solver.lopsided else 0):
+        note_middles(state, r, True)
     for r in range(solver.contacts if solver.has_rolling else 0):
         c = solver.pair[r]
         solver.rolling[solver.slot[r]] = rolling_between(state.bodies, pairs.a[c], pairs.b[c])

@@ -7,14 +7,13 @@ the pairs are solved.
 
 from __future__ import annotations
 
-import math
-
 from ....framework.compilation import inlined, part
 from ....framework.jit.records.schema import Schema, floats, vectors
 from ....framework.jit.records.stack_record import stack_record
-from ....framework.vectors import add, add_scaled, dot, item, replace, scale, sub
+from ....framework.vectors import add, add_scaled, dot, scale, sub
 from ...integration.turning import cross_spin, symmetric, twist
 from .records import ROW_CHUNK
+from .rows import pull_along_surface
 
 SEVERAL = 1.0 + 1e-9  # times the masses that two points of a pair move: they are solved at once even if they are one
 
@@ -107,19 +106,6 @@ def pushed(solver, k, motion, arm_a, arm_b, push):
 
 
 @inlined
-def pull_in_chunk(old, slip, normal, mass, limit):
-    """The impulse along the surface that stops a slip, of at most ``limit``, where it is ``old`` so far."""
-    if len(normal) == 2:  # a number along the one direction there is
-        along = replace(replace(normal, 0, -item(normal, 1)), 1, item(normal, 0))
-        pull = dot(old, along) - mass * dot(slip, along)
-        pull = pull if pull < limit else limit
-        return scale(along, pull if pull > -limit else -limit)
-    pull = add_scaled(old, add_scaled(slip, normal, -dot(slip, normal)), -mass)
-    square = dot(pull, pull)
-    return scale(pull, limit / math.sqrt(square) if square > limit * limit else 1.0)
-
-
-@inlined
 def terms_at(solver, one, k, motion, bias, softly):
     """Of row k of the pair whose first row is ``one``: (normal, what an impulse of 1 along it twists of each body, how
     that changes their spins, 1 / kg that it moves, what a soft row keeps, how much faster than it may it closes)."""
@@ -139,7 +125,7 @@ def rub_at(solver, one, k, impulse, motion):
     row is ``one``."""
     n, arm_a, arm_b, tangent = solver.normal[k], solver.arm_a[k], solver.arm_b[k], solver.tangent[k]
     slip = parting_at(motion, arm_a, arm_b)
-    pull = pull_in_chunk(tangent, slip, n, solver.tangent_mass[k], solver.friction[k] * impulse)
+    pull = pull_along_surface(tangent, slip, n, solver.tangent_mass[k], solver.friction[k] * impulse)
     solver.tangent[k] = pull
     return pushed(solver, one, motion, arm_a, arm_b, sub(pull, tangent))
 

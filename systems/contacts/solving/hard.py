@@ -16,6 +16,13 @@ from .rows import closing_speed, separation, separation_from_rotation
 
 
 @part
+def moved_body(solver, k):
+    """The body of row k that can be moved; the first if both can."""
+    first = solver.first[k]
+    return first if solver.inverse_mass[first] > 0.0 else solver.second[k]
+
+
+@part
 def is_loaded(solver, k, dt):
     """Whether contact k, of two bodies that can be moved, bears a load, or will: they overlap."""
     a, b, acceleration = solver.first[k], solver.second[k], solver.acceleration
@@ -34,25 +41,26 @@ def select_rigid(state, dt, nothing, arms):
     stands for several faces: how much it overlaps each of them says which way it pushes.
     """
     solver, warm_started = state.solver, state.bodies.warm_started
-    inverse_mass, way, shared = solver.inverse_mass, solver.way, solver.shared
+    inverse_mass, way, pressed = solver.inverse_mass, solver.way, solver.held
     for q in range(solver.bodies):
-        way[q], shared[q] = nothing, False
+        way[q], pressed[q] = nothing, 0.0
     for k in range(solver.contacts):
         a, b = solver.first[k], solver.second[k]
         if inverse_mass[a] == 0.0:
             way[b] = add(way[b], solver.normal[k])
         elif inverse_mass[b] == 0.0:
             way[a] = sub(way[a], solver.normal[k])
-        elif not (shared[a] and shared[b]) and is_loaded(solver, k, dt):
-            shared[a] = shared[b] = True
+        elif not (pressed[a] > 0.0 and pressed[b] > 0.0) and is_loaded(solver, k, dt):
+            pressed[a] = pressed[b] = 1.0
     any_hard = any_apart = False
     for k in range(solver.contacts):
         a, b, n = solver.first[k], solver.second[k], solver.normal[k]
         solver.hard[k] = False
         if inverse_mass[a] == 0.0 or inverse_mass[b] == 0.0:
-            body, along = (b, dot(way[b], n)) if inverse_mass[b] > 0.0 else (a, -dot(way[a], n))
+            body = moved_body(solver, k)
+            along = dot(way[body], n) if body == b else -dot(way[body], n)
             rested = state.any_warm_started and warm_started[solver.body_row[body]]
-            hard = rested and along > ALIGNED and not (shared[body] or solver.varies[k])
+            hard = rested and along > ALIGNED and not (pressed[body] > 0.0 or solver.varies[k])
             solver.hard[k] = hard
             any_hard |= hard
             any_apart |= hard and solver.apart[k]
@@ -81,7 +89,7 @@ def disable_out_of_reach(state):
     for r in range(solver.contacts):
         k, c = solver.slot[r], solver.pair[r]
         if solver.hard[k] and solver.apart[k]:
-            body = solver.first[k] if solver.inverse_mass[solver.first[k]] > 0.0 else solver.second[k]
+            body = moved_body(solver, k)
             a, b = pairs.a[c], pairs.b[c]
             if state.spinning and (is_turned(bodies, a) or is_turned(bodies, b)):
                 continue  # turning brings its points nearer as well
@@ -95,16 +103,16 @@ def defer_open_contacts(solver, h, span, arms):
     """A hard contact that was open when the step began and is not overlapped when it ends is left to the next step if
     its body is held by another one: it slides on, and by then it may have passed the corner that it would stop at."""
     start, stop, begin, end = span
-    first, second, held = solver.first, solver.second, solver.held
+    held = solver.held
     for q in range(begin, end):
         held[q] = 0.0
     for k in range(start, stop):
         if solver.hard[k]:
-            body = first[k] if solver.inverse_mass[first[k]] > 0.0 else second[k]
+            body = moved_body(solver, k)
             held[body] = max(held[body], solver.impulse[k])
     for k in range(start, stop):
         if solver.hard[k] and solver.apart[k]:
-            body = first[k] if solver.inverse_mass[first[k]] > 0.0 else second[k]
+            body = moved_body(solver, k)
             room = separation(solver, k, arms)
             idle = solver.impulse[k] <= NEGLIGIBLE * held[body]
             if held[body] > 0.0 and idle and room > -NEGLIGIBLE * solver.extent[k]:

@@ -8,7 +8,7 @@ from ....framework.compilation import part
 from ....framework.vectors import length
 from ..constants import CONVERGED_SHARE, CONVERGED_SPEED, FRICTION_OVERRELAXATION, ISLAND_WORK, MOST_PASSES
 from .chunks import solve_chunks
-from .rows import closing_speed, relax_listed, solve_friction, solve_normals, solve_rolling
+from .rows import closing_speed, look_ahead, relax_listed, solve_friction, solve_normals, solve_rolling
 
 
 @part
@@ -54,6 +54,8 @@ def agrees(solver, h, least, span):
 @part
 def solve_passes(solver, pushes, passes, stiff, h, span, arms):
     """So many ``passes`` over a range, and over a ``stiff`` one more, until they agree."""
+    if len(arms) > 0:
+        look_ahead(solver, 0.5 * h, span)
     bias, most, least = solver.pushing if pushes else solver.target_speed, passes, 0.0
     if stiff:
         most, least = max(passes, min(MOST_PASSES, ISLAND_WORK // (span[1] - span[0]))), least_change(solver, h, span)
@@ -64,6 +66,8 @@ def solve_passes(solver, pushes, passes, stiff, h, span, arms):
         solve_pass(solver, bias, pushes, over, span, arms)
         if stiff and left <= 0 and agrees(solver, h, least, span):
             break
+    if len(arms) > 0:
+        look_ahead(solver, -0.5 * h, span)
 
 
 @part

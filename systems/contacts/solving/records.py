@@ -53,6 +53,7 @@ SOLVER = Schema(
     has_friction=flag(),
     tips=flag(),  # some pair has several points
     has_rolling=flag(),
+    lopsided=flag(),  # some body has such a middle
     # where bodies spin:
     place=vectors(unit="m"),  # of the point, from the centre of the first shape
     arm_a=vectors(apart=True, unit="m"),  # from the centres of mass to the surfaces there,
@@ -95,6 +96,7 @@ SOLVER = Schema(
     spin=vectors(flat=1, unit="rad/s"),  # where bodies spin, as in the records of the bodies
     spin_before=vectors(flat=1, unit="rad/s"),  # of a substep
     turn=vectors(flat=1, unit="rad"),
+    middle=vectors(unit="m"),  # of the ball that touches, from its mass centre; 0: that is the same, or no ball does
     sine=floats(unit="1"),  # shares of that, see shares_of_turn
     versine=floats(unit="1"),
     inverse_inertia=vectors(flat=1, unit="1/(kg m^2)"),
@@ -106,9 +108,8 @@ SOLVER = Schema(
     opened=integer(),
     mover=ints("int32"),  # bodies that move by themselves
     movers=integer(),
-    shared=flags(),  # something presses on it
     way=vectors(unit="1"),  # sum of the normals of what holds it
-    held=floats(unit="N s"),  # by its strongest hard contact
+    held=floats(unit="N s"),  # by its strongest hard contact; above 0 before that: something presses on it
     # islands
     islands=integer(),
     size_of=ints("int32"),  # rows
@@ -162,8 +163,8 @@ ARM_COLUMNS = (
     "inertia_b", "products_a", "products_b", "ends", "points",
 )  # fmt: skip
 TURN_COLUMNS = (
-    "spin", "spin_before", "turn", "sine", "versine", "inverse_inertia", "inverse_products", "frame", "inverse_moments",
-    "reach",
+    "spin", "spin_before", "turn", "middle", "sine", "versine", "inverse_inertia", "inverse_products", "frame",
+    "inverse_moments", "reach",
 )  # fmt: skip
 
 # Impulses of the contacts at rest, for the next step: [now, i] is the memory, [1 - now, i] is written.

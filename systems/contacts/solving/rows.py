@@ -60,13 +60,18 @@ def integrate_rotation(solver, begin, end, h):
 
 
 @inlined
+def turned(solver, q, arm):
+    """By how much body q moves the end of an arm as it turns from where the step ends to where it is now."""
+    return end_of_turn(solver.turn[q], (solver.sine[q], solver.versine[q]), arm)
+
+
+@inlined
 def separation(solver, k, arms):
     """The gap of row k where its bodies are now."""
     a, b = solver.first[k], solver.second[k]
     way = sub(solver.shift[b], solver.shift[a])
     if len(arms) > 0:
-        way = add(way, end_of_turn(solver.turn[b], (solver.sine[b], solver.versine[b]), solver.core_b[k]))
-        way = sub(way, end_of_turn(solver.turn[a], (solver.sine[a], solver.versine[a]), solver.core_a[k]))
+        way = sub(add(way, turned(solver, b, solver.core_b[k])), turned(solver, a, solver.core_a[k]))
     return solver.gap[k] + dot(way, solver.normal[k])
 
 
@@ -76,9 +81,7 @@ def separation_from_rotation(solver, k, arms):
     if len(arms) == 0:
         return 0.0
     a, b = solver.first[k], solver.second[k]
-    way = end_of_turn(solver.turn[b], (solver.sine[b], solver.versine[b]), solver.core_b[k])
-    way = sub(way, end_of_turn(solver.turn[a], (solver.sine[a], solver.versine[a]), solver.core_a[k]))
-    return dot(way, solver.normal[k])
+    return dot(sub(turned(solver, b, solver.core_b[k]), turned(solver, a, solver.core_a[k])), solver.normal[k])
 
 
 @inlined
@@ -105,6 +108,29 @@ def compute_effective_mass(solver, k, arms):
     solver.mass[k] = 1.0 / compliance_along(solver, k, solver.normal[k], arms)
     if len(arms) > 0:
         solver.tangent_mass[k] = 1.0 / most_compliance(solver, k, arms)
+
+
+@part
+def turn_arms(solver, by, span, arms):
+    """Arms to what rolls about another point than its middle turn with it; by: 1, or -1 to go back."""
+    middle = solver.middle
+    for k in range(span[0], span[1] if solver.lopsided else span[0]):
+        a, b = solver.first[k], solver.second[k]
+        if dot(middle[a], middle[a]) + dot(middle[b], middle[b]) > 0.0:
+            solver.arm_a[k] = add_scaled(solver.arm_a[k], turned(solver, a, middle[a]), by)
+            solver.arm_b[k] = add_scaled(solver.arm_b[k], turned(solver, b, middle[b]), by)
+            compute_effective_mass(solver, k, arms)
+
+
+@part
+def look_ahead(solver, ahead, span):
+    """The velocity of what rolls so becomes what its middle will have after a time: half a substep, as it moves by
+    that. Else it would lose energy as it rolls. Each middle moves about its mass centre by the spin before contacts."""
+    for q in range(span[2], span[3] if solver.lopsided else span[2]):
+        middle, spin = solver.middle[q], solver.spin_before[q]
+        if dot(middle, middle) > 0.0:
+            inwards = cross_spin(spin, cross_spin(spin, add(middle, turned(solver, q, middle))))
+            solver.velocity[q] = add_scaled(solver.velocity[q], inwards, ahead)
 
 
 @inlined
@@ -186,43 +212,53 @@ def apply_impulse(solver, k, impulse, arms):
             solver.spin[b] = add(solver.spin[b], change_of_spin(solver, b, twist(solver.arm_b[k], impulse)))
 
 
+@inlined
+def solve_normal_of(solver, k, bias, pushes, arms):
+    """One row along its normal, see ``solve_normals``."""
+    old = solver.impulse[k]
+    excess = solver.mass[k] * (closing_speed(solver, k, arms) - bias[k])
+    if pushes:
+        excess -= solver.soft[k] * (excess + old)
+    new = max(0.0, old + excess)
+    apply_impulse(solver, k, scale(solver.normal[k], new - old), arms)
+    solver.impulse[k] = new
+
+
 @part
 def solve_normals(solver, bias, pushes, span, arms):
     """One pass over the rows of a range, along their normals; where bodies spin each along its surface after that.
 
     bias: speed at which each row may close, below 0 at which it is to open; softly where this pass ``pushes``.
     """
-    impulse, soft, runs = solver.impulse, solver.soft, solver.surfaces_run
-    start, stop, _, _ = span
-    for k in range(start, stop):
-        old = impulse[k]
-        excess = solver.mass[k] * (closing_speed(solver, k, arms) - bias[k])
-        if pushes:
-            excess -= soft[k] * (excess + old)
-        new = max(0.0, old + excess)
-        apply_impulse(solver, k, scale(solver.normal[k], new - old), arms)
-        impulse[k] = new
+    runs = solver.surfaces_run
+    for k in range(span[0], span[1]):
+        solve_normal_of(solver, k, bias, pushes, arms)
         if len(arms) > 0 and solver.friction[k] != 0.0:
             solve_friction_of(solver, k, 1.0, arms, runs)
+
+
+@inlined
+def pull_along_surface(old, slip, normal, mass, limit):
+    """The impulse along the surface that stops a slip, of at most ``limit``, where it is ``old`` so far."""
+    if len(normal) == 2:  # a number along the one direction there is
+        along = replace(replace(normal, 0, -item(normal, 1)), 1, item(normal, 0))
+        pull = dot(old, along) - mass * dot(slip, along)
+        pull = pull if pull < limit else limit
+        return scale(along, pull if pull > -limit else -limit)
+    pull = add_scaled(old, add_scaled(slip, normal, -dot(slip, normal)), -mass)
+    square = dot(pull, pull)
+    return scale(pull, limit / math.sqrt(square) if square > limit * limit else 1.0)
 
 
 @inlined
 def solve_friction_of(solver, k, over, arms, runs):
     """Stop what slides at row k, with at most ``friction`` times the normal impulse (Coulomb). over: times the impulse
     that stops it; see FRICTION_OVERRELAXATION. runs: whether some surface does."""
-    n, old, w = solver.normal[k], solver.tangent[k], relative_velocity(solver, k, arms)
+    old, slip = solver.tangent[k], relative_velocity(solver, k, arms)
     if runs:
-        w = add(w, solver.surface_slip[k])
+        slip = add(slip, solver.surface_slip[k])
     mass = over * (solver.tangent_mass[k] if len(arms) > 0 else solver.mass[k])
-    limit = solver.friction[k] * solver.impulse[k]
-    if len(n) == 2:  # a number along the one direction there is
-        along = replace(replace(n, 0, -item(n, 1)), 1, item(n, 0))
-        pull = scale(along, max(-limit, min(limit, dot(old, along) - mass * dot(w, along))))
-    else:
-        pull = add_scaled(old, add_scaled(w, n, -dot(w, n)), -mass)
-        square = dot(pull, pull)
-        if square > limit * limit:
-            pull = scale(pull, limit / math.sqrt(square))
+    pull = pull_along_surface(old, slip, solver.normal[k], mass, solver.friction[k] * solver.impulse[k])
     solver.tangent[k] = pull
     apply_impulse(solver, k, sub(pull, old), arms)
 
@@ -271,10 +307,7 @@ def relax_listed(solver, count, arms):
     """One pass over the first rows of ``listed``, which may close as fast as what is open lets them."""
     for e in range(count):
         k = solver.listed[e]
-        old = solver.impulse[k]
-        new = max(0.0, old + solver.mass[k] * (closing_speed(solver, k, arms) - solver.target_speed[k]))
-        apply_impulse(solver, k, scale(solver.normal[k], new - old), arms)
-        solver.impulse[k] = new
+        solve_normal_of(solver, k, solver.target_speed, False, arms)
         if solver.friction[k] != 0.0:
             solve_friction_of(solver, k, 1.0, arms, solver.surfaces_run)
     solver.visits += count

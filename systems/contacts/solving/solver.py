@@ -43,6 +43,7 @@ from .rows import (
     compute_effective_mass,
     integrate_rotation,
     rotate_body,
+    turn_arms,
     update_targets,
 )
 
@@ -56,6 +57,8 @@ def measure(solver, h, springs, dt, stiff, ends, span, arms):
     where the speed of some row is far from what the relaxing passes are to make of it; returns whether any is.
     """
     asks = dt / solver.usual if ends else h, h, dt, springs, stiff
+    if len(arms) > 0:
+        turn_arms(solver, 1.0, span, arms)
     any_struck, islands = False, islands_of(solver, span)
     for t in range(islands[0], islands[1]):
         solver.struck[t] = False
@@ -73,8 +76,8 @@ def apply_forces(solver, h, span, arms):
     for q in range(span[2], span[3]):
         v = add_scaled(solver.velocity[q], solver.acceleration[q], h)
         solver.velocity[q], solver.velocity_before[q] = v, v
-    for q in range(span[2], span[3] if len(arms) > 0 else span[2]):
-        solver.spin_before[q] = solver.spin[q]
+        if len(arms) > 0:
+            solver.spin_before[q] = solver.spin[q]
 
 
 @part
@@ -94,6 +97,8 @@ def apply_warm_start(solver, times, span, arms):
 @part
 def integrate_positions(solver, h, span, arms):
     """Bodies move for a substep; what moves by itself belongs to no special range, but moves with each of them."""
+    if len(arms) > 0:
+        turn_arms(solver, -1.0, span, arms)
     for q in range(span[2], span[3]):
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], h)
     for m in range(solver.movers if span[2] > 0 else 0):
@@ -101,12 +106,6 @@ def integrate_positions(solver, h, span, arms):
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], h)
         if len(arms) > 0:
             rotate_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], h))
-    integrate_rotations(solver, h, span, arms)
-
-
-@part
-def integrate_rotations(solver, h, span, arms):
-    """Bodies go on turning for a time."""
     if len(arms) > 0 and solver.joints.active > 0 and len(solver.velocity[span[2]]) == 3:
         call_joined_range(solver.joints.solver, solver, calls.TURN_BODIES, (h, h), span)
         load_masses(solver, span)
@@ -167,11 +166,11 @@ def is_still(solver, dt, span, arms):
         return False
     for q in range(begin, end):
         fastest = max(fastest, dot(solver.velocity[q], solver.velocity[q]))
+        if len(arms) > 0:
+            around = scale(solver.spin[q], solver.reach[q])
+            fastest = max(fastest, dot(around, around))
     for k in range(start, stop):
         extent = min(extent, solver.extent[k])
-    for q in range(begin, end if len(arms) > 0 else begin):
-        around = scale(solver.spin[q], solver.reach[q])
-        fastest = max(fastest, dot(around, around))
     if not math.sqrt(fastest) * dt <= NEGLIGIBLE * extent:
         return False
     changes = False
@@ -185,9 +184,7 @@ def repeat_substep(solver, left, h, span, arms):
     """The substeps that are left of an island that rests do what the last one did."""
     for k in range(span[0], span[1]):
         solver.total[k] += left * solver.impulse[k]
-    for q in range(span[2], span[3]):
-        solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], left * h)
-    integrate_rotations(solver, left * h, span, arms)
+    integrate_positions(solver, left * h, span, arms)
 
 
 @part
