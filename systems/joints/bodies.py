@@ -232,7 +232,7 @@ def build_joint_rows(state):
     ground = solver.bodies
     solver.velocity[ground], solver.shift[ground], solver.spin[ground] = zero, zero, zero
     rotate_body(solver, ground, zero)
-    solver.inverse_mass[ground] = 0.0
+    solver.inverse_mass[ground] = solver.reach[ground] = 0.0
     solver.inverse_inertia[ground], solver.inverse_products[ground] = zero, zero
     for e in range(joints.active):
         j = joints.order[e]

@@ -21,7 +21,7 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.elementary import atan2, cos, exp
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
-from ..contacts.constants import FREQUENCY, JOINT_DAMPING_RATIO, SPRING_FREQUENCY
+from ..contacts.constants import FREQUENCY, FULL_PUSH_OVERLAP, JOINT_DAMPING_RATIO, SPRING_FREQUENCY
 from ..integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
 from .coupling import (
     compliance_of,
@@ -190,10 +190,20 @@ def angle_of(solver, j):
     return scale(across, 1.0 / size) if size > 0.0 else axis, atan2(size, dot(end_a, end_b))
 
 
+@inlined
+def room_to(solver, j, limit, beyond, value):
+    """How far a value is from a limit; of what is ``beyond`` it no more than is pushed out at once, as of overlap: from
+    far beyond a limit bodies would be thrown."""
+    joints = solver.joints
+    size = solver.reach[joints.first[j]] + solver.reach[joints.second[j]] if joints.kind[j] < TURN else 1.0
+    return max(-beyond, -FULL_PUSH_OVERLAP * (size + max(abs(value), abs(limit))))
+
+
 @part
-def update_joint_targets(joints, j, value):
+def update_joint_targets(solver, j, value):
     """What a row asks of the speed of its value, m/s or rad/s, and the impulses that it may have."""
-    rule, h, low, target, most = joints.rule[j], joints.step, joints.low[j], 0.0, joints.most[j] * joints.step
+    joints, target = solver.joints, 0.0
+    rule, h, low, most = joints.rule[j], joints.step, joints.low[j], joints.most[j] * joints.step
     least = -most
     if rule == DRIVE:
         pushing = target = joints.target[j]
@@ -202,9 +212,9 @@ def update_joint_targets(joints, j, value):
     elif rule != LIMIT:
         pushing = -joints.push_rate[j] * (value - low)
     else:
-        below, above = value - low, joints.high[j] - value
-        lower = below <= above
-        room = below if lower else above
+        high = joints.high[j]
+        lower = value - low <= high - value
+        room = room_to(solver, j, low, low - value, value) if lower else room_to(solver, j, high, value - high, value)
         speed = -room / h if room > 0.0 else -joints.push_rate[j] * room
         pushing = speed if lower else -speed
         if room > 0.0:
@@ -233,7 +243,7 @@ def measure_joints(solver, moved_for):
         j = order[e]
         kind, a, b = kinds[j], first[j], second[j]
         if kind == CUSTOM:
-            update_joint_targets(joints, j, measure_custom(solver, j, moved_for))
+            update_joint_targets(solver, j, measure_custom(solver, j, moved_for))
             continue
         if kind >= TURN:
             axis, angle = angle_of(solver, j)
@@ -241,7 +251,7 @@ def measure_joints(solver, moved_for):
             if not has_coupling(joints, j):
                 moved = dot(axis, change_of_spin(solver, a, axis)) + dot(axis, change_of_spin(solver, b, axis))
                 joints.mass[j] = 1.0 / moved if moved > 0.0 else 0.0
-            update_joint_targets(joints, j, angle)
+            update_joint_targets(solver, j, angle)
             continue
         arm_a, arm_b = turned_with(solver, a, base_a[j]), turned_with(solver, b, base_b[j])
         way = add(between[j], sub(add(shift[b], arm_b), add(shift[a], arm_a)))
@@ -266,7 +276,7 @@ def measure_joints(solver, moved_for):
         if not has_coupling(joints, j):
             moved = solver.inverse_mass[a] + solver.inverse_mass[b]
             joints.mass[j] = 1.0 / (moved + compliance(solver, a, arm_a, normal) + compliance(solver, b, arm_b, normal))
-        update_joint_targets(joints, j, value)
+        update_joint_targets(solver, j, value)
     for e in range(joints.begin, joints.end):  # now that all rows are measured: those of a joint may come in any order
         j = order[e]
         if has_coupling(joints, j) and not has_coupling(joints, j - 1) and not is_idle(joints, j - 1):
