@@ -77,7 +77,7 @@ def all_corners(normal, of_a, of_b, margin):
             top, bottom = (gradient @ point + height if np.ndim(gradient) else height for gradient, height in planes)
             found.append((*(across[:-1].T @ point + normal * (top + bottom) / 2), bottom - top))
     found = np.array(found)
-    found = found[found[:, -1] <= max(margin, found[:, -1].min() + 1e-12)]
+    found = found[found[:, -1] <= margin + max(0.0, found[:, -1].min())]
     return np.array([row for k, row in enumerate(found) if not (np.abs(found[:k] - row).max(axis=1) < 1e-8).any()])
 
 

@@ -36,9 +36,10 @@ def contact_points(state, rows, d, met, within, places, gaps):
     """Write up to 2 (2D) or 4 (3D) points in which two rows touch, and the gaps there; returns how many, at least 1.
 
     rows: (a, b). d: from the centre of a's shape to that of b's. met: (depth, normal, point) as the pair's function
-    answers for these. within: (margin, tilt); points with larger gaps are left out, but for the deepest; faces count
-    whose normals are within so many radians of that of the contact. places: relative to the centre of a's shape, in
-    the middle between the surfaces. gaps: along the normal, negative where the shapes overlap.
+    answers for these. within: (margin, tilt); points are left out whose gap exceeds that of the deepest, or 0, by more
+    than the margin; faces count whose normals are within so many radians of that of the contact. places: relative to
+    the centre of a's shape, in the middle between the surfaces. gaps: along the normal, negative where the shapes
+    overlap.
 
     A shape without a support and without an end is a plane through the pair's point. Where there are no two faces that
     share something, the point is that of the pair.
@@ -86,12 +87,13 @@ def is_same(one, two):
 
 @inlined
 def keep_near(places, gaps, count, margin, like):
-    """Leave out points whose gap exceeds the margin, but for the deepest; returns how many are left."""
+    """Leave out points whose gap exceeds that of the deepest, or 0, by more than the margin; returns how many are left.
+    """
     deepest, kept = gaps[0], 0
     for k in range(1, count):
         deepest = min(deepest, gaps[k])
     for k in range(count):
-        if gaps[k] <= max(margin, deepest):
+        if gaps[k] <= margin + max(deepest, 0.0):
             store(places, kept, row(places, k, like))
             gaps[kept] = gaps[k]
             kept += 1
