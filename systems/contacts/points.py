@@ -78,10 +78,11 @@ def build_arms(state, dt, r, gap):
     round_a, round_b = point_rounding(state, a), point_rounding(state, b)
     radius_a, radius_b = bodies.rolling_radius[a], bodies.rolling_radius[b]
     solver.has_rolling |= rolling_between(bodies, a, b) > 0.0
+    every = 2 if 2 * count == rows else 1  # two of four are in the rows that are solved at once
     for e in range(rows):
-        k = solver.slot[r + e]
-        at, between = row(places, min(e, count - 1), nothing), gaps[min(e, count - 1)]
-        solver.place[k], solver.gap[k] = at, between if e < count else UNREACHED * extent
+        k, one = solver.slot[r + e], min(e // every, count - 1)
+        at, between = row(places, one, nothing), gaps[one]
+        solver.place[k], solver.gap[k] = at, between if e == one * every else UNREACHED * extent
         arm_a = add(bodies.offset[a], add_scaled(at, normal, -0.5 * between))
         arm_b = add(bodies.offset[b], add_scaled(sub(at, d), normal, 0.5 * between))
         arm_a = scale(normal, radius_a) if radius_a > 0.0 else arm_a
