@@ -251,14 +251,16 @@ def linearise(state, dt):
         gap, normal = -depth_by_plane(pairs, c, d), pairs.normal[c]
         apart, convex = gap > REST_GAP * extent, both_convex(state, bodies.shape[a], bodies.shape[b])
         varies = not convex and normal_varies(state, a, b, d, normal)
-        moves = not is_stationary(sub(end, d), slop)
-        if moves and (apart or parting != STATIONARY or meets_at_corner(state, a, b, d, (-gap, normal), slop)):
+        way, struck = sub(end, d), bodies.impact_count[a] + bodies.impact_count[b] > 0
+        slides = convex and not struck and gap + dot(way, normal) >= -STAYS_SLOPS * slop  # its plane parts them
+        moves, nears = not is_stationary(way, slop), apart and not slides
+        if moves and (nears or parting != STATIONARY or meets_at_corner(state, a, b, d, (-gap, normal), slop)):
             far, gap, normal = touch_of_long_way(state, dt, a, b, end)
             if not far or parting != STATIONARY:
-                gap, normal = entry(state, a, b, d, sub(end, d), parting != STATIONARY, slop)
+                gap, normal = entry(state, a, b, d, way, parting != STATIONARY, slop)
             forget_manifold(pairs, c)
         if gap == math.inf:  # deep in a map that has no face there, at neither end: one that it does not reach
-            gap = extent + length(sub(end, d))
+            gap = extent + length(way)
         if pairs.impulse[c] > 0.0 and dot(normal, struck_along) <= 0.0:
             normal = struck_along  # coincident centres have parted: not back again
             forget_manifold(pairs, c)

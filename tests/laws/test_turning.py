@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from rotation.helpers_turning import G, box, motion, pose, turning_world, wall
+from rotation.helpers_turning import G, box, motion, pose, turned, turning_world, wall
 from worlds import MODES
 
 from carom.components import RigidBody, SphereCollider, Transform
@@ -43,6 +43,49 @@ def test_round_corners_do_not_catch_at_the_seams_of_a_floor(mode):
         assert turns < 0.01
 
 
+def seams_in_space(seed, mode):
+    """(how far it rises, m; how far it tips, as the sine) of a capsule that lies on rows of tiles and slides over."""
+    random = np.random.default_rng([seed, 64])
+    radius, speed, width = random.choice([0.01, 0.03, 0.1, 0.3]), random.uniform(3.0, 30.0), random.uniform(0.4, 1.5)
+    half, way = random.uniform(0.3, 0.8), random.uniform(0.0, 2.0 * math.pi) if seed % 2 else 0.0
+    axis, long = np.array((math.cos(way), 0.0, math.sin(way))), random.uniform(0.4, 1.5)
+    with turning_world(3, G, capsule.plugin, collision=mode, on_fault="ignore") as world:
+        wall(world, (-10.0, -0.5, 0.0), (10.0, 0.5, 9.0))
+        for k in range(math.ceil(speed / width) + 2):
+            for j in range(-1, 2):
+                wall(world, ((k + 0.5) * width, -0.5, j * long), (0.5 * width, 0.5, 0.5 * long))
+        turn = np.append(1.0, np.cross((0.0, 1.0, 0.0), axis)) * math.sqrt(0.5)  # its axis lies along that
+        start = Transform((-2.5 - 5 / 60 * speed, radius, random.uniform(-0.3, 0.3)), turn)
+        shape = capsule.CapsuleCollider(radius, half)
+        entity, rises, tips = world.create_entity(start, RigidBody(1.0, (speed, 0.0, 0.0)), Spin(), shape), [], []
+        for _ in range(60):
+            world.step()
+            now = pose(world, entity)
+            rises.append(now[1] - radius)
+            tips.append(np.linalg.norm(np.cross(turned(now[3:], np.array((0.0, 1.0, 0.0))), axis)))
+        return max(rises), max(tips)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_capsules_do_not_catch_at_the_seams_of_a_floor_in_space(mode):
+    """They rose by up to 1.5 m: two points in rows for four were solved one after the other, and a plane along which
+    one slid was given up for that of where it had left the tile."""
+    for seed in range(2):
+        rises, tips = seams_in_space(seed, mode)
+        assert rises < 3e-3
+        assert tips < 0.01
+
+
+# Missed today: 43 tips by .016 in each mode, 57 is thrown .26 m high where it is swept; 9 of 469 cases of fresh seeds.
+@pytest.mark.long
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("seed", range(2, 60))
+def test_no_capsule_catches_at_the_seams_of_a_floor_in_space(seed, mode):
+    rises, tips = seams_in_space(seed, mode)
+    assert rises < 3e-3
+    assert tips < 0.01
+
+
 def fall(seed, mode, d):
     """The fastest spin of a box that falls flat, in two seconds; all lengths are sums of powers of two."""
     random = np.random.default_rng([seed, 61])
@@ -63,8 +106,10 @@ def test_what_falls_flat_does_not_turn_by_a_bit(mode):
     assert [fall(seed, mode, 2) for seed in range(20)] == [0.0] * 20
 
 
-def test_what_falls_flat_in_space_turns_by_rounding_alone():
-    assert max(fall(seed, "discrete", 3) for seed in range(6)) < 1e-12
+@pytest.mark.parametrize("mode", MODES)
+def test_what_falls_flat_in_space_turns_by_rounding_alone(mode):
+    """1237: it leant on two of its four points, which were as far as the others but for rounding, at .1 rad/s."""
+    assert max(fall(seed, mode, 3) for seed in (0, 1, 1237)) < 1e-10
 
 
 def lopsided(seed, mode, d):
