@@ -10,7 +10,7 @@ import pytest
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
 from carom.plugins import Physics
-from carom.plugins.joints import Hinge, Joints
+from carom.plugins.joints import Distance, Hinge, Joints, Motor
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 MODES = "discrete", "continuous", "event_driven"
@@ -112,3 +112,25 @@ def test_trees_of_hinges_with_limits_gain_nothing_and_hold(d):
                 gap = max(gap, float(np.linalg.norm(a - b, axis=1).max()))
                 assert world.kinetic_energy() < 1.02 * energy
             assert gap < 0.08 or ratio > 10.0
+
+@pytest.mark.parametrize("driven", [False, True])
+@pytest.mark.parametrize("d", [2, 3])
+def test_what_is_far_beyond_a_limit_comes_back_at_a_bounded_speed(d, driven):
+    """A rope of 1 m between bodies 20 m apart: in a substep it pulls by 3 % of its length at most, as contacts push by
+    3 % of a size, where it pulled them past each other in one step; a motor in the island changes nothing of it."""
+    for seed in range(3):
+        world, _ = world_of(d, seed)
+        with world:
+            a = world.create_entity(Transform(vector(d)), RigidBody(1), SphereCollider(0.2), Spin())
+            b = world.create_entity(Transform(vector(d, 20)), RigidBody(3), SphereCollider(0.2), Spin())
+            world.create_entity(Distance(a, b, least=0.0, most=1.0))
+            if driven:
+                world.create_entity(Motor(None, a, speed=1.0, **({} if d == 2 else {"axis": (1, 0, 0)})))
+            transforms = [world.component_for_entity(entity, Transform) for entity in (a, b)]
+            apart = 20.0
+            for _ in range(600):
+                world.step()
+                before, apart = apart, float(np.linalg.norm(transforms[1].position - transforms[0].position))
+                assert before - apart < 4 * 0.03 * (before + 0.4)
+                assert world.kinetic_energy() < 1.0
+            assert apart < 1.01

@@ -11,10 +11,10 @@ import pytest
 from carom import scenes
 
 HASHES = {
-    "pile2d": ({"n": 40}, "43cad55e233dbe63bd82c89017d8282e26d8072413c54e968be12d8dc9a2a35c"),
-    "pile3d": ({"n": 27}, "059dd8c48f9f797f3533fa59e5bceeddae6a99cdc98004a8e40695ee056e280a"),
+    "pile2d": ({"n": 40}, "37e83a7c66975f55c323e5788a27d4ab2cd94abe007d8d80530fa52e9259fbfb"),
+    "pile3d": ({"n": 27}, "31bd1f8666ae9387515ef60f333e81dd6fd6e3fe66bc24700c6c34d2d473ccc7"),
     "tumbler": ({"n": 12}, "0c1980139e89fde1c589cce28d44e01f52c316eeab435314c4e599fccb103c62"),
-    "bridge": ({"n": 8, "crates": 2}, "8e60f0e627b5bfbe4e9ecc74e197dd58b15335f1f6d23bfbc530ada4c5a90775"),
+    "bridge": ({"n": 8, "crates": 2}, "90386a86fe10077d25cae829ab05deebebc7ab7a3b84a2c0095a7c9dafb139d9"),
     "ragdoll": ({"n": 1}, "a2cb76e518cd3313c77f8fe557cdebc26f4a88a6f7fc091ee8835e6cb1ccdd16"),
 }
 STEPS = 60
