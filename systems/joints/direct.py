@@ -15,14 +15,14 @@ import math
 
 from ...framework.compilation import inlined, part
 from ...framework.jit.stack_arrays import stack_array
-from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
+from ...framework.vectors import add, add_scaled, dot, item, replace, scale, sub
 from ..contacts.constants import DIRECT_STIFFNESS, DIRECT_STIFFNESS_MAX
 from ..integration.turning import change_of_spin, cross_spin, twist
 from .custom import speed_of_custom
 from .order import NO_BLOCK, block_of, freedoms
 from .records import CUSTOM, HELD_AT_ONCE, LIMITED_AT_ONCE, POINT, TURN
 
-PUSH_PASS, RELAX_PASS, RESULT_OF, ERRORS = 0, 1, 2, -2  # what is asked of rows; even: errors are pushed out
+PUSH_PASS, RELAX_PASS, RESULT_OF = 0, 1, 2  # what is asked of rows; even: errors are pushed out
 
 
 @part
@@ -243,11 +243,10 @@ def speed_of(solver, j):
 def note_rows(solver, what):
     """What rows ask for, as impulses of their bodies; in the end these are the impulses that they get.
 
-    what: ERRORS, of the errors that they push out alone; PUSH_PASS and RELAX_PASS with the velocities as they are;
-    RESULT_OF either with those of the solution.
+    what: PUSH_PASS and RELAX_PASS with the velocities as they are; RESULT_OF either with those of the solution.
     """
     joints, direct = solver.joints, solver.direct
-    errors, pushes, ends = what == ERRORS, what % 2 == 0, what >= RESULT_OF
+    pushes, ends = what % 2 == 0, what >= RESULT_OF
     for q in range(direct.begin, direct.end):
         direct.push[direct.body[q]] = direct.twist[direct.body[q]] = scale(solver.velocity[solver.bodies], 0.0)
     for e in range(joints.begin, joints.end):
@@ -256,20 +255,20 @@ def note_rows(solver, what):
             continue
         a, b, weight = joints.first[j], joints.second[j], inverse_mass_of(solver, j)
         if joints.kind[j] == POINT:
-            speed = scale(speed_between(solver, j), 0.0 if errors else 1.0)
+            speed = speed_between(solver, j)
             if pushes:
-                speed = add_scaled(speed, joints.gap[j], direct.share * joints.push_rate[j])
+                speed = add_scaled(speed, joints.gap[j], joints.push_rate[j])
             change = scale(speed, -weight)
-            if pushes and not errors:
+            if pushes:
                 change = sub(change, joints.push[j])
             if ends:
                 joints.push[j] = add(joints.push[j], change)
             note_push(direct, a, change, twist(joints.arm_a[j], change), -1.0)
             note_push(direct, b, change, twist(joints.arm_b[j], change), 1.0)
             continue
-        asked = direct.share * joints.pushing[j] if pushes else joints.target_speed[j]
-        change = weight * (asked - (0.0 if errors else speed_of(solver, j)))
-        if pushes and not errors:
+        asked = joints.pushing[j] if pushes else joints.target_speed[j]
+        change = weight * (asked - speed_of(solver, j))
+        if pushes:
             change -= joints.impulse[j]
         if ends:
             joints.impulse[j] += change
@@ -310,31 +309,6 @@ def back_substitute(solver, n):
             for k in range(i + 1, n):
                 x[q, i] -= diagonal[q, n * k + i] * x[q, k]
             x[q, i] /= diagonal[q, n * i + i]
-
-
-@part
-def bound_push(solver, h):
-    """What share of their errors the joints push out in a substep: as bodies turn they move along circles, and what
-    they stray by that from where they are pushed is to be less than the errors."""
-    joints, direct, zero = solver.joints, solver.direct, scale(solver.velocity[solver.bodies], 0.0)
-    error = strays = 0.0
-    direct.share = 1.0
-    note_rows(solver, ERRORS)
-    back_substitute(solver, freedoms(zero))
-    for e in range(direct.begin, direct.end):
-        q = direct.body[e]
-        _, direct.twist[q] = from_energy_norm(solver, q, zero)
-    for e in range(joints.begin, joints.end):
-        j = joints.order[e]
-        if joints.at_once[j] != HELD_AT_ONCE:
-            continue
-        point = joints.kind[j] == POINT
-        error = max(error, h * (joints.push_rate[j] * length(joints.gap[j]) if point else abs(joints.pushing[j])))
-        for q, arm in ((joints.first[j], joints.arm_a[j]), (joints.second[j], joints.arm_b[j])):
-            if joints.kind[j] < TURN and solver.island[q] >= 0:
-                turn = h * length(direct.twist[q])
-                strays = max(strays, turn * turn * length(arm))
-    direct.share = error / strays if error < strays else 1.0
 
 
 @part

@@ -83,6 +83,7 @@ JOINTS = Schema(
     step=number(unit="s"),  # of a substep
     fastest=number(unit="Hz"),  # springs above it hold
     stiffness=number(unit="1"),  # of what holds
+    rate=number(unit="1/s"),  # at which what holds pushes its error out
     asked=integer(),  # the joint whose function runs now; 0: none
     push_rate=floats(unit="1/s"),  # at which error is pushed out,
     mass_scale=floats(unit="1"),  # and what makes it soft
@@ -134,7 +135,6 @@ DIRECT = Schema(
     begin=integer(),
     end=integer(),
     stiffer=number(unit="1"),  # times as stiff as where the pass pushes
-    share=number(unit="1"),  # of the errors of its joints that the pass pushes out
     mixed=flag(),  # some of its rows are solved by passes
 )
 DIRECT_BODIES = [name for name, field in DIRECT.fields.items() if isinstance(field, Column) and name != "values"]

@@ -35,7 +35,7 @@ from .coupling import (
     symmetric_product,
 )
 from .custom import measure_custom, push_custom
-from .direct import bound_push, factorise, solve_all_limited, solve_direct, speed_between, speed_of
+from .direct import factorise, solve_all_limited, solve_direct, speed_between, speed_of
 from .order import is_rigid
 from .records import ALIGN, BY_PASSES, CUSTOM, DRIVE, HELD_AT_ONCE, LIMIT, POINT, SERVO, SLIDE, TURN, TWIST
 
@@ -93,8 +93,8 @@ def start_joints(solver, h, period):
     joints.step, joints.fastest = h, SPRING_FREQUENCY / period
     omega = 2.0 * math.pi * FREQUENCY / period
     damping = 2.0 * JOINT_DAMPING_RATIO + h * omega
-    joints.stiffness = stiffness = h * omega * damping
-    rate, kept, back = omega / damping, stiffness / (1.0 + stiffness), 1.0 / (1.0 + stiffness)
+    joints.stiffness, joints.rate = stiffness, rate = h * omega * damping, omega / damping
+    kept, back = stiffness / (1.0 + stiffness), 1.0 / (1.0 + stiffness)
     count_springs(solver)
     for e in range(joints.begin, joints.end):
         j = joints.order[e]
@@ -191,12 +191,22 @@ def angle_of(solver, j):
 
 
 @inlined
-def room_to(solver, j, limit, beyond, value):
-    """How far a value is from a limit; of what is ``beyond`` it no more than is pushed out at once, as of overlap: from
-    far beyond a limit bodies would be thrown."""
+def reach_at(solver, q, arm):
+    """How far a body reaches; one without a collider reaches to where it is held."""
+    return max(solver.reach[q], length(arm))
+
+
+@inlined
+def most_pushed(solver, j, size):
+    """Of how much error of a row, by the size of its value, no more is pushed out at once, as of overlap: else bodies
+    are thrown where joints ask for what cannot be, or from beyond a limit. Springs and values of others push it all."""
     joints = solver.joints
-    size = solver.reach[joints.first[j]] + solver.reach[joints.second[j]] if joints.kind[j] < TURN else 1.0
-    return max(-beyond, -FULL_PUSH_OVERLAP * (size + max(abs(value), abs(limit))))
+    if is_soft_spring(joints, j) or joints.kind[j] == CUSTOM:
+        return math.inf
+    reach = 1.0
+    if joints.kind[j] < TURN:
+        reach = reach_at(solver, joints.first[j], joints.arm_a[j]) + reach_at(solver, joints.second[j], joints.arm_b[j])
+    return FULL_PUSH_OVERLAP * (reach + size)
 
 
 @part
@@ -210,12 +220,14 @@ def update_joint_targets(solver, j, value):
     elif rule == SERVO:
         pushing = low - value  # see servo_speed
     elif rule != LIMIT:
-        pushing = -joints.push_rate[j] * (value - low)
+        bound = most_pushed(solver, j, max(abs(value), abs(low)))
+        pushing = -joints.push_rate[j] * max(-bound, min(bound, value - low))
     else:
-        high = joints.high[j]
-        lower = value - low <= high - value
-        room = room_to(solver, j, low, low - value, value) if lower else room_to(solver, j, high, value - high, value)
-        speed = -room / h if room > 0.0 else -joints.push_rate[j] * room
+        below, above = value - low, joints.high[j] - value
+        lower = below <= above
+        room = below if lower else above
+        bound = most_pushed(solver, j, max(abs(value), abs(low if lower else joints.high[j])))
+        speed = -room / h if room > 0.0 else -joints.push_rate[j] * max(room, -bound)
         pushing = speed if lower else -speed
         if room > 0.0:
             target = pushing
@@ -261,6 +273,9 @@ def measure_joints(solver, moved_for):
             arms_a[j], arms_b[j], gap[j] = arm_a, arm_b, way
             compute_point_mass(solver, j, scale(way, 0.0))
             if is_holding(joints, j):
+                wide = length(way)
+                bound = most_pushed(solver, j, wide)
+                joints.push_rate[j] = joints.rate * (bound / wide if bound < wide else 1.0)
                 gives, mass_scale, impulse_scale = compliance_of(solver, j, usual), usual_mass, usual_impulse
                 if gives < usual:
                     mass_scale, impulse_scale = 1.0 / (1.0 + gives), gives / (1.0 + gives)
@@ -417,8 +432,6 @@ def solve_joints(solver, pushes):
     solve_joint_pass(solver, pushes)
     if solver.direct.begin < solver.direct.end:
         factorise(solver, pushes)
-        if pushes:
-            bound_push(solver, solver.joints.step)
         solve_direct(solver, pushes)
         if solver.direct.mixed:
             solve_all_limited(solver, pushes)
@@ -467,8 +480,8 @@ def is_torn(solver, j):
     """Whether a joint is wide open where the step ends, against the size of its smaller body."""
     joints, reach = solver.joints, math.inf
     for q, arm in ((joints.first[j], joints.arm_a[j]), (joints.second[j], joints.arm_b[j])):
-        if solver.inverse_mass[q] > 0.0:  # what has no collider reaches to where it is held
-            reach = min(reach, max(solver.reach[q], length(arm)))
+        if solver.inverse_mass[q] > 0.0:
+            reach = min(reach, reach_at(solver, q, arm))
     return is_rigid(joints, j) and length(joints.gap[j]) > TORN * reach > 0.0
 
 

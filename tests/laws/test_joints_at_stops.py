@@ -10,7 +10,7 @@ import pytest
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
 from carom.plugins import Physics
-from carom.plugins.joints import Distance, Hinge, Joints, Motor
+from carom.plugins.joints import Distance, Hinge, Joints, Motor, Weld
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 MODES = "discrete", "continuous", "event_driven"
@@ -113,24 +113,32 @@ def test_trees_of_hinges_with_limits_gain_nothing_and_hold(d):
                 assert world.kinetic_energy() < 1.02 * energy
             assert gap < 0.08 or ratio > 10.0
 
-@pytest.mark.parametrize("driven", [False, True])
+
+@pytest.mark.parametrize("what", ["rope", "driven rope", "weld"])
 @pytest.mark.parametrize("d", [2, 3])
-def test_what_is_far_beyond_a_limit_comes_back_at_a_bounded_speed(d, driven):
-    """A rope of 1 m between bodies 20 m apart: in a substep it pulls by 3 % of its length at most, as contacts push by
-    3 % of a size, where it pulled them past each other in one step; a motor in the island changes nothing of it."""
+def test_what_is_far_from_where_a_joint_asks_comes_back_at_a_bounded_speed(d, what):
+    """Bodies 20 m apart, on a rope of 1 m or torn from a weld: in a substep that pulls by 3 % of the way and its arms
+    at most, as contacts push by 3 % of a size, where it pulled them past each other in one step; a motor in the island
+    changes nothing of it."""
     for seed in range(3):
         world, _ = world_of(d, seed)
+        world.settings = world.settings.replace(on_fault="ignore")
         with world:
             a = world.create_entity(Transform(vector(d)), RigidBody(1), SphereCollider(0.2), Spin())
-            b = world.create_entity(Transform(vector(d, 20)), RigidBody(3), SphereCollider(0.2), Spin())
-            world.create_entity(Distance(a, b, least=0.0, most=1.0))
-            if driven:
-                world.create_entity(Motor(None, a, speed=1.0, **({} if d == 2 else {"axis": (1, 0, 0)})))
+            b = world.create_entity(Transform(vector(d, 1)), RigidBody(3), SphereCollider(0.2), Spin())
             transforms = [world.component_for_entity(entity, Transform) for entity in (a, b)]
+            if what == "weld":
+                world.create_entity(Weld(a, b, anchor=vector(d, 0.5)))
+                world.step()
+            transforms[1].position = vector(d, 20)
+            if what != "weld":
+                world.create_entity(Distance(a, b, least=0.0, most=1.0))
+            if what == "driven rope":
+                world.create_entity(Motor(None, a, speed=1.0, **({} if d == 2 else {"axis": (1, 0, 0)})))
             apart = 20.0
             for _ in range(600):
                 world.step()
                 before, apart = apart, float(np.linalg.norm(transforms[1].position - transforms[0].position))
-                assert before - apart < 4 * 0.03 * (before + 0.4)
+                assert before - apart < 4 * 0.03 * (before + 1.0)
                 assert world.kinetic_energy() < 1.0
             assert apart < 1.01
