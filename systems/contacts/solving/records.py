@@ -45,7 +45,6 @@ SOLVER = Schema(
     pushing=floats(unit="m/s"),  # and the same in the pass that pushes: below 0 where overlap is to open
     loaded=floats(unit="m"),  # of sag under the impulse of the last step
     had_impulse=flags(),  # it has pushed in this step
-    wrong=flags(),  # its speed is far from what it asks
     soft=floats(unit="1"),  # share of its impulse that it gives back in the pass that pushes
     fixed=flags(),  # it has several points, and one of its bodies cannot be moved
     hard=flags(),

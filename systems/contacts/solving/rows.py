@@ -188,12 +188,10 @@ def update_targets(solver, k, arms, asks):
     near = at_once if once else room
     push = deep if room < deep else near
     soft = (room <= NEGLIGIBLE * extent) & (not solver.parting[k])  # just closed, give or take rounding
-    wrong = excess_of(closing, opening, impulse) * dt > STRUCK_EXCESS * extent
     solver.target_speed[k], solver.pushing[k] = opening, bias_rate * push if soft else opening
     solver.soft[k] = 0.0 if stiff or hard or not soft else softness
     solver.had_impulse[k] |= impulse > 0.0
-    solver.wrong[k] = wrong  # not to be read again here: several rows are asked at once
-    return wrong
+    return excess_of(closing, opening, impulse) * dt > STRUCK_EXCESS * extent
 
 
 @inlined

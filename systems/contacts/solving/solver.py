@@ -28,6 +28,7 @@ from ..constants import (
     RELAX_PASSES,
     REPORTED_GAIN,
     STATIC_STIFFNESS,
+    STRUCK_EXCESS,
     TIPPING_FREQUENCY,
     TURNING_RELAX_PASSES,
 )  # fmt: skip
@@ -41,6 +42,7 @@ from .rows import (
     NO_ARMS,
     apply_impulse,
     compute_effective_mass,
+    excess_speed,
     integrate_rotation,
     rotate_body,
     turn_arms,
@@ -65,7 +67,7 @@ def measure(solver, h, springs, dt, stiff, ends, span, arms):
     for k in range(span[0], span[1]):
         any_struck |= update_targets(solver, k, arms, asks)
     for k in range(span[0], span[1] if any_struck else span[0]):
-        if solver.wrong[k]:
+        if excess_speed(solver, k, arms) * dt > STRUCK_EXCESS * solver.extent[k]:
             solver.struck[island_of(solver, k)] = True
     return any_struck
 
