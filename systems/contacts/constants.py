@@ -6,14 +6,11 @@ a few substeps: how much they sag follows from the substeps alone, never from th
 
 from __future__ import annotations
 
-import math
-
 # The spring of a soft contact.
 FREQUENCY = 0.25  # times the rate of the substeps; above .5 an explicit spring is unstable
 DAMPING_RATIO = 10.0  # at the usual number of substeps; overdamped, so that pushing out gives little speed
 TIPPING_FREQUENCY = 0.125  # where pairs have several points: with .25 ten boxes that turn in space lean by .2
 STATIC_STIFFNESS = 1.4  # times that where one of the two is static: with 1 a crate settles at 1.2 mm/s on its floor
-SAG = 1.0 / (2.0 * math.pi * FREQUENCY) ** 2  # of a contact that bears an impulse J per substep h: SAG J h / mass
 
 # How fast overlap is pushed out. A bounded push bounds the force, so the bound grows with the load.
 FULL_PUSH_OVERLAP = 0.03  # extents: more overlap does not push faster; .2 lets rooms of mixed masses gain energy

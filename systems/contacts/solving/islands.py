@@ -27,6 +27,7 @@ from ...parts.rows import owner_of, place_of
 from ...shapes.tolerances import smaller_extent
 from ..constants import (
     AT_ONCE_WORK,
+    FREQUENCY,
     ISLAND_WORK,
     LEAST_FURTHER_PASSES,
     LEAST_WORK_SUBSTEPS,
@@ -36,7 +37,6 @@ from ..constants import (
     MOST_SUBSTEPS,
     MOST_SWAY,
     OWN_SAG,
-    SAG,
     STRIKE_SUBSTEPS,
     STRUCK_EXCESS,
     STRUCK_JOINT_SUBSTEPS,
@@ -221,7 +221,8 @@ def choose_substeps(solver, t, usual, dt):
     MOST_SUBSTEPS are capped, see ``load_share``. From masses, not from impulses, which would change with the substeps;
     by factors of two, so that it seldom changes. Light bodies whose joints bear heavy ones swing fast.
     """
-    sag, least = SAG * solver.most_change[t] * dt, usual
+    turn, least = 2.0 * math.pi * FREQUENCY, usual
+    sag = solver.most_change[t] * dt / (turn * turn)
     while MOST_SWAY * float(least * least) < sag * solver.sway[t] and 2 * least <= LEAST_WORK_SUBSTEPS:
         least *= 2
     if solver.needs_substeps[t]:
