@@ -9,7 +9,8 @@ from __future__ import annotations
 # The spring of a soft contact.
 FREQUENCY = 0.25  # times the rate of the substeps; above .5 an explicit spring is unstable
 DAMPING_RATIO = 10.0  # at the usual number of substeps; overdamped, so that pushing out gives little speed
-TIPPING_FREQUENCY = 0.125  # where pairs have several points: with .25 ten boxes that turn in space lean by .2
+TURNING_FREQUENCY = 0.125  # where bodies turn, of pairs with several points: with .25 ten boxes lean by .2; and the
+# most of springs of joints: faster ones hold, as with more springs at a light body gain
 STATIC_STIFFNESS = 1.4  # times that where one of the two is static: with 1 a crate settles at 1.2 mm/s on its floor
 
 # How fast overlap is pushed out. A bounded push bounds the force, so the bound grows with the load.
@@ -39,7 +40,6 @@ MOST_RATIO = 16.0  # between the masses of joined bodies: above it joints are so
 FRAME_BEND = 4.0  # frames are, which bend by this times the square of their welds as much as one
 DIRECT_STIFFNESS = 1e3  # times as stiff those are, and times that in the passes that do not push,
 DIRECT_STIFFNESS_MAX = 1e11  # at most against their own masses: more is rounding
-SPRING_FREQUENCY = 0.125  # times the rate of the substeps: faster springs hold; with more, springs at a light body gain
 
 # The number of substeps of an island.
 MOST_SAG = 0.005  # extents: no contact sags more under the island's heaviest body,

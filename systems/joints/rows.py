@@ -21,7 +21,7 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.elementary import atan2, cos, exp
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
-from ..contacts.constants import FREQUENCY, FULL_PUSH_OVERLAP, JOINT_DAMPING_RATIO, SPRING_FREQUENCY
+from ..contacts.constants import FREQUENCY, FULL_PUSH_OVERLAP, JOINT_DAMPING_RATIO, TURNING_FREQUENCY
 from ..integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
 from .coupling import (
     compliance_of,
@@ -90,7 +90,7 @@ def start_joints(solver, h, period):
     """The joints of a range start with the forces that they had, in substeps of h. They are as stiff as in the usual
     ``period``, whatever contacts ask for: changes of it would give energy to what is stretched."""
     joints = solver.joints
-    joints.step, joints.fastest = h, SPRING_FREQUENCY / period
+    joints.step, joints.fastest = h, TURNING_FREQUENCY / period
     omega = 2.0 * math.pi * FREQUENCY / period
     damping = 2.0 * JOINT_DAMPING_RATIO + h * omega
     joints.stiffness, joints.rate = stiffness, rate = h * omega * damping, omega / damping

@@ -29,7 +29,7 @@ from ..constants import (
     REPORTED_GAIN,
     STATIC_STIFFNESS,
     STRUCK_EXCESS,
-    TIPPING_FREQUENCY,
+    TURNING_FREQUENCY,
     TURNING_RELAX_PASSES,
 )  # fmt: skip
 from .chunks import find_chunks, load_masses
@@ -200,7 +200,7 @@ def scale_impulses(solver, by, span):
 @inlined
 def spring_frequency(solver):
     """That of contacts, times the rate of the substeps."""
-    return TIPPING_FREQUENCY if solver.tips else FREQUENCY
+    return TURNING_FREQUENCY if solver.tips else FREQUENCY
 
 
 @part
