@@ -63,10 +63,10 @@ GAIN_ROUNDING = 1e-12  # of an energy: less is none
 REPORTED_GAIN = 0.05  # extents per step: a fault tells where contacts would have made an island faster by more
 
 # Hard contacts of bodies that nothing presses on.
-LEAST_LOAD = 1e-6  # of the impulse that forces give in a step: less is none
 ALIGNED = 0.5  # cosine: a hard contact lies along the sum of the normals of its body, and a normal is that of the step
 # before: else its impulses say nothing
-NEGLIGIBLE = 1e-9  # of an extent: a smaller gap, overlap or way in a step is none; of an impulse
+NEGLIGIBLE = 1e-9  # of an extent: a smaller gap, overlap or way in a step is none; of an impulse,
+# or of the one that forces give in a step
 UNREACHED = 1e6  # extents: a row that is left to the next step
 
 # What is remembered of a step.

@@ -11,7 +11,7 @@ from ....framework.vectors import add, dot, sub
 from ...ccd.search_bounds import turns_far
 from ...integration.turning import is_turned
 from ..approach import centre_offset, centre_offset_at_start
-from ..constants import ALIGNED, LEAST_LOAD, NEGLIGIBLE, UNREACHED
+from ..constants import ALIGNED, NEGLIGIBLE, UNREACHED
 from .rows import closing_speed, separation, separation_from_rotation
 
 
@@ -28,7 +28,7 @@ def is_loaded(solver, k, dt):
     a, b, acceleration = solver.first[k], solver.second[k], solver.acceleration
     if solver.gap[k] < -NEGLIGIBLE * solver.extent[k]:
         return True
-    least = LEAST_LOAD * solver.mass[k] * dt
+    least = NEGLIGIBLE * solver.mass[k] * dt
     load = max(dot(acceleration[a], acceleration[a]), dot(acceleration[b], acceleration[b]))
     return solver.impulse[k] > 0.0 and solver.impulse[k] * solver.impulse[k] > least * least * load
 
