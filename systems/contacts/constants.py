@@ -25,7 +25,8 @@ TURNING_RELAX_PASSES = 1  # of each where bodies spin: the friction of a row fol
 FRICTION_OVERRELAXATION = 1.5  # of the impulse that stops a row from sliding, in all passes of a substep but the last:
 # a stored impulse is a spring without a damper, so columns sway, and only passes take energy; below 2 they do
 REFINED_PASSES = 8  # of each substep of an island with more: columns under heavy bodies sway with 2, pyramids with 12
-MOST_PASSES = 1000  # over rows that are not solved and islands that have gained energy, or until hard islands agree;
+MOST_REPEATS = 1024  # substeps of an island, beyond which the heaviest count as lighter, and a fault says so; and
+# passes over rows that are not solved and islands that have gained energy, or until hard islands agree;
 ISLAND_WORK = 20_000  # rows at most in all of these, and in all substeps of an island, if they are more than usual
 LEAST_FURTHER_PASSES = 8  # which are allowed whatever its size
 AT_ONCE_WORK = 8  # rows: so much is a joint that is solved at once
@@ -48,7 +49,6 @@ LIMIT_STRIKE = 0.25  # extents per step, or rad of a limit: a faster blow on joi
 STRUCK_JOINT_SUBSTEPS = 32  # needs so many substeps, or it tears them
 OWN_SAG = 0.002  # nor a contact under one body alone: grains, whose contacts are hard
 STRIKE_SUBSTEPS = 4.0  # substeps for each extent per step that a light body is closed on, times the ratio of masses
-MOST_SUBSTEPS = 1024  # then the heaviest count as lighter, and a fault says so
 LEAST_WORK_SUBSTEPS = 64  # are allowed whatever the size of an island, see ISLAND_WORK
 
 # Hard islands: passes until they agree.

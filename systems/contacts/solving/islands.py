@@ -32,9 +32,8 @@ from ..constants import (
     LEAST_FURTHER_PASSES,
     LEAST_WORK_SUBSTEPS,
     LIMIT_STRIKE,
-    MOST_PASSES,
+    MOST_REPEATS,
     MOST_SAG,
-    MOST_SUBSTEPS,
     MOST_SWAY,
     OWN_SAG,
     STRIKE_SUBSTEPS,
@@ -218,7 +217,7 @@ def choose_substeps(solver, t, usual, dt):
 
     Its contacts may have to bear its heaviest body: the sag under that falls with the square of the substeps, the depth
     of an impact with 1 / substeps. Where the own weight of bodies asks for too many, contacts are rigid. Loads beyond
-    MOST_SUBSTEPS are capped, see ``load_share``. From masses, not from impulses, which would change with the substeps;
+    MOST_REPEATS are capped, see ``load_share``. From masses, not from impulses, which would change with the substeps;
     by factors of two, so that it seldom changes. Light bodies whose joints bear heavy ones swing fast.
     """
     turn, least = 2.0 * math.pi * FREQUENCY, usual
@@ -239,12 +238,12 @@ def choose_substeps(solver, t, usual, dt):
     strike = solver.approach_extents[t] - 2.0 * solver.most_change[t] * solver.own[t] * dt
     ratio = solver.stiff[t] / (solver.lightest[t] * solver.own[t])
     struck = STRIKE_SUBSTEPS * strike * ratio if strike > STRUCK_EXCESS else 0.0
-    most = max(LEAST_WORK_SUBSTEPS, min(MOST_SUBSTEPS, ISLAND_WORK // rows))
+    most = max(LEAST_WORK_SUBSTEPS, min(MOST_REPEATS, ISLAND_WORK // rows))
     asked, substeps = max(need, struck * struck), least
     while float(substeps * substeps) < asked and 2 * substeps <= most:
         substeps *= 2
     solver.substeps_of[t], solver.hard_of[t] = substeps, hard
-    solver.passes[t] = max(LEAST_FURTHER_PASSES, min(MOST_PASSES, ISLAND_WORK // rows))
+    solver.passes[t] = max(LEAST_FURTHER_PASSES, min(MOST_REPEATS, ISLAND_WORK // rows))
     solver.load_share[t] = float(substeps * substeps) / need if need > 0.0 else math.inf
     return substeps > usual or hard or solver.at_once[t]
 

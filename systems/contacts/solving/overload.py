@@ -18,7 +18,7 @@ from .rows import compute_effective_mass, rotate_body
 
 @part
 def cap_mass_ratio(solver, t, dt, span, arms):
-    """Cap the masses of island t at what it can carry with MOST_SUBSTEPS."""
+    """Cap the masses of island t at what it can carry with MOST_REPEATS."""
     least = solver.lightest[t] / solver.load_share[t]
     solver.mass_of[t] = solver.force_of[t] = 0.0
     for q in range(span[2], span[3]):

@@ -6,7 +6,7 @@ import math
 
 from ....framework.compilation import part
 from ....framework.vectors import length
-from ..constants import CONVERGED_SHARE, CONVERGED_SPEED, FRICTION_OVERRELAXATION, ISLAND_WORK, MOST_PASSES
+from ..constants import CONVERGED_SHARE, CONVERGED_SPEED, FRICTION_OVERRELAXATION, ISLAND_WORK, MOST_REPEATS
 from .chunks import solve_chunks
 from .rows import closing_speed, look_ahead, relax_listed, solve_friction, solve_normals, solve_rolling
 
@@ -58,7 +58,7 @@ def solve_passes(solver, pushes, passes, stiff, h, span, arms):
         look_ahead(solver, 0.5 * h, span)
     bias, most, least = solver.pushing if pushes else solver.target_speed, passes, 0.0
     if stiff:
-        most, least = max(passes, min(MOST_PASSES, ISLAND_WORK // (span[1] - span[0]))), least_change(solver, h, span)
+        most, least = max(passes, min(MOST_REPEATS, ISLAND_WORK // (span[1] - span[0]))), least_change(solver, h, span)
     for left in range(passes - 1, passes - 1 - most, -1):
         if stiff:
             note_impulses(solver, span)
