@@ -177,7 +177,7 @@ def find_unsolved_rows(solver, turn, any_struck, dt, span, arms, islands):
         if excess * finest > least or any_gain:  # seldom
             t = island_of(solver, k)
             wrong = struck[t] and excess * excess_scale(solver, t) > least
-            if (wrong or gains_by_contacts(solver, t)) and turn < solver.passes[t]:
+            if (wrong or gains_by_contacts(solver, t)) and turn <= solver.passes[t]:
                 solver.listed[count] = k
                 solver.listed_of[t] += 1
                 count += 1

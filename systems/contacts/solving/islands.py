@@ -29,7 +29,6 @@ from ..constants import (
     AT_ONCE_WORK,
     FREQUENCY,
     ISLAND_WORK,
-    LEAST_FURTHER_PASSES,
     LEAST_WORK_SUBSTEPS,
     LIMIT_STRIKE,
     MOST_REPEATS,
@@ -243,7 +242,7 @@ def choose_substeps(solver, t, usual, dt):
     while float(substeps * substeps) < asked and 2 * substeps <= most:
         substeps *= 2
     solver.substeps_of[t], solver.hard_of[t] = substeps, hard
-    solver.passes[t] = max(LEAST_FURTHER_PASSES, min(MOST_REPEATS, ISLAND_WORK // rows))
+    solver.passes[t] = min(MOST_REPEATS, ISLAND_WORK // rows)
     solver.load_share[t] = float(substeps * substeps) / need if need > 0.0 else math.inf
     return substeps > usual or hard or solver.at_once[t]
 
