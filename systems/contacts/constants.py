@@ -28,7 +28,6 @@ REFINED_PASSES = 8  # of each substep of an island with more: columns under heav
 MOST_REPEATS = 1024  # substeps of an island, beyond which the heaviest count as lighter, and a fault says so; and
 # passes over rows that are not solved and islands that have gained energy, or until hard islands agree;
 ISLAND_WORK = 20_000  # rows at most in all of these, and in all substeps of an island, if they are more than usual
-AT_ONCE_WORK = 8  # rows: so much is a joint that is solved at once
 SWEEPS_PER_LOOK = 4  # between two looks at which rows these are: so many whatever its size
 STRUCK_EXCESS = 0.01  # extents per step: an island with a row whose speed is wrong by more is solved further, and what
 # closes slower strikes nothing

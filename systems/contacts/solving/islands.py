@@ -26,7 +26,6 @@ from ...narrow_phase.manifolds import centre_offset_at_start
 from ...parts.rows import owner_of, place_of
 from ...shapes.tolerances import smaller_extent
 from ..constants import (
-    AT_ONCE_WORK,
     FREQUENCY,
     ISLAND_WORK,
     LEAST_WORK_SUBSTEPS,
@@ -228,7 +227,7 @@ def choose_substeps(solver, t, usual, dt):
     if solver.size_of[t] == 0:  # it has joints alone
         solver.substeps_of[t], solver.hard_of[t], solver.passes[t], solver.load_share[t] = least, False, 0, math.inf
         return least > usual or solver.at_once[t]
-    rows = solver.size_of[t] + solver.links[t] * (AT_ONCE_WORK if solver.at_once[t] else 1)
+    rows = solver.size_of[t] + solver.links[t]
     own = sag * solver.own[t] / OWN_SAG
     need = sag * solver.stiff[t] / (solver.lightest[t] * MOST_SAG)
     hard = own > float(usual * usual)
