@@ -24,6 +24,7 @@ from ..constants import (
     STRUCK_EXCESS,
     SWEEPS_PER_LOOK,
 )  # fmt: skip
+from .passes import most_repeats
 from .rows import excess_speed, relax_listed, velocity_at
 
 NO_NUMBERS = 0.0, 0.0
@@ -156,9 +157,15 @@ def gains_by_contacts(solver, t):
 
 
 @inlined
+def further_passes(solver, t):
+    """How many further passes island t may have in a substep."""
+    return most_repeats(solver.size_of[t] + solver.links[t])
+
+
+@inlined
 def excess_scale(solver, t):
     """How many times better than STRUCK_EXCESS the rows of a struck island are solved."""
-    return max(1.0, solver.passes[t] / FINER_PASSES)
+    return max(1.0, further_passes(solver, t) / FINER_PASSES)
 
 
 @part
@@ -177,7 +184,7 @@ def find_unsolved_rows(solver, turn, any_struck, dt, span, arms, islands):
         if excess * finest > least or any_gain:  # seldom
             t = island_of(solver, k)
             wrong = struck[t] and excess * excess_scale(solver, t) > least
-            if (wrong or gains_by_contacts(solver, t)) and turn <= solver.passes[t]:
+            if (wrong or gains_by_contacts(solver, t)) and turn <= further_passes(solver, t):
                 solver.listed[count] = k
                 solver.listed_of[t] += 1
                 count += 1

@@ -27,10 +27,8 @@ from ...parts.rows import owner_of, place_of
 from ...shapes.tolerances import smaller_extent
 from ..constants import (
     FREQUENCY,
-    ISLAND_WORK,
     LEAST_WORK_SUBSTEPS,
     LIMIT_STRIKE,
-    MOST_REPEATS,
     MOST_SAG,
     MOST_SWAY,
     OWN_SAG,
@@ -39,6 +37,7 @@ from ..constants import (
     STRUCK_JOINT_SUBSTEPS,
 )  # fmt: skip
 from ..points import points_of
+from .passes import most_repeats
 from .records import ROW_CHUNK
 
 COLOURS = 62  # bits of a mask; pairs of a body beyond them share the last one
@@ -225,9 +224,8 @@ def choose_substeps(solver, t, usual, dt):
     if solver.needs_substeps[t]:
         least = max(least, STRUCK_JOINT_SUBSTEPS)
     if solver.size_of[t] == 0:  # it has joints alone
-        solver.substeps_of[t], solver.hard_of[t], solver.passes[t], solver.load_share[t] = least, False, 0, math.inf
+        solver.substeps_of[t], solver.hard_of[t], solver.load_share[t] = least, False, math.inf
         return least > usual or solver.at_once[t]
-    rows = solver.size_of[t] + solver.links[t]
     own = sag * solver.own[t] / OWN_SAG
     need = sag * solver.stiff[t] / (solver.lightest[t] * MOST_SAG)
     hard = own > float(usual * usual)
@@ -236,12 +234,11 @@ def choose_substeps(solver, t, usual, dt):
     strike = solver.approach_extents[t] - 2.0 * solver.most_change[t] * solver.own[t] * dt
     ratio = solver.stiff[t] / (solver.lightest[t] * solver.own[t])
     struck = STRIKE_SUBSTEPS * strike * ratio if strike > STRUCK_EXCESS else 0.0
-    most = max(LEAST_WORK_SUBSTEPS, min(MOST_REPEATS, ISLAND_WORK // rows))
+    most = max(LEAST_WORK_SUBSTEPS, most_repeats(solver.size_of[t] + solver.links[t]))
     asked, substeps = max(need, struck * struck), least
     while float(substeps * substeps) < asked and 2 * substeps <= most:
         substeps *= 2
     solver.substeps_of[t], solver.hard_of[t] = substeps, hard
-    solver.passes[t] = min(MOST_REPEATS, ISLAND_WORK // rows)
     solver.load_share[t] = float(substeps * substeps) / need if need > 0.0 else math.inf
     return substeps > usual or hard or solver.at_once[t]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ....framework.compilation import part
+from ....framework.compilation import inlined, part
 from ....framework.vectors import length
 from ..constants import CONVERGED_SHARE, CONVERGED_SPEED, FRICTION_OVERRELAXATION, ISLAND_WORK, MOST_REPEATS
 from .chunks import solve_chunks
@@ -23,6 +23,12 @@ def solve_pass(solver, bias, pushes, over, span, arms):
         if len(arms) == 0 and solver.has_friction:
             solve_friction(solver, over, span, arms)
     solver.visits += span[1] - span[0]
+
+
+@inlined
+def most_repeats(rows):
+    """How many substeps, or passes in one, so many rows may have."""
+    return min(MOST_REPEATS, ISLAND_WORK // rows)
 
 
 @part
@@ -58,7 +64,7 @@ def solve_passes(solver, pushes, passes, stiff, h, span, arms):
         look_ahead(solver, 0.5 * h, span)
     bias, most, least = solver.pushing if pushes else solver.target_speed, passes, 0.0
     if stiff:
-        most, least = max(passes, min(MOST_REPEATS, ISLAND_WORK // (span[1] - span[0]))), least_change(solver, h, span)
+        most, least = max(passes, most_repeats(span[1] - span[0])), least_change(solver, h, span)
     for left in range(passes - 1, passes - 1 - most, -1):
         if stiff:
             note_impulses(solver, span)

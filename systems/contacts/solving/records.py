@@ -121,7 +121,6 @@ SOLVER = Schema(
     approach_extents=floats(unit="1"),  # extents per step that some row closes
     substeps_of=ints("int32"),
     hard_of=flags(),
-    passes=ints("int32"),  # further ones in a substep, at most
     load_share=floats(unit="1"),  # share of its heaviest body that it can bear
     range_of=ints("int32"),
     slope=floats(unit="J"),  # see guard.measure_energy
