@@ -29,8 +29,8 @@ MOST_REPEATS = 1024  # substeps of an island, beyond which the heaviest count as
 # passes over rows that are not solved and islands that have gained energy, or until hard islands agree;
 ISLAND_WORK = 20_000  # rows at most in all of these, and in all substeps of an island, if they are more than usual
 SWEEPS_PER_LOOK = 4  # between two looks at which rows these are: so many whatever its size
-STRUCK_EXCESS = 0.01  # extents per step: an island with a row whose speed is wrong by more is solved further, and what
-# closes slower strikes nothing
+STRUCK_EXCESS = 0.01  # extents per step: an island with a row whose speed is wrong by more is solved further, what
+# closes slower strikes nothing, and a fault tells where contacts would have made an island faster by more
 FINER_PASSES = 32  # an island that may have more passes than these is solved as much better
 
 # Joints that hold: springs that the passes which push solve, as soft as contacts, and the others as if they were none.
@@ -58,7 +58,6 @@ GAIN_MOTION = 0.008  # of its kinetic energy against its mean velocity,
 GAIN_PUSH = 0.004  # of the energy at the speed of pushing,
 GAIN_WEIGHT = 2.5  # of the energy that forces give from rest: towers that are pushed out need it
 GAIN_ROUNDING = 1e-12  # of an energy: less is none
-REPORTED_GAIN = 0.05  # extents per step: a fault tells where contacts would have made an island faster by more
 
 # Hard contacts of bodies that nothing presses on.
 ALIGNED = 0.5  # cosine: a hard contact lies along the sum of the normals of its body, and a normal is that of the step

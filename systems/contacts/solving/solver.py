@@ -26,7 +26,6 @@ from ..constants import (
     NEGLIGIBLE,
     REFINED_PASSES,
     RELAX_PASSES,
-    REPORTED_GAIN,
     STATIC_STIFFNESS,
     STRUCK_EXCESS,
     TURNING_FREQUENCY,
@@ -260,7 +259,7 @@ def count_work(state, dt):
             state.restrained_counted += 1
             state.restrained_energy += taken
             step = math.sqrt(2.0 * taken / solver.mass_of[t]) * dt * solver.own[t]
-            if taken > 0.5 * solver.energy[t] and step > REPORTED_GAIN:
+            if taken > 0.5 * solver.energy[t] and step > STRUCK_EXCESS:
                 for q in range(solver.bodies - 1 if solver.restrained == 0 else -1, -1, -1):
                     if solver.island[q] == t:  # the first body of the first such island
                         solver.restrained_row = solver.body_row[q]
