@@ -16,7 +16,7 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, item, replace, scale, sub
-from ..contacts.constants import DIRECT_STIFFNESS, DIRECT_STIFFNESS_MAX
+from ..contacts.constants import DIRECT_STIFFNESS, DIRECT_STIFFNESS_MAX, FRAME_BEND
 from ..integration.turning import change_of_spin, cross_spin, twist
 from .custom import speed_of_custom
 from .order import NO_BLOCK, block_of, freedoms
@@ -87,11 +87,19 @@ def directions_at(joints, j, k):
 
 
 @inlined
+def carried_mass(solver, j):
+    """What a row may have to bear, times how much stiffer it is; of angles times how far they bend."""
+    direct, g = solver.direct, solver.joints.group[j]
+    bend = max(1.0, FRAME_BEND * direct.welds[g] ** 2) if solver.joints.kind[j] >= TURN else 1.0
+    return DIRECT_STIFFNESS / direct.heavy[g] * bend
+
+
+@inlined
 def inverse_mass_of(solver, j):
     """How stiff a row is: as if it bore the heaviest body of its group; of angles, at the end of a beam of welds."""
     joints, a, b = solver.joints, solver.joints.first[j], solver.joints.second[j]
     w = max(solver.inverse_mass[a], solver.inverse_mass[b])
-    share = min(solver.direct.stiffer * joints.stiffness * joints.carried_mass[j] * w, DIRECT_STIFFNESS_MAX)
+    share = min(solver.direct.stiffer * joints.stiffness * carried_mass(solver, j) * w, DIRECT_STIFFNESS_MAX)
     if joints.kind[j] < TURN:
         return share / w
     if joints.kind[j] == CUSTOM:

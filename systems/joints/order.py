@@ -7,7 +7,7 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import length
-from ..contacts.constants import DIRECT_STIFFNESS, FRAME_BEND, MOST_RATIO
+from ..contacts.constants import MOST_RATIO
 from ..islands import root_of
 from ..parts.rows import place_of
 from .records import (
@@ -77,14 +77,13 @@ def choose_direct(state):
         a = joints.row_a[j]
         q = place_of(state, a if a >= 0 and state.bodies.inverse_mass[a] > 0.0 else joints.row_b[j])
         g, t = root_of(solver.group, q), island[q]
-        light, heavy, bend = direct.light[g], direct.heavy[g], max(1.0, FRAME_BEND * direct.welds[g] ** 2)
+        light, heavy = direct.light[g], direct.heavy[g]
         chosen = light > MOST_RATIO * heavy or direct.welds[g] > 1 or direct.freedom[g] < 0
         joints.at_once[j], joints.group[j] = BY_PASSES, g
         if chosen and is_rigid(joints, j):
             joints.at_once[j] = HELD_AT_ONCE
         elif chosen and joints.rule[j] in (LIMIT, DRIVE, SERVO) and joints.kind[j] != POINT:
             joints.at_once[j] = LIMITED_AT_ONCE
-        joints.carried_mass[j] = DIRECT_STIFFNESS / heavy * (bend if joints.kind[j] >= TURN else 1.0)
         solver.at_once[t] |= joints.at_once[j] == HELD_AT_ONCE
         solver.sway[t] = max(solver.sway[t], direct.swing[g] / heavy)
 
@@ -195,7 +194,7 @@ def order_direct(solver):
     direct.bodies = direct.blocks = 0
     for s in range(solver.ranges):
         end, rows_end, first, blocks = solver.body_ends[s], solver.joint_ends[s], direct.bodies, direct.blocks
-        while s > 0 and solver.at_once[solver.special[s]]:
+        while s > 0 and solver.at_once[solver.island[begin]]:
             full = order_island(solver, begin, end, rows_begin, rows_end)
             if full == NO_BODY:
                 break

@@ -60,8 +60,7 @@ JOINTS = Schema(
     order=ints("int32"),
     stream=ints("int32"),  # of each place: what holds points of an island, or all else of it
     at_once=ints("int8"),  # BY_PASSES, or with all such of its island: HELD_AT_ONCE, LIMITED_AT_ONCE; see direct
-    group=ints("int32"),  # of its bodies, as that was numbered first,
-    carried_mass=floats(unit="kg"),  # and what it may have to bear, of angles times how far they bend
+    group=ints("int32"),  # of its bodies, as that was numbered first
     open_row=ints("int32"),  # of these, those that further passes go over: so many
     opened=integer(),
     first=ints("int32"),  # places of the two bodies

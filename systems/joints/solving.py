@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from ...framework.compilation import packed, part
 from ...framework.vectors import add, dot, scale
 from ..contacts.solving.turning import integrate_rotation_of_joined
@@ -50,15 +48,12 @@ def work_of_joint(solver, j):
 
 @part
 def add_joint_work(solver):
-    """What moves by itself gives its work to open islands; what is driven may gain anything."""
+    """What moves by itself gives its work to open islands."""
     joints = solver.joints
-    for e in range(joints.opened):
+    for e in range(joints.opened if solver.movers > 0 else 0):
         j = joints.open_row[e]
         t = island_of_joint(solver, j)
-        if solver.driven[t]:
-            solver.slope[t] = -math.inf
-        elif solver.movers > 0:
-            solver.slope[t] += work_of_joint(solver, j)
+        solver.slope[t] += work_of_joint(solver, j)
 
 
 @part

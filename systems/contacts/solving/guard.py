@@ -244,7 +244,7 @@ def carry_budget(solver, islands):
     """What joints have taken in a substep they may give back later in the step."""
     for t in range(islands[0], islands[1]):
         s = solver.share[t]
-        if solver.links[t] > 0 and not solver.driven[t]:
+        if solver.links[t] > 0:
             solver.credit[t] = max(0.0, solver.credit[t] - s * (solver.slope[t] + 0.5 * s * solver.curvature[t]))
         else:
             solver.credit[t] = 0.0

@@ -130,11 +130,13 @@ def measure_joint(state, j, dt):
     a, b = joints.row_a[j], joints.row_b[j]
     t = island_of_rows(state, a, b)
     solver.links[t] += 1
-    solver.driven[t] |= joints.rule[j] > LIMIT
+    if joints.rule[j] > LIMIT:  # motors and springs give energy
+        solver.credit[t] = math.inf
     if joints.kind[j] >= TURN and joints.rule[j] == LIMIT:
         nothing = zero_of(state)
         turned = sub(spin[b] if b >= 0 else nothing, spin[a] if a >= 0 else nothing)
-        solver.needs_substeps[t] |= length(turned) * dt > LIMIT_STRIKE
+        if length(turned) * dt > LIMIT_STRIKE:
+            solver.substeps_of[t] = STRUCK_JOINT_SUBSTEPS
 
 
 @part
@@ -143,7 +145,7 @@ def number_islands(state, dt, ordered):
     moved. It is that already if rows are ``ordered``. What is known of its bodies is summed up."""
     solver, bodies, island, count = state.solver, state.bodies, state.solver.island, 0
     velocity, start, warm_started = bodies.linear_velocity, bodies.start_velocity, bodies.warm_started
-    number = solver.number
+    number = solver.open_body
     for q in range(solver.bodies):
         i = solver.body_row[q]
         w = bodies.inverse_mass[i]
@@ -156,7 +158,8 @@ def number_islands(state, dt, ordered):
             count += 1
             solver.lightest[t], solver.most_change[t], solver.mass_of[t], solver.force_of[t] = math.inf, 0.0, 0.0, 0.0
             solver.stiff[t] = solver.own[t] = solver.approach_extents[t] = solver.taken[t] = 0.0
-            solver.size_of[t], solver.driven[t], solver.needs_substeps[t], solver.credit[t] = 0, False, False, 0.0
+            solver.size_of[t] = solver.substeps_of[t] = 0
+            solver.credit[t] = 0.0
             solver.at_once[t], solver.sway[t], solver.links[t] = False, 0.0, 0
         number[q] = t
         change = sub(velocity[i], start[i])
@@ -203,32 +206,49 @@ def measure_islands(state, dt):
         if solver.links[t] > 0:
             arms = arms_to(bodies, a, b, pairs.normal[c], pairs.point[c], centre_offset_at_start(bodies, a, b))
             speed = length(add(sub(v_b, v_a), velocity_by_spin(bodies, a, b, arms)))
-            solver.needs_substeps[t] |= speed * dt * inverse_extent > LIMIT_STRIKE
+            if speed * dt * inverse_extent > LIMIT_STRIKE:
+                solver.substeps_of[t] = STRUCK_JOINT_SUBSTEPS
         if strike > solver.approach_extents[t]:
             solver.approach_extents[t] = strike
 
 
+@inlined
+def usual_sag(solver, t, dt):
+    """How far a row of island t sags, m, where one substep bears the weight of its lighter body."""
+    turn = 2.0 * math.pi * FREQUENCY
+    return solver.most_change[t] * dt / (turn * turn)
+
+
+@inlined
+def own_need(solver, t, dt):
+    """The square of the substeps that the own weight of bodies of island t asks for."""
+    return usual_sag(solver, t, dt) * solver.own[t] / OWN_SAG
+
+
+@inlined
+def is_hard_island(solver, t, usual, dt):
+    """Whether that is too many: its contacts are rigid."""
+    return own_need(solver, t, dt) > float(usual * usual)
+
+
 @part
 def choose_substeps(solver, t, usual, dt):
-    """How many substeps island t has, and whether its contacts are hard; returns whether it is special.
+    """How many substeps island t has; returns whether it is special.
 
     Its contacts may have to bear its heaviest body: the sag under that falls with the square of the substeps, the depth
     of an impact with 1 / substeps. Where the own weight of bodies asks for too many, contacts are rigid. Loads beyond
     MOST_REPEATS are capped, see ``load_share``. From masses, not from impulses, which would change with the substeps;
     by factors of two, so that it seldom changes. Light bodies whose joints bear heavy ones swing fast.
     """
-    turn, least = 2.0 * math.pi * FREQUENCY, usual
-    sag = solver.most_change[t] * dt / (turn * turn)
+    least, sag = usual, usual_sag(solver, t, dt)
     while MOST_SWAY * float(least * least) < sag * solver.sway[t] and 2 * least <= LEAST_WORK_SUBSTEPS:
         least *= 2
-    if solver.needs_substeps[t]:
-        least = max(least, STRUCK_JOINT_SUBSTEPS)
+    least = max(least, solver.substeps_of[t])
     if solver.size_of[t] == 0:  # it has joints alone
-        solver.substeps_of[t], solver.hard_of[t], solver.load_share[t] = least, False, math.inf
+        solver.substeps_of[t], solver.load_share[t] = least, math.inf
         return least > usual or solver.at_once[t]
-    own = sag * solver.own[t] / OWN_SAG
+    own, hard = own_need(solver, t, dt), is_hard_island(solver, t, usual, dt)
     need = sag * solver.stiff[t] / (solver.lightest[t] * MOST_SAG)
-    hard = own > float(usual * usual)
     if hard:
         need *= OWN_SAG / max(OWN_SAG, own)
     strike = solver.approach_extents[t] - 2.0 * solver.most_change[t] * solver.own[t] * dt
@@ -238,7 +258,7 @@ def choose_substeps(solver, t, usual, dt):
     asked, substeps = max(need, struck * struck), least
     while float(substeps * substeps) < asked and 2 * substeps <= most:
         substeps *= 2
-    solver.substeps_of[t], solver.hard_of[t] = substeps, hard
+    solver.substeps_of[t] = substeps
     solver.load_share[t] = float(substeps * substeps) / need if need > 0.0 else math.inf
     return substeps > usual or hard or solver.at_once[t]
 
@@ -247,7 +267,7 @@ def choose_substeps(solver, t, usual, dt):
 def place_rows(state):
     """``slot`` of each row by (range, colour), and the bodies by range: the ordinary islands are range 0."""
     solver, bodies, pairs, starts = state.solver, state.bodies, state.pairs, state.solver.starts
-    row, island, number, range_of = solver.body_row, solver.island, solver.number, solver.range_of
+    row, island, number, range_of = solver.body_row, solver.island, solver.open_body, solver.range_of
     ends, body_ends = solver.row_ends, solver.body_ends
     slot, colour, contacts, listed = solver.slot, solver.colour, solver.contacts, solver.listed
     for k in range(2 * COLOURS + 1):
@@ -334,10 +354,11 @@ def order_joints(state):
     The rows of a joint stand together, and its neighbours in a chain apart: they would wait for each other.
     """
     solver, joints, ground = state.solver, state.solver.joints, state.solver.bodies
-    island, begins, begin = solver.island, solver.number, 0
+    island, begins, begin = solver.island, solver.open_body, 0
     island[ground] = -1
     for s in range(solver.ranges):
-        for t in range(0 if s == 0 else solver.special[s], solver.islands if s == 0 else solver.special[s] + 1):
+        one = 0 if s == 0 else island[solver.body_ends[s - 1]]
+        for t in range(one, solver.islands if s == 0 else one + 1):
             if solver.range_of[t] == s:
                 begins[t], begin = begin, begin + solver.links[t]
         solver.joint_ends[s] = begin
@@ -382,7 +403,7 @@ def order_rows(state, dt, listed):
         solver.range_of[t] = 0
         if choose_substeps(solver, t, state.substeps, dt):
             s = solver.ranges
-            solver.range_of[t], solver.special[s], solver.joint_ends[s], solver.ranges = s, t, 0, s + 1
+            solver.range_of[t], solver.joint_ends[s], solver.ranges = s, 0, s + 1
     if not (ordered and solver.ranges == 1):
         place_rows(state)
         solver.chunks = 0

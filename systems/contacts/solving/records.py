@@ -82,7 +82,6 @@ SOLVER = Schema(
     bodies=integer(),
     body_row=ints("int32"),
     used=ints(),  # colours of its rows; later a row, or after how many further passes it was changed
-    number=ints("int32"),
     island=ints("int32"),  # -1: cannot be moved
     group=ints("int32"),  # of what joints join
     velocity=vectors(unit="m/s"),
@@ -103,7 +102,7 @@ SOLVER = Schema(
     frame=table("float64", 4, unit="1"),  # principal axes, a quaternion, with joints in space: see turning
     inverse_moments=vectors(unit="1/(kg m^2)"),  # about these
     reach=floats(unit="m"),  # of its shape from its centre of mass
-    open_body=ints("int32"),  # those of islands that further passes go over: so many
+    open_body=ints("int32"),  # those of islands that further passes go over: so many; before that a number of each
     opened=integer(),
     mover=ints("int32"),  # bodies that move by themselves
     movers=integer(),
@@ -119,8 +118,7 @@ SOLVER = Schema(
     stiff=floats(unit="1/(kg m)"),  # largest inverse mass of a row over its extent
     own=floats(unit="1/m"),  # the same times the mass of the lighter body
     approach_extents=floats(unit="1"),  # extents per step that some row closes
-    substeps_of=ints("int32"),
-    hard_of=flags(),
+    substeps_of=ints("int32"),  # before they are chosen: as many as a blow on its joints needs
     load_share=floats(unit="1"),  # share of its heaviest body that it can bear
     range_of=ints("int32"),
     slope=floats(unit="J"),  # see guard.measure_energy
@@ -132,16 +130,13 @@ SOLVER = Schema(
     taken=floats(unit="J"),  # that the guard has taken in this step
     struck=flags(),  # some row is far from solved
     listed_of=ints("int32"),  # rows of it that further passes go over
-    driven=flags(),  # by motors or springs, which give energy
-    needs_substeps=flags(),  # so fast struck that its joints need more substeps
-    credit=floats(unit="J"),  # that joints have taken in this step, and may give back
+    credit=floats(unit="J"),  # that joints have taken in this step, and may give back; inf: motors or springs give any
     at_once=flags(),  # some of its joints are solved at once
     sway=floats(unit="1/m"),  # how fast light bodies of joints swing that bear heavy ones, see direct
     links=ints("int32"),  # rows of joints
-    # ranges: the ordinary islands, then each special one
+    # ranges: the ordinary islands, then each special one, whose bodies are all of it
     ranges=integer(),
     usual=integer(),  # substeps,
-    special=ints("int32"),  # island of a range
     row_ends=ints("int32"),
     body_ends=ints("int32"),
     joint_ends=ints("int32"),

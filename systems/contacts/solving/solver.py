@@ -34,6 +34,7 @@ from ..constants import (
 from .chunks import find_chunks, load_masses
 from .guard import finish_substep, island_of, islands_of, open_all
 from .hard import defer_open_contacts, select_rigid
+from .islands import is_hard_island
 from .overload import cap_mass_ratio, restore_mass
 from .passes import close_nearest_first, note_impulses, solve_passes
 from .rows import (
@@ -115,18 +116,20 @@ def integrate_positions(solver, h, span, arms):
 
 
 @part
-def rule_of(solver, s, arms):
+def rule_of(solver, s, dt, span, arms):
     """(substeps, passes in each that take back the speed that pushing has given, the same in the last one, whether
     they go on until they agree, whether masses are capped) of a range. More passes would pull joints apart, which have
     one."""
-    t, passes, last = solver.special[s], RELAX_PASSES, LAST_RELAX_PASSES
+    passes, last = RELAX_PASSES, LAST_RELAX_PASSES
     if len(arms) > 0:
         passes = last = TURNING_RELAX_PASSES
     if s == 0:
         return solver.usual, passes, last, False, False
+    t = solver.island[span[2]]
     if solver.links[t] == 0:
         passes = last = REFINED_PASSES
-    return solver.substeps_of[t], passes, last, solver.hard_of[t], solver.load_share[t] < 1.0
+    hard = is_hard_island(solver, t, solver.usual, dt)
+    return solver.substeps_of[t], passes, last, hard, solver.load_share[t] < 1.0
 
 
 @part
@@ -217,11 +220,11 @@ def contact_spring(solver, stiffer, substeps, h):
 @part
 def solve_range(solver, s, dt, span, arms):
     """The substeps of a range."""
-    rule, special = rule_of(solver, s, arms), s > 0
+    rule, special = rule_of(solver, s, dt, span, arms), s > 0
     substeps, _, _, stiff, capped = rule
     h = dt / substeps
     if capped:
-        cap_mass_ratio(solver, solver.special[s], dt, span, arms)
+        cap_mass_ratio(solver, solver.island[span[2]], dt, span, arms)
     springs = contact_spring(solver, 1.0, substeps, h), contact_spring(solver, STATIC_STIFFNESS, substeps, h)
     open_all(solver, span, arms)
     if len(arms) > 0:
