@@ -13,10 +13,9 @@ TURNING_FREQUENCY = 0.125  # where bodies turn, of pairs with several points: wi
 # most of springs of joints: faster ones hold, as with more springs at a light body gain
 STATIC_STIFFNESS = 1.4  # times that where one of the two is static: with 1 a crate settles at 1.2 mm/s on its floor
 
-# How fast overlap is pushed out. A bounded push bounds the force, so the bound grows with the load.
+# How fast overlap is pushed out. A bounded push bounds the force, so the bound grows with the load: the sag under the
+# last impulse is pushed out as well, or jammed bodies would keep overlaps of .15.
 FULL_PUSH_OVERLAP = 0.03  # extents: more overlap does not push faster; .2 lets rooms of mixed masses gain energy
-LOAD_SAG_MAX = 0.1  # extents of the sag under the last impulse is pushed out as well: without it jammed bodies keep
-# overlaps of .15 at equal, bounded pushes
 
 # Passes over the rows in a substep.
 RELAX_PASSES = 2  # after the pass that pushes: they take back the speed that pushing has given

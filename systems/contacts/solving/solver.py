@@ -22,7 +22,6 @@ from ..constants import (
     DAMPING_RATIO,
     FREQUENCY,
     LAST_RELAX_PASSES,
-    LOAD_SAG_MAX,
     NEGLIGIBLE,
     REFINED_PASSES,
     RELAX_PASSES,
@@ -233,8 +232,7 @@ def solve_range(solver, s, dt, span, arms):
     scale_impulses(solver, 1.0 / substeps, span)
     turn = 2.0 * math.pi * spring_frequency(solver)
     for k in range(span[0], span[1]):
-        sag = solver.impulse[k] * h / (turn * turn * solver.mass[k])
-        solver.loaded[k] = 0.0 if stiff else min(sag, LOAD_SAG_MAX * solver.extent[k])
+        solver.loaded[k] = 0.0 if stiff else solver.impulse[k] * h / (turn * turn * solver.mass[k])
     for_joints(solver, calls.START, (h, dt), span, arms)
     measure(solver, h, springs, dt, stiff, False, span, arms)
     for step in range(substeps):
