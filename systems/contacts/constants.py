@@ -48,10 +48,6 @@ OWN_SAG = 0.002  # nor a contact under one body alone: grains, whose contacts ar
 STRIKE_SUBSTEPS = 4.0  # substeps for each extent per step that a light body is closed on, times the ratio of masses
 LEAST_WORK_SUBSTEPS = 64  # are allowed whatever the size of an island, see ISLAND_WORK
 
-# Hard islands: passes until they agree.
-CONVERGED_SPEED = 1e-5  # extents per substep,
-CONVERGED_SHARE = 1e-3  # and of the change of speed that forces make in it
-
 # What contacts may add to the energy of their island in a step.
 GAIN_MOTION = 0.008  # of its kinetic energy against its mean velocity,
 GAIN_PUSH = 0.004  # of the energy at the speed of pushing,
@@ -61,8 +57,8 @@ GAIN_ROUNDING = 1e-12  # of an energy: less is none
 # Hard contacts of bodies that nothing presses on.
 ALIGNED = 0.5  # cosine: a hard contact lies along the sum of the normals of its body, and a normal is that of the step
 # before: else its impulses say nothing
-NEGLIGIBLE = 1e-9  # of an extent: a smaller gap, overlap or way in a step is none; of an impulse,
-# or of the one that forces give in a step
+NEGLIGIBLE = 1e-9  # of an extent: a smaller gap, overlap or way in a step is none, and hard islands agree where passes
+# change no way in a substep by more; of an impulse, or of the one that forces give in a step
 UNREACHED = 1e6  # extents: a row that is left to the next step
 
 # What is remembered of a step.

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
 from ....framework.compilation import inlined, part
-from ....framework.vectors import length
-from ..constants import CONVERGED_SHARE, CONVERGED_SPEED, FRICTION_OVERRELAXATION, ISLAND_WORK, MOST_REPEATS
+from ..constants import FRICTION_OVERRELAXATION, ISLAND_WORK, MOST_REPEATS, NEGLIGIBLE
 from .chunks import solve_chunks
 from .rows import closing_speed, look_ahead, relax_listed, solve_friction, solve_normals, solve_rolling
 
@@ -39,21 +36,12 @@ def note_impulses(solver, span):
 
 
 @part
-def least_change(solver, h, span):
-    """The change of a speed that matters in a hard island, m/s for each m of extent; see CONVERGED_SHARE."""
-    fastest = 0.0
-    for q in range(span[2], span[3]):
-        fastest = max(fastest, length(solver.acceleration[q]) * h)
-    return CONVERGED_SHARE * fastest if fastest > 0.0 else math.inf
-
-
-@part
-def agrees(solver, h, least, span):
+def agrees(solver, h, span):
     """Whether the last pass has changed nothing that matters."""
     any_wrong = False
     for k in range(span[0], span[1]):
-        wrong = min(CONVERGED_SPEED * solver.extent[k] / h, least) * solver.mass[k]
-        any_wrong |= not abs(solver.impulse[k] - solver.previous[k]) <= wrong
+        way = abs(solver.impulse[k] - solver.previous[k]) * h / solver.mass[k]
+        any_wrong |= not way <= NEGLIGIBLE * solver.extent[k]
     return not any_wrong
 
 
@@ -62,15 +50,15 @@ def solve_passes(solver, pushes, passes, stiff, h, span, arms):
     """So many ``passes`` over a range, and over a ``stiff`` one more, until they agree."""
     if len(arms) > 0:
         look_ahead(solver, 0.5 * h, span)
-    bias, most, least = solver.pushing if pushes else solver.target_speed, passes, 0.0
+    bias, most = solver.pushing if pushes else solver.target_speed, passes
     if stiff:
-        most, least = max(passes, most_repeats(span[1] - span[0])), least_change(solver, h, span)
+        most = max(passes, most_repeats(span[1] - span[0]))
     for left in range(passes - 1, passes - 1 - most, -1):
         if stiff:
             note_impulses(solver, span)
         over = FRICTION_OVERRELAXATION if left > 0 and not pushes else 1.0
         solve_pass(solver, bias, pushes, over, span, arms)
-        if stiff and left <= 0 and agrees(solver, h, least, span):
+        if stiff and left <= 0 and agrees(solver, h, span):
             break
     if len(arms) > 0:
         look_ahead(solver, -0.5 * h, span)
@@ -105,8 +93,7 @@ def close_nearest_first(solver, h, span, arms):
     impulse of a row which another one should have held before is as high as a whole fall.
     """
     list_by_gap(solver, span)
-    count, least = span[1] - span[0], least_change(solver, h, span)
-    work = ISLAND_WORK
+    count, work = span[1] - span[0], ISLAND_WORK
     for e in range(count):
         k = solver.listed[e]
         new = closing_speed(solver, k, arms) > solver.target_speed[k]
@@ -114,4 +101,4 @@ def close_nearest_first(solver, h, span, arms):
             note_impulses(solver, span)
             relax_listed(solver, e + 1, arms)
             work -= e + 1
-            new = not agrees(solver, h, least, span)
+            new = not agrees(solver, h, span)
