@@ -49,7 +49,6 @@ STRIKE_SUBSTEPS = 4.0  # substeps for each extent per step that a light body is 
 LEAST_WORK_SUBSTEPS = 64  # are allowed whatever the size of an island, see ISLAND_WORK
 
 # What contacts may add to the energy of their island in a step.
-GAIN_MOTION = 0.008  # of its kinetic energy against its mean velocity,
 GAIN_PUSH = 0.004  # of the energy at the speed of pushing,
 GAIN_WEIGHT = 2.5  # of the energy that forces give from rest: towers that are pushed out need it
 GAIN_ROUNDING = 1e-12  # of an energy: less is none

@@ -16,7 +16,6 @@ from ...joints import calls
 from ...joints.calls import for_joints
 from ..constants import (
     FULL_PUSH_OVERLAP,
-    GAIN_MOTION,
     GAIN_PUSH,
     GAIN_ROUNDING,
     GAIN_WEIGHT,
@@ -120,34 +119,24 @@ def measure_energy(solver, span, arms, islands):
 @part
 def exceeds_budget(solver, t):
     """Whether the contacts of island t have given it more energy than ``allowed``."""
-    gained = solver.slope[t] - solver.allowed[t] + 0.5 * solver.curvature[t]
-    return not gained <= GAIN_ROUNDING * (solver.energy[t] + solver.curvature[t])
+    curvature = solver.curvature[t]
+    gained = solver.slope[t] - solver.allowed[t] + 0.5 * curvature
+    return not gained <= GAIN_ROUNDING * (math.sqrt(solver.energy[t] * curvature) + curvature)
 
 
 @part
 def energy_budget(solver, bias_rate, h, dt, span, arms, islands):
-    """What each island may gain in a substep: what forces give from rest, more of that where it is pushed out, and a
-    small share of its motion and of the energy at the speed of pushing. Joints would use such a share in each substep:
-    where there are some, it may give back what it has taken, and no more."""
-    start, stop, begin, end = span
-    allowed, motion = solver.allowed, solver.momentum
-    share, zero = h / dt, scale(solver.velocity[begin], 0.0)  # of what a step may give
+    """What each island may gain in a substep: what its joints have taken before in the step, what forces give from
+    rest, more of that where it is pushed out, and without joints, which would use it in each substep, a small share of
+    the energy at the speed of pushing."""
+    allowed = solver.allowed
     for t in range(islands[0], islands[1]):
-        motion[t] = zero
-    for q in range(begin, end):
-        if solver.island[q] >= 0:
-            t = solver.island[q]
-            motion[t] = add_scaled(motion[t], solver.velocity_before[q], solver.solver_mass[q])
-    for t in range(islands[0], islands[1]):
-        mass, force = solver.mass_of[t], solver.force_of[t] * h / dt
-        energy = max(0.0, solver.energy[t] - dot(motion[t], motion[t]) / mass)
-        rate = dt / h if solver.size_of[t] > 0 else 1.0
-        allowed[t] = (0.5 + GAIN_WEIGHT * rate) * force * force / mass
-        allowed[t] += solver.credit[t] if solver.links[t] > 0 else share * GAIN_MOTION * energy
-    for k in range(start, stop):
+        force, rate = solver.force_of[t] * h / dt, dt / h if solver.size_of[t] > 0 else 1.0
+        allowed[t] = solver.credit[t] + (0.5 + GAIN_WEIGHT * rate) * force * force / solver.mass_of[t]
+    for k in range(span[0], span[1]):
         t, speed = island_of(solver, k), bias_rate * FULL_PUSH_OVERLAP * solver.extent[k]
         if solver.links[t] == 0:
-            allowed[t] += share * GAIN_PUSH * solver.mass[k] * speed * speed
+            allowed[t] += h / dt * GAIN_PUSH * solver.mass[k] * speed * speed
 
 
 @inlined

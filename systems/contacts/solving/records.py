@@ -124,7 +124,6 @@ SOLVER = Schema(
     slope=floats(unit="J"),  # see guard.measure_energy
     curvature=floats(unit="J"),
     energy=floats(unit="J"),
-    momentum=vectors(unit="kg m/s"),
     allowed=floats(unit="J"),
     share=floats(unit="1"),
     taken=floats(unit="J"),  # that the guard has taken in this step
