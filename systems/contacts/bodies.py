@@ -36,14 +36,6 @@ from .solving.turning import NOT_TUMBLING, integrate_rotation_of_joined, note_fr
 
 
 @part
-def note_squeezed(solver, i):
-    """There is no room for body i where it is pushed: a fault will name the first of them."""
-    if solver.squeezed == 0:
-        solver.squeezed_row = i
-    solver.squeezed += 1
-
-
-@part
 def start_of_flight(state, i, v, a, dt):
     """From where the substeps would take body i to the place of its last impact in time."""
     bodies = state.bodies

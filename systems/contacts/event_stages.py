@@ -8,6 +8,7 @@ from ...framework.vectors import add
 from ..codes import FAULTS, OK
 from ..narrow_phase.manifolds import move_to_end
 from ..records import CONTACT_ROWS
+from .solving.faults import KINDS_OF_FAULT
 
 ROOM_FOR_CONTACTS = (Rows("contacts", CONTACT_ROWS, lambda s: s.pairs.touching_count),)
 # Where no response has looked at the end of the step.
@@ -87,9 +88,10 @@ def compare_contacts(state, dt):
             j += 1
     state.ids_changed = False
     contacts.ends, contacts.begins, contacts.stays[now] = ends, begins, stays
-    solver = state.solver
     faults = state.impacts.capped + state.impacts.halted + state.too_fast_for_discrete
-    faults += state.turns_too_far + solver.squeezed + solver.overloaded + solver.restrained + solver.joints.torn
+    faults += state.turns_too_far
+    for kind in range(KINDS_OF_FAULT):
+        faults += state.solver.faults[kind]
     staying = stays + contacts.stored if state.stay_wanted else 0
     state.event_count = ends + begins + staying + state.impacts.logged + faults
     return FAULTS if faults > 0 and not state.others_write else OK

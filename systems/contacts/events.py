@@ -19,6 +19,7 @@ from ..sleeping.sleepers import Sleepers
 from ..sleeping.stored import merged
 from ..stage_system import StagedSystem
 from .event_stages import ROOM_FOR_FOUND, compare_contacts
+from .solving.faults import OVERLOADED, RESTRAINED, SQUEEZED, TORN_OPEN
 
 Columns = dict[str, np.ndarray]
 
@@ -260,7 +261,7 @@ class ContactEvents(StagedSystem):
     def report_faults(self, dt: float) -> None:
         """Note what has gone wrong in the step of ``dt``, s."""
         state, impacts, solver = self._state, self._impacts, self._state.solver
-        entity = state.bodies.entity
+        entity, faults, faulty = state.bodies.entity, solver.faults, solver.faulty
         if state.too_fast_for_discrete:
             fast = int(entity[state.too_fast_row])
             self.world.report_fault(
@@ -275,30 +276,30 @@ class ContactEvents(StagedSystem):
                 f"smaller steps",
                 kind="turns too far", entity=turned,
             )  # fmt: skip
-        if solver.squeezed:
+        if faults[SQUEEZED]:
             self.world.report_fault(
-                f"no room for {solver.squeezed} squeezed bodies, the first is entity "
-                f"{entity[solver.squeezed_row]}: stop earlier what squeezes them, or use masses that differ less",
+                f"no room for {faults[SQUEEZED]} squeezed bodies, the first is entity "
+                f"{entity[faulty[SQUEEZED]]}: stop earlier what squeezes them, or use masses that differ less",
                 kind="squeezed",
             )
-        if solver.overloaded:
+        if faults[OVERLOADED]:
             self.world.report_fault(
-                f"{solver.overloaded} bodies are too heavy for what they lie on, the "
-                f"first is entity {entity[solver.overloaded_row]}: their contacts take them as lighter; use masses "
+                f"{faults[OVERLOADED]} bodies are too heavy for what they lie on, the "
+                f"first is entity {entity[faulty[OVERLOADED]]}: their contacts take them as lighter; use masses "
                 f"that differ less, or smaller steps",
                 kind="overloaded",
             )
-        if solver.restrained:
+        if faults[RESTRAINED]:
             self.world.report_fault(
-                f"contacts of {solver.restrained} islands would have given them much "
-                f"energy, and were held back, the first with entity {entity[solver.restrained_row]}: use smaller "
+                f"contacts of {faults[RESTRAINED]} islands would have given them much "
+                f"energy, and were held back, the first with entity {entity[faulty[RESTRAINED]]}: use smaller "
                 f"steps, more substeps, or masses that differ less",
                 kind="restrained",
             )
-        if solver.joints.torn:
-            torn = int(solver.joints.torn_joint)
+        if faults[TORN_OPEN]:
+            torn = int(faulty[TORN_OPEN])
             self.world.report_fault(
-                f"{solver.joints.torn} joints are torn open by more than a tenth of the size of a body, the first is "
+                f"{faults[TORN_OPEN]} joints are torn open by more than a tenth of the size of a body, the first is "
                 f"entity {torn}: use more substeps, smaller steps, or less force and speed",
                 kind="torn", entity=torn,
             )  # fmt: skip

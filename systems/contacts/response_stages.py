@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..codes import OK, RUN_NARROW
 from ..narrow_phase.manifolds import move_to_start
+from .solving.faults import KINDS_OF_FAULT
 
 
 def begin_response(state, dt):
@@ -15,8 +16,9 @@ def begin_response(state, dt):
     unknown = state.sweeping and state.moved and state.neighbours_known_until < dt
     solver = state.solver
     state.response_idle = near + solver.joints.active + memory.counts[memory.now] == 0 and not unknown
-    solver.islands = solver.squeezed = solver.overloaded = solver.restrained = solver.joints.torn = 0
-    state.impacts.halted = 0
+    for kind in range(KINDS_OF_FAULT):
+        solver.faults[kind] = 0
+    solver.islands = state.impacts.halted = 0
     state.impacts_recorded = False
     if state.response_idle:
         return OK

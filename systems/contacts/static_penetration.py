@@ -36,7 +36,7 @@ from ..narrow_phase.stages import is_solid_pair, layers_meet
 from ..parts.rows import next_row, owner_of
 from ..shapes.tolerances import SAME_PLACE, smaller_extent, way_of_turning
 from .approach import first_touch_on_segment, segment_start
-from .bodies import note_squeezed
+from .solving.faults import SQUEEZED, note_fault
 
 QUARTER = 0.5 * math.pi  # rad: what turns farther shows its other side
 ALLOWED = 0.05  # of the extent: overlap with what cannot be moved; what was deeper may stay so
@@ -198,7 +198,7 @@ def resolve_static_penetration(state, dt):
             far = push_out(state, dt, c, a, b)
             moved |= far > 0.0
             if turn == ROUNDS - 1 and far > SAME_PLACE * smaller_extent(bodies, a, b):  # more than rounding
-                note_squeezed(state.solver, i)
+                note_fault(state.solver, SQUEEZED, i)
         if not moved:
             break
     for i in range(state.first, state.dynamic if not state.pairs_filtered else 0):

@@ -42,11 +42,7 @@ JOINTS = Schema(
     along_a=vectors(unit="1"),  # of a CUSTOM: the same for the first body
     value=floats(unit="m or rad"),  # of a CUSTOM, after the last substep; of the first row of a joint in space with a
     # TURN or TWIST the angle of that, with whole turns: it stays with the joint while that holds the same bodies
-    old_load=floats(unit="N or N m"),  # the same before the step
-    old_pull=vectors(unit="N"),
-    old_normal=vectors(unit="1"),
-    old_along_a=vectors(unit="1"),
-    old_value=floats(unit="m or rad"),
+    before=table("float64", 11),  # the same before the step: load, value, then what are vectors
     # pairs of bodies that joints keep from touching, the smaller id first, in order
     apart=integer(),
     apart_a=ints(),
@@ -73,8 +69,6 @@ JOINTS = Schema(
     axes_a=vectors(unit="1"),  # of the bodies of a CUSTOM, likewise: as many rows as there are dimensions
     soft_further=vectors(unit="1 or 1/m or m"),
     axes_b=vectors(unit="1"),
-    torn=integer(),  # joints that are wide open, and the first
-    torn_joint=integer(),
     solver=integer(),  # address of what solves them, see calls
     # in a range
     begin=integer(),  # places in ``order``

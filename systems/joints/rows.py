@@ -22,6 +22,7 @@ from ...framework.compilation import inlined, part
 from ...framework.elementary import atan2, cos, exp
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 from ..contacts.constants import FREQUENCY, FULL_PUSH_OVERLAP, JOINT_DAMPING_RATIO, TURNING_FREQUENCY
+from ..contacts.solving.faults import TORN_OPEN, note_fault
 from ..integration.turning import change_of_spin, compliance, cross_spin, end_of_turn, symmetric, twist
 from .coupling import (
     compliance_of,
@@ -498,4 +499,4 @@ def keep_joints(solver, dt):
         size = length(pull)
         joints.pull[j] = scale(pull, most / size) if size > most else pull
         if joints.kind[j] == POINT and is_torn(solver, j):
-            joints.torn, joints.torn_joint = joints.torn + 1, joints.joint[j] if joints.torn == 0 else joints.torn_joint
+            note_fault(solver, TORN_OPEN, joints.joint[j])

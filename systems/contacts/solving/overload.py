@@ -12,6 +12,7 @@ from ...integration.turning import momentum_of_spin
 from ...joints import calls
 from ...joints.calls import for_joints
 from ..constants import GAIN_ROUNDING
+from .faults import OVERLOADED, note_fault
 from .guard import work_of_row
 from .rows import compute_effective_mass, rotate_body
 
@@ -25,9 +26,7 @@ def cap_mass_ratio(solver, t, dt, span, arms):
         by = solver.inverse_mass[q] / least
         solver.mass_ratio[q] = min(1.0, by)
         if by < 1.0:
-            if solver.overloaded == 0:
-                solver.overloaded_row = solver.body_row[q]
-            solver.overloaded += 1
+            note_fault(solver, OVERLOADED, solver.body_row[q])
             if len(arms) > 0:
                 solver.inverse_inertia[q] = scale(solver.inverse_inertia[q], 1.0 / by)
                 solver.inverse_products[q] = scale(solver.inverse_products[q], 1.0 / by)

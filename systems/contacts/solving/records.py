@@ -139,13 +139,9 @@ SOLVER = Schema(
     row_ends=ints("int32"),
     body_ends=ints("int32"),
     joint_ends=ints("int32"),
-    # faults: how many bodies, and the row of the first
-    squeezed=integer(),  # there is no room where they are pushed
-    squeezed_row=integer(),
-    overloaded=integer(),  # they count as lighter than they are
-    overloaded_row=integer(),
-    restrained=integer(),  # first bodies of islands to which contacts would have given much energy
-    restrained_row=integer(),
+    # of each kind of faults:
+    faults=ints(),  # how many there are,
+    faulty=ints(),  # and the row of the first body
     joints=JOINTS,
     direct=DIRECT,
 )

@@ -31,6 +31,7 @@ from ..constants import (
     TURNING_RELAX_PASSES,
 )  # fmt: skip
 from .chunks import find_chunks, load_masses
+from .faults import RESTRAINED, note_fault
 from .guard import finish_substep, island_of, islands_of, open_all
 from .hard import defer_open_contacts, select_rigid
 from .islands import is_hard_island
@@ -261,10 +262,10 @@ def count_work(state, dt):
             state.restrained_energy += taken
             step = math.sqrt(2.0 * taken / solver.mass_of[t]) * dt * solver.own[t]
             if taken > 0.5 * solver.energy[t] and step > STRUCK_EXCESS:
-                for q in range(solver.bodies - 1 if solver.restrained == 0 else -1, -1, -1):
-                    if solver.island[q] == t:  # the first body of the first such island
-                        solver.restrained_row = solver.body_row[q]
-                solver.restrained += 1
+                q = 0
+                while solver.island[q] != t:
+                    q += 1
+                note_fault(solver, RESTRAINED, solver.body_row[q])
 
 
 @part
