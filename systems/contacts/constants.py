@@ -23,11 +23,11 @@ LAST_RELAX_PASSES = 4  # of the last substep, whose velocities stay: with 2 a to
 TURNING_RELAX_PASSES = 1  # of each where bodies spin: the friction of a row follows its normal, not all normals
 FRICTION_OVERRELAXATION = 1.5  # of the impulse that stops a row from sliding, in all passes of a substep but the last:
 # a stored impulse is a spring without a damper, so columns sway, and only passes take energy; below 2 they do
-REFINED_PASSES = 8  # of each substep of an island with more: columns under heavy bodies sway with 2, pyramids with 12;
-# and an island that may have more further passes than these is solved as much better
+REFINED_PASSES = 8  # of each substep of an island with more: columns under heavy bodies sway with 2, pyramids with 12
 MOST_REPEATS = 1024  # substeps of an island, beyond which the heaviest count as lighter, and a fault says so; and
 # passes over rows that are not solved and islands that have gained energy, or until hard islands agree;
 ISLAND_WORK = 20_000  # rows at most in all of these, and in all substeps of an island, if they are more than usual
+FINER_PASSES = 32  # an island for which that is more passes is solved as much better
 SWEEPS_PER_LOOK = 4  # between two looks at which rows these are: so many whatever its size
 STRUCK_EXCESS = 0.01  # extents per step: an island with a row whose speed is wrong by more is solved further, what
 # closes slower strikes nothing, and a fault tells where contacts would have made an island faster by more

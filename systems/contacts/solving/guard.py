@@ -15,11 +15,12 @@ from ...integration.turning import momentum_of_spin
 from ...joints import calls
 from ...joints.calls import for_joints
 from ..constants import (
+    FINER_PASSES,
     FULL_PUSH_OVERLAP,
     GAIN_PUSH,
     GAIN_ROUNDING,
     GAIN_WEIGHT,
-    REFINED_PASSES,
+    ISLAND_WORK,
     STRUCK_EXCESS,
     SWEEPS_PER_LOOK,
 )  # fmt: skip
@@ -154,7 +155,7 @@ def further_passes(solver, t):
 @inlined
 def excess_scale(solver, t):
     """How many times better than STRUCK_EXCESS the rows of a struck island are solved."""
-    return max(1.0, further_passes(solver, t) / REFINED_PASSES)
+    return max(1.0, ISLAND_WORK / (FINER_PASSES * (solver.size_of[t] + solver.links[t])))
 
 
 @part
