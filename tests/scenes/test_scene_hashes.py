@@ -11,11 +11,11 @@ import pytest
 from carom import scenes
 
 HASHES = {
-    "pile2d": ({"n": 40}, "37e83a7c66975f55c323e5788a27d4ab2cd94abe007d8d80530fa52e9259fbfb"),
-    "pile3d": ({"n": 27}, "31bd1f8666ae9387515ef60f333e81dd6fd6e3fe66bc24700c6c34d2d473ccc7"),
+    "pile2d": ({"n": 40}, "9142b236a207b714a281488ae95160caf4b25b2bf35df15695683925505c69c9"),
+    "pile3d": ({"n": 27}, "8dd881f2fba79a68a9e253abf8600714554a4b1fdb75dead1382c086a0386a12"),
     "tumbler": ({"n": 12}, "0c1980139e89fde1c589cce28d44e01f52c316eeab435314c4e599fccb103c62"),
-    "bridge": ({"n": 8, "crates": 2}, "90386a86fe10077d25cae829ab05deebebc7ab7a3b84a2c0095a7c9dafb139d9"),
-    "ragdoll": ({"n": 1}, "a2cb76e518cd3313c77f8fe557cdebc26f4a88a6f7fc091ee8835e6cb1ccdd16"),
+    "bridge": ({"n": 8, "crates": 2}, "f9ce66209486f0101560a32992fbb34c691fc66ca30616739b9d399df4e8acf8"),
+    "ragdoll": ({"n": 1}, "3f26a14796fcf79599b27e0c71157fbd6f34a956ad4e83a4fe7cdd5356adffeb"),
 }
 STEPS = 60
 
