@@ -62,11 +62,11 @@ def random_chain(seed: int, d: int, gravity: float) -> tuple[World, bool]:
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("gravity", [0.0, 9.81])
 def test_no_chain_gains_energy(d, gravity):
-    for seed in range(8):
+    for seed in range(5):  # of each number of substeps
         world, hangs = random_chain(seed, d, gravity)
         start = lowest = energy(world)
         momentum, fastest = world.momentum(), world.kinetic_energy()
-        for _ in range(150):
+        for _ in range(120):
             world.step()
             now, fastest = energy(world), max(fastest, world.kinetic_energy())
             assert now <= start + 1e-8 * fastest
@@ -98,15 +98,15 @@ def chain_in_a_room(seed: int, d: int) -> World:
 @pytest.mark.parametrize("d", [2, 3])
 def test_no_chain_gains_energy_from_what_it_touches(d):
     touched = 0
-    for seed in range(8):
+    for seed in range(5):  # of each number of substeps
         with chain_in_a_room(seed, d) as world:
             start = lowest = world.kinetic_energy()
-            for _ in range(150):
+            for _ in range(120):
                 world.step()
                 assert world.kinetic_energy() <= lowest + 1e-9 * start
                 lowest = min(lowest, world.kinetic_energy())
                 touched += len(world.contacts)
-    assert touched > 500
+    assert touched > 300
 
 
 @pytest.mark.parametrize("seed", [0, 7])

@@ -67,7 +67,7 @@ def mixed_heap(seed, e, mode):
             place = (np.array((k % 6, k // 6)) - 2.5) * 1.2 + random.uniform(-0.1, 0.1, 2)
             mass = float(random.choice([1e-12, 1.0, 1e12]))
             (ball, box)[k % 2](world, place, 3.0 * random.normal(size=2), mass=mass, restitution=e, friction=0.4)
-        return play(world, 60, limit=6.0)
+        return play(world, 25, limit=6.0)
 
 
 @pytest.mark.slow

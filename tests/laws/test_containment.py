@@ -63,13 +63,13 @@ def too_fast(found):
 
 
 @pytest.mark.parametrize("mode", SWEPT)
-@pytest.mark.parametrize("seed", seeds(8, 500))
+@pytest.mark.parametrize("seed", seeds(5, 500))
 def test_what_is_swept_stays_inside(seed, mode):
     found = room(seed, mode)
     assert found.out == 0, found.faults[-1:]
 
 
-@pytest.mark.parametrize("seed", seeds(15, 500))
+@pytest.mark.parametrize("seed", seeds(9, 500))
 def test_discrete_bodies_stay_inside_or_are_called_too_fast(seed):
     found = room(seed, "discrete")
     assert found.out == 0 or too_fast(found), found.faults[-1:]
@@ -79,7 +79,7 @@ def test_discrete_bodies_stay_inside_or_are_called_too_fast(seed):
 def test_what_is_struck_into_a_thin_wall_stays_or_is_called_too_fast(share):
     """What is struck within a step meets nothing else until the next, which pushes it out on the side where its centre
     is: in a step it may go half its size and that of the wall, half as far as what flies freely. Any phase, any gap."""
-    for k in range(100):
+    for k in range(0, 100, 3):
         with make_world(2, collision="discrete", on_fault="ignore") as world:
             box(world, (10.0, 0.0), half=(0.005, 20.0), kind="static", restitution=1.0)
             way, gap = share * 1.01, (0.01, 0.1, 0.2, 0.3, 0.4)[k % 5]
@@ -93,7 +93,7 @@ def test_what_is_struck_into_a_thin_wall_stays_or_is_called_too_fast(share):
 
 
 @pytest.mark.parametrize("mode", SWEPT)
-@pytest.mark.parametrize("seed", seeds(20, 1000, known=(508, 2073, 2905, 3539)))
+@pytest.mark.parametrize("seed", seeds(10, 1000, known=(508, 2073, 2905, 3539)))
 def test_what_is_swept_stays_inside_under_any_pull(seed, mode):
     """Ten to thirty bodies of 1 m behind walls of 5 cm: gravity moves them by .03 to 3 m in a step from rest, so far
     that between two impacts within a step they fall through what they lie on."""
@@ -113,7 +113,7 @@ def test_what_is_swept_stays_inside_under_any_pull(seed, mode):
 
 @pytest.mark.parametrize("mode", SWEPT)
 @both_dimensions
-@pytest.mark.parametrize("seed", seeds(4, 100))
+@pytest.mark.parametrize("seed", seeds(2, 100))
 def test_nothing_leaves_a_room_at_any_speed(seed, d, mode):
     """Sixty bodies of 1 to 1e4 m/s, sizes to 1:100, masses to 1:1e6; walls of 1 cm to 2 m, steps of 1/20 to 1/240 s."""
     random = np.random.default_rng([seed, 15])

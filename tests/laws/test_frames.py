@@ -69,7 +69,7 @@ def girder(world, d, bays, masses):
 @pytest.mark.parametrize("d", [2, 3])
 def test_girders_stand(d):
     """Masses 1:1,000, and a load of up to 50 times the weight of a bar in the middle: nothing moves by a thousandth."""
-    for seed in range(6):
+    for seed in range(3):
         rng = np.random.default_rng((seed, d))
         world, joints = world_of(d, seed, substeps=int(rng.integers(2, 7)))
         bays, ratio = int(rng.integers(2, 6)), 10.0 ** (1.5 * (seed % 3 > 0))
@@ -175,7 +175,7 @@ def test_sliders_in_a_row_stay_on_their_rails(d):
 @pytest.mark.parametrize("d", [2, 3])
 def test_beams_of_welds_do_not_bend(d):
     """Up to 20 boxes of 1 m welded to a wall, the last up to 1,000 times as heavy: it sinks by less than 1 mm."""
-    for seed in range(6):
+    for seed in range(3):
         rng = np.random.default_rng((seed, d))
         world, joints = world_of(d, seed)
         n, before = int(rng.integers(2, 21)), None
@@ -196,7 +196,7 @@ def test_beams_of_welds_do_not_bend(d):
 def test_chains_swing_with_what_is_a_thousand_times_as_heavy(d):
     """2 to 12 links of 1 kg that fall from the horizontal with 30 to 1,000 kg at their end: no hinge opens by a
     hundredth of a link, and the energy rises by no more than g h v / 2, by which symplectic Euler's swings."""
-    for seed in range(6):
+    for seed in range(3):
         rng = np.random.default_rng((seed, d))
         world, joints = world_of(d, seed, on_fault="ignore")
         n, load, before = int(rng.integers(2, 13)), 10.0 ** rng.uniform(1.5, 3), None

@@ -88,7 +88,7 @@ def test_a_door_flung_at_its_stop_stays_on_its_hinge(d):
 def test_trees_of_hinges_with_limits_gain_nothing_and_hold(d):
     """Six balls of 1 to 10 or 1 to 1,000 kg on hinges with limits, thrown at random: no energy is gained, and with
     masses of 1:10 no joint opens by more than a tenth of a ball, which would be told."""
-    for seed in range(24):
+    for seed in range(8):
         rng = np.random.default_rng((seed, d, 77))
         ratio, places = (10.0, 1000.0)[seed % 2], [(None, np.zeros(d))]
         world, joints = world_of(d, seed // 2)

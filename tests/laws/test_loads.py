@@ -59,7 +59,7 @@ def test_boxes_carry_a_load(count, load, mode, d):
     assert not found.faults
 
 
-@pytest.mark.parametrize(("count", "load", "mode"), pairwise((1, 3, 5, 7), HUGE, MODES))
+@pytest.mark.parametrize(("count", "load", "mode"), pairwise((1, 3, 7), HUGE, MODES))
 def test_a_load_beyond_all_bounds_passes_through_nothing(count, load, mode):
     """It stands, or a fault says that it is too much; in any case all stay in order, and what lies below stays."""
     found = stand(mode, (1.0,) * count + (load,))

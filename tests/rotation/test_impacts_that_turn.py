@@ -181,7 +181,7 @@ def test_a_gas_of_boxes_and_balls_never_gains_energy_and_keeps_it_if_smooth_and_
         last = first = world.kinetic_energy()
         given = 1e-12 if e > 0.0 else 1e-5  # what does not bounce is left to contacts, which push out overlaps
         given = 2e-2 if mu == 0.0 and mode == "discrete" else given
-        for _ in range(180):
+        for _ in range(120):
             world.step()
             now = world.kinetic_energy()
             assert now <= last * (1 + given)
@@ -194,7 +194,7 @@ def test_a_gas_of_boxes_and_balls_never_gains_energy_and_keeps_it_if_smooth_and_
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("seed", [4, pytest.param(6, marks=pytest.mark.long)])
 def test_a_smooth_elastic_gas_of_boxes_in_space_keeps_energy(seed, mode):
-    """To rounding, over more than 300 impacts; among them corners that slide along faces, and would graze them more
+    """To rounding, over more than 150 impacts; among them corners that slide along faces, and would graze them more
     often than the cap allows."""
     random = np.random.default_rng(seed)
     with turning_world(3, collision=mode, max_impacts_per_step=64) as world:
@@ -207,10 +207,10 @@ def test_a_smooth_elastic_gas_of_boxes_in_space_keeps_energy(seed, mode):
             BoxCollider.many(half, restitution=1.0),
         )  # fmt: skip
         energy = world.kinetic_energy()
-        for _ in range(200):
+        for _ in range(100):
             world.step()
             assert world.kinetic_energy() == pytest.approx(energy, rel=1e-12)
-        assert world.stats().counters["impacts"] > 300
+        assert world.stats().counters["impacts"] > 150
         assert np.abs(world.bodies.dynamic.position).max() < 3.0
 
 

@@ -81,7 +81,7 @@ def test_what_bears_the_others_in_a_tumbler_keeps_its_shape():
     for n in (600, 800, 1000):
         with tumbler.build(n=n) as world:
             deepest, walls = [], world.bodies.kinematic.entity
-            for step in range(600):
+            for step in range(360):
                 world.step()
                 if step >= 120 and step % 5 == 0:
                     contacts = world.contacts
