@@ -176,7 +176,7 @@ def test_a_list_that_follows_its_world_is_that_of_a_new_drawing(d, seed):
     with crowd(d, seed) as world:
         drawing = Drawing(world)
         before = drawing.update()
-        for _ in range(60 if d == 2 else 15):
+        for _ in range(30 if d == 2 else 10):
             what = str(random.choice(OPERATIONS))
             if what == "snapshot":
                 kept = world.snapshot()

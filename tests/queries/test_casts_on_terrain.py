@@ -109,11 +109,14 @@ def random_ground(random, d):
 def first_touches(core, radius, pieces, starts, ways):
     """(distance, way apart from each piece just before) of each cast; nan if that is no touch, or a graze. What is
     apart can go as far as the gap is wide."""
-    far = np.zeros(len(starts))
+    far, gaps, on = np.zeros(len(starts)), np.zeros(len(starts)), np.arange(len(starts))  # those still on their way
     for _ in range(80):
-        apart = ways_apart(core, pieces, starts + far[:, None] * ways)
-        gaps = np.linalg.norm(apart, axis=2).min(axis=1) - radius
-        far += np.where(gaps > 1e-13, np.minimum(gaps, LENGTH), 0.0)
+        apart = ways_apart(core, pieces, starts[on] + far[on, None] * ways[on])
+        gaps[on] = np.linalg.norm(apart, axis=2).min(axis=1) - radius
+        far[on] += np.where(gaps[on] > 1e-13, np.minimum(gaps[on], LENGTH), 0.0)
+        on = on[(gaps[on] > 1e-13) & (far[on] < LENGTH)]
+        if not len(on):
+            break
     before = ways_apart(core, pieces, starts + (far - 1e-7)[:, None] * ways)
     return np.where((gaps < 1e-12) & (far < LENGTH), far, np.nan), before
 

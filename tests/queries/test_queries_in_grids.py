@@ -7,7 +7,7 @@ import pytest
 from queries.helpers_queries import GRAZE, Bodies, directions, scene
 from worlds import both_dimensions
 
-ASKED = 10  # places, each time
+ASKED = 6  # places, each time
 
 
 def compare(world, bodies, rng):

@@ -80,7 +80,7 @@ def test_depth_and_normal_of(first, second, d):
     pair = REGISTRY.pair(first, second)
     assert pair is not None
     first, second = pair.first, pair.second
-    examples = np.random.default_rng(5).uniform(-1, 1, (1000, WIDTH))
+    examples = np.random.default_rng(5).uniform(-1, 1, (400, WIDTH))
     cases = poses(REGISTRY.shapes[first], REGISTRY.shapes[second], d, examples)
     found = PairCode(pair, REGISTRY.shapes[first], REGISTRY.shapes[second], d)(cases.a, cases.b, cases.d)
     scale = np.linalg.norm(cases.d, axis=1) + size_of(cases.a.half) + size_of(cases.b.half)
