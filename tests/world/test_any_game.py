@@ -436,13 +436,13 @@ def play_for(steps):
     """Games until they have made so many steps: each round plays others, as its games are longer by a rule."""
     Game.steps, rules = 0, 50
     while Game.steps < steps:
-        play(50, rules)
+        play(25, rules)
         rules += 1
 
 
 @pytest.mark.slow
 def test_games_of_some_thousand_steps():
-    play_for(2_000)
+    play_for(1_000)
 
 
 @pytest.mark.long
