@@ -131,7 +131,7 @@ def test_any_sequence_of_changes_leads_to_what_esper_has():
         elif world.has_component(e, RigidBody):
             world.component_for_entity(e, RigidBody).kind = kind_of()
 
-    for number in range(100):
+    for number in range(60):
         with world:
             for _ in range(int(rng.integers(1, 12))):
                 verbs = (esper, world)[int(rng.integers(2))]
@@ -153,18 +153,18 @@ def test_what_comes_and_goes_costs_the_same_among_any_number():
         )
 
     calls = {}
-    for many in (2_000, 10_000):
+    for many in (400, 2_000):
         world = make_world()
         alive = list(spawn(world, many))
-        for changes in (100, 1_000, 1_000, 100):  # what is made once is made in the first two
+        for changes in (20, 200, 200, 20):  # what is made once is made in the first two
             for e in alive[:changes]:
                 world.delete_entity(e)
             alive = [*alive[changes:], *spawn(world, changes)]
             calls[many, changes] = calls_of(world.step)
             assert world.bodies.entity.tolist() == alive
         assert matches_esper(world)
-    assert calls[10_000, 1_000] < calls[2_000, 1_000] + 200  # searches make room or not
-    assert calls[10_000, 1_000] < calls[10_000, 100] + 4 * 900
+    assert calls[2_000, 200] < calls[400, 200] + 200  # searches make room or not
+    assert calls[2_000, 200] < calls[2_000, 20] + 4 * 180
 
 
 def test_nothing_changed_costs_next_to_nothing_whatever_the_size():
