@@ -191,7 +191,7 @@ def grown_by_counting(tiles, cells, limits, wide_first):
 def test_large_maps_against_every_single_cell(size):
     """Distances across many blocks, and times of touch on long ways."""
     rng = np.random.default_rng(int(size))
-    shape, count = (70, 90), 60
+    shape, count = (70, 90), 30
     tiles = rng.random(shape) < 0.004
     tiles[-2:, 10:70], tiles[20:50, 85:] = True, True
     low, high = boxes_of(tiles, 1.0)
@@ -203,11 +203,11 @@ def test_large_maps_against_every_single_cell(size):
     bodies = vertices + (offsets + np.array((45.0, 35.0)))[:, None]
     single = cellwise(low, high, bodies).max(1) + radii
     apart = single < 0
-    assert apart.sum() > 20
+    assert apart.sum() > 10
     assert abs(depths - single)[apart].max() < 1e-11
     assert depths[~apart].min() > -1e-11
     met = np.isfinite(times) & apart
-    assert met.sum() > 5
+    assert met.sum() > 2
     at_touch = cellwise(low, high, bodies[met] + (times[met, None] * ways[met])[:, None]).max(1) + radii[met]
     assert abs(at_touch).max() < 1e-11
     for share in np.linspace(0.0, 1.0, 9):  # apart until then

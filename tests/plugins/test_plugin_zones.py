@@ -216,18 +216,18 @@ ORBITS = [
 @pytest.mark.parametrize(("integrator", "error"), ORBITS[1:])
 @mostly_2d
 def test_orbits_close_as_well_as_the_method_is(d, integrator, error):
-    """An ellipse with falloff 2 and of a third of its axis in eccentricity: where it was after ten rounds of T = 2 pi
+    """An ellipse with falloff 2 and of a third of its axis in eccentricity: where it was after four rounds of T = 2 pi
     sqrt(a^3 / k), by energy; the place is right to a part of the way that the method's order says."""
     k, a, e = 16.0, 4.0, 1 / 3
     world = world_of(d, gravity=0.0, integrator=integrator, dt=2.0 * math.pi * math.sqrt(a**3 / k) / 800)
     entity = world.create_entity(Transform(flat(d)), SphereCollider(20.0, sensor=True), Field(k))
     start, speed = a * (1.0 - e), math.sqrt(k / a * (1.0 + e) / (1.0 - e))
     moon = ball(world, flat(d, start), flat(d, 0.0, speed), radius=0.1, mass=3.0)
-    for _ in range(8000):
+    for _ in range(3200):
         world.step()
     v, r = velocity(world, moon), np.linalg.norm(position(world, moon))
-    assert 0.5 * v @ v - k / r == pytest.approx(-k / (2.0 * a), rel=error)
-    assert np.linalg.norm(position(world, moon) - flat(d, start)) < 20.0 * math.pi * a * error
+    assert 0.5 * v @ v - k / r == pytest.approx(-k / (2.0 * a), rel=0.4 * error)
+    assert np.linalg.norm(position(world, moon) - flat(d, start)) < 8.0 * math.pi * a * error
     assert world.has_component(entity, Field)
 
 

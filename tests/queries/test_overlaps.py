@@ -52,7 +52,7 @@ def test_overlaps_of_many_bodies(d, n, sphere):
     """Which, how deep, in order, by layers, masks, groups and what is left out; moved out by the depth, they touch."""
     rng = np.random.default_rng(n)
     world, bodies, _, filtered = filtered_scene(d, n, rng)
-    m = 150
+    m = 60
     places = bodies.centre[rng.integers(0, n, m)] + 0.5 * rng.standard_normal((m, d))
     halves, others = 2.0 * rng.random((m, d)), rng.choice(bodies.entity, (m, 3))
     layers, own, groups = filters(rng, m)
@@ -87,7 +87,7 @@ def test_overlaps_of_many_bodies(d, n, sphere):
         for hit, normal, point in zip(singles, hits.normals[some], hits.points[some], strict=True):
             assert (hit.normal.tolist(), hit.point.tolist()) == (normal.tolist(), point.tolist())
         count += len(singles)
-    assert count > 50
+    assert count > 20
     assert world.bodies.entity[hits.rows].tolist() == hits.entities.tolist()
 
 
@@ -96,7 +96,7 @@ def test_casts_meet_what_a_body_would_meet(d):
     """The nearest of those that layers, masks and groups let meet, that the call asks for and does not leave out."""
     rng = np.random.default_rng(d)
     world, bodies, side, filtered = filtered_scene(d, 800, rng)
-    m = 60
+    m = 30
     starts, ways = rng.random((m, d)) * side, directions(rng, m, d)
     (layers, own, groups), masks, others = filters(rng, m), rng.integers(0, 16, m), rng.choice(bodies.entity, (m, 2))
     balls = SphereCollider.many(radius=np.full(m, 0.4), layer=layers, mask=own, group=groups)
@@ -111,7 +111,7 @@ def test_casts_meet_what_a_body_would_meet(d):
             if (np.abs(least[wanted]) > GRAZE).all():
                 nearest = np.where(wanted, distances, math.inf).min(initial=math.inf)
                 assert found.distance[i] == pytest.approx(nearest, abs=1e-6)
-    assert 10 < hits.found.sum() < m
+    assert 5 < hits.found.sum() < m
 
 
 @both_dimensions
