@@ -40,19 +40,19 @@ def pressed_at_random(random, names, frames):
 
 
 def fuzz(game, seconds, check, seed=0, **how):
-    """Plays so long with random keys, games that end begin again; every other 5 s twice, with the same bits."""
+    """Plays so long with random keys, games that end begin again; every other 2 s twice, with the same bits."""
     random = np.random.default_rng(seed)
     left, worlds, world = round(seconds / DT), 0, None
     while left > 0:
         if world is None:
             world = game.play([set(game.KEYS), set()], seed=seed + worlds, **how)
             worlds += 1
-        start, frames = world.snapshot(), list(pressed_at_random(random, game.KEYS, min(left, 300)))
+        start, frames = world.snapshot(), list(pressed_at_random(random, game.KEYS, min(left, 120)))
         game.play(frames, world)
         check(world)
         assert not world.faults
         left -= len(frames)
-        if left // 300 % 2:
+        if left // 120 % 2:
             first = world.state_hash()
             world.restore(start)
             assert game.play(frames, world).state_hash() == first
