@@ -78,7 +78,7 @@ def test_all_that_holds_an_array_keeps_it():
     worlds[0].step()
     hashed, saved = worlds[0].state_hash(), copy.deepcopy(worlds[0].snapshot())
     before = int(POOL.starts[-1])
-    for number in range(5000):
+    for number in range(1500):
         worlds[0].component_for_entity(changing, ConvexPolygonCollider).vertices = polygon(number)
     assert len(POOL.data) <= 2 * (before + (16 + 2) * 12)
     gc.collect()

@@ -18,7 +18,7 @@ from carom.framework.schedule.plan import PlannedKernel
 from carom.plugins import Physics, capsule
 from carom.systems.broad_phase.brute_force import BRUTE_FORCE_MAX
 
-STEPS = 40
+STEPS = 15
 COUNT = 150  # bodies created at once, more than the capacity of a new table: exactly that many rows
 
 
