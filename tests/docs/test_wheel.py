@@ -39,8 +39,6 @@ from carom.framework import Settings, World
 from carom.framework.compilation import log
 from carom.plugins import Physics, capsule, convex_polygon, tile_grid
 
-STEPS = 200
-
 def platformer(mode):
     plugins = capsule.plugin, convex_polygon.plugin, tile_grid.plugin
     world = World(Physics(2, gravity=(0.0, -9.81)), *plugins, settings=Settings(collision=mode))
@@ -77,15 +75,10 @@ for name, build in worlds.items():
     world = build()
     world.step()
     before = len(log.compiled), log.loaded
-    for step in range(STEPS if "platformer" not in name else 120):
+    for step in range(200 if name == "pile" else 60):
         world.step()
     ask(world)
     print(f"{name}: {world.state_hash()} compiled {len(log.compiled)} later {len(log.compiled) - before[0]}")
-for name in scenes.names() if len(sys.argv) == 1 else ():
-    world = scenes.get(name).build()
-    for step in range(10):
-        world.step()
-    ask(world)
 print("kernels", [kernel for kernel, _ in log.compiled])
 """
 

@@ -88,7 +88,7 @@ def test_nobody_passes_the_hills(mode, seed):
         )[k % 4]
         spin = None if k % 4 == 3 else random.uniform(-2.0, 2.0, 3)
         throw(world, random.uniform((2, 3, 2), (22, 8, 22)), random.uniform(-6, 6, 3), shape, spin)
-    for _ in range(150):
+    for _ in range(80):
         world.step()
         places = world.bodies.dynamic.position
         assert (places[:, 1] > height_at(heights, places)).all()
