@@ -20,7 +20,7 @@ from carom.lab.cli.usage_errors import Problem
 from carom.lab.jobs import Jobs
 
 needs_signals = pytest.mark.skipif(os.name == "nt", reason="there are no signals of this kind")
-SHORT = ("--dt", "1/60,1/120", "--repeats", "2", "--no-timing", "--collisions", "discrete", "--seconds", "0.5")
+SHORT = ("--dt", "1/60", "--repeats", "2", "--no-timing", "--collisions", "discrete", "--seconds", "0.2")
 NOTED = '    print("said")\n    open(Path(__file__).with_name("ran"), "a").write(".")\n    world = World'
 COUNTING = BALL.replace("    world = World", NOTED, 1)
 DEADLY = BALL.replace("    world = World", "    import multiprocessing, os, signal\n"
