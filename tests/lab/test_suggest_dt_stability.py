@@ -83,7 +83,8 @@ def test_the_limits_are_those_of_the_table(method):
             found = step_limits(world)
             assert world.state_hash() == before
             assert found.stability * w == pytest.approx(limit, abs=DIGITS)
-            assert found.suggested == suggest_dt(world) == SAFETY * found.stability
+            assert found.suggested == SAFETY * found.stability
+            assert k or found.suggested == suggest_dt(world)
             assert found.oscillation.frequency == pytest.approx(w * math.sqrt(stiffness), rel=NOISE)
             assert found.oscillation.drag == pytest.approx(w * drag, rel=NOISE)
             assert found.oscillation.entity == (1 if world is place else 2)
