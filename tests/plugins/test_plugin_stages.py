@@ -366,7 +366,7 @@ print(world.state_hash(), any("swirling" in name for name, _ in log.compiled), l
 def test_a_cold_and_a_warm_cache_give_the_same_bits(tmp_path):
     folder = tmp_path / "cache"
     (cold, compiled, _), (warm, _, again) = (
-        output_of(PROGRAM, CAROM_CACHE_DIR=str(folder), CAROM_BACKGROUND="0", CAROM_LIBRARY="0").split()
+        output_of(PROGRAM, CAROM_CACHE_DIR=str(folder), CAROM_BACKGROUND="0").split()
         for _ in range(2)
     )
     assert cold == warm
