@@ -122,11 +122,14 @@ MISTAKES = {  # that four poses of samples do not show: what is said of them, an
 
 WITHOUT_SUPPORT = ("depth too small, without a support", "never touching")
 OFTEN = "apart where they touch", "raises", "does not compile", "never touching", "sweep of large ones"
+FIND_SIMPLEST = "carom.lab.plugins.check.simplest"  # takes most of the time, and does the same for all laws
 
 
 @pytest.mark.parametrize("mistake", [pytest.param(k, marks=() if k in OFTEN else pytest.mark.long) for k in MISTAKES])
-def test_mistakes_that_pass_at_registration_are_found(check, mistake):
+def test_mistakes_that_pass_at_registration_are_found(check, mistake, monkeypatch):
     change, expected = MISTAKES[mistake]
+    if mistake == "sweep of large ones":
+        monkeypatch.setattr(FIND_SIMPLEST, lambda is_wanted: None)
     code, said = check(change, *([NO_SUPPORT] if mistake in WITHOUT_SUPPORT else []))
     assert code == 1, said
     for words in expected:
@@ -282,6 +285,7 @@ plugin = Plugin("ropes")
 
 @plugin.joint
 class Rope(Joint):
+    dimensions = (2,)
     a = column(dtype=int)
     b = column(dtype=int)
     hook = column(item="vector")
@@ -300,10 +304,11 @@ class Rope(Joint):
     [pytest.param("1.0", 0, marks=pytest.mark.long), ("(1.0 if length(way) < 2.0 else 2.0)", 1), ("2.0", 2)],
     ids=["right", "far", "2"],
 )
-def test_joints_are_compared_with_the_change_of_their_value(carom, tmp_path, factor, code):
+def test_joints_are_compared_with_the_change_of_their_value(carom, tmp_path, factor, code, monkeypatch):
+    monkeypatch.setattr(FIND_SIMPLEST, lambda is_wanted: None)
     (tmp_path / "ropes.py").write_text(ROPE.replace("FACTOR", factor))
     result = carom("plugins", "check", "ropes.py")
     assert result.exit_code == code, (result.stdout, result.stderr, result.exception)
     said = refusal(result) if code == 2 else result.stdout
     assert ("row 0: its value changes by" in said) is ("turns by moment(arm, push)" in said) is bool(code)
-    assert code == 2 or sum(line.startswith("joint Rope") and " 400 " in line for line in said.splitlines()) == 2
+    assert code == 2 or sum(line.startswith("joint Rope") and " 400 " in line for line in said.splitlines()) == 1
