@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
@@ -123,14 +122,11 @@ MOTIONS = {  # forces, the spin and the angle of the body, what is seen, its exa
 @methods
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_errors_fall_with_the_step_as_the_integrator_says(motion, method):
-    """Over three halvings."""
+    """From four to eight times the steps."""
     add, spin, start, seen, exact, steps = MOTIONS[motion]
-    exact, counts = exact(), (steps, 2 * steps, 4 * steps, 8 * steps)
-    errors = [
-        np.linalg.norm(end_of(method, 1 / n, add, spin.copy(), start, seen=seen) - exact) for n in counts
-    ]
-    orders = [math.log2(one / two) for one, two in itertools.pairwise(errors)]
-    assert orders[-1] == pytest.approx(ORDERS[method], abs=0.2), (errors, orders)
+    exact, counts = exact(), (4 * steps, 8 * steps)
+    errors = [np.linalg.norm(end_of(method, 1 / n, add, spin.copy(), start, seen=seen) - exact) for n in counts]
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(ORDERS[method], abs=0.2), errors
 
 
 @pytest.mark.compiled
