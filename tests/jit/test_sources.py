@@ -7,8 +7,10 @@ from __future__ import annotations
 import ast
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
+import pytest
 from helpers_folders import FLOORS, ROOT, imported, package_of
 
 from carom.framework.jit.records.schema import Schema
@@ -57,13 +59,26 @@ def name_of(decorator):
     return getattr(decorator, "attr", getattr(decorator, "id", None))
 
 
+@cache
+def all_nodes() -> list[tuple[str, ast.AST]]:
+    """(place, node) of all nodes of the engine's sources that a test asks for."""
+    return [
+        (f"{path.relative_to(ROOT)}:{node.lineno}", node)
+        for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, (ast.FunctionDef, ast.Call, ast.Attribute, ast.BinOp))
+    ]  # fmt: skip
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _forget():
+    yield
+    all_nodes.cache_clear()
+
+
 def nodes(kind: type[ast.AST]) -> Iterator[tuple[str, ast.AST]]:
-    """(place, node) of all nodes of that kind in the engine's sources."""
-    for folder in FOLDERS:
-        for path in sorted((ROOT / folder).rglob("*.py")):
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-                if isinstance(node, kind):
-                    yield f"{path.relative_to(ROOT)}:{node.lineno}", node
+    """Those of that kind."""
+    return (each for each in all_nodes() if isinstance(each[1], kind))
 
 
 def kernels():
