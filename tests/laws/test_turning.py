@@ -103,7 +103,7 @@ def fall(seed, mode, d):
 
 @pytest.mark.parametrize("mode", MODES)
 def test_what_falls_flat_does_not_turn_by_a_bit(mode):
-    assert [fall(seed, mode, 2) for seed in range(20)] == [0.0] * 20
+    assert [fall(seed, mode, 2) for seed in range(8)] == [0.0] * 8
 
 
 @pytest.mark.parametrize("mode", MODES)
