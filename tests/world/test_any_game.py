@@ -441,8 +441,8 @@ def play_for(steps):
 
 
 @pytest.mark.slow
-def test_games_of_some_thousand_steps():
-    play_for(1_000)
+def test_games_of_some_hundred_steps():
+    play_for(600)
 
 
 @pytest.mark.long

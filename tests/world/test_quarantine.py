@@ -310,8 +310,8 @@ def test_too_far_from_the_origin_to_move(d, mode):
 
 
 # Each mode takes every second or third body, each mode others. The flat worlds wait for the long run:
-# jit/test_checked_build.py does the same with them; of those in 3D every fourth body does.
-SHARES = {"mixed 2D": 3, "mixed 3D": 6, "platformer": 1, "tumbling 2D": 2, "tumbling 3D": 6}
+# jit/test_checked_build.py does the same with them; of those in 3D every fifth body does.
+SHARES = {"mixed 2D": 3, "mixed 3D": 8, "platformer": 1, "tumbling 2D": 2, "tumbling 3D": 8}
 
 
 def cases():
