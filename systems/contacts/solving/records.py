@@ -161,7 +161,7 @@ WARM_START_ROWS = Section(
     "contact", "contacts at rest", RESTED,
     entity_a=ints(stacked=True),
     entity_b=ints(stacked=True),
-    place=vectors(stacked=True, unit="m"),  # of the point, where bodies spin
+    place=vectors(stacked=True, unit="m"),  # of the point; nan where no body spun
     normal=vectors(stacked=True, unit="1"),
     impulse=floats(stacked=True, unit="N s"),  # of the last substep, as if the step were one,
     tangent=vectors(stacked=True, unit="N s"),  # and along the surface

@@ -6,6 +6,8 @@ substep, and what it gave in the whole step (total).
 
 from __future__ import annotations
 
+import math
+
 from ....framework.compilation import inlined, part
 from ....framework.data.row_moves import place_of
 from ....framework.jit.records.record_type import zero_of
@@ -127,7 +129,7 @@ def store_warm_start(state, dt):
     solver, memory, pairs, entity = state.solver, state.warm_start, state.pairs, state.bodies.entity
     if state.response_idle or (solver.contacts == 0 and memory.counts[memory.now] == 0):
         return OK
-    new, count = 1 - memory.now, 0
+    new, count, nowhere = 1 - memory.now, 0, scale(zero_of(state), math.nan)
     for r in range(solver.contacts):
         k, c = solver.slot[r], solver.pair[r]
         if not solver.total[k] * dt > NEGLIGIBLE * solver.extent[k] * solver.mass[k]:  # of rounding; also nan
@@ -140,8 +142,7 @@ def store_warm_start(state, dt):
         kept = most / last if last > most else 1.0
         memory.impulse[new, count], memory.tangent[new, count] = kept * last, scale(solver.tangent[k], kept)
         memory.normal[new, count] = solver.normal[k]
-        if state.spinning:
-            memory.place[new, count] = solver.place[k]
+        memory.place[new, count] = solver.place[k] if state.spinning else nowhere
         count += 1
     memory.counts[new], memory.rows_version[new] = count, state.version
     memory.step[new] = dt
