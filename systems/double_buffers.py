@@ -5,7 +5,6 @@ Both are kept for the last step and the one before (``[now, i]`` and ``[1 - now,
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -15,8 +14,7 @@ from ..framework.jit.records.schema import Column, Section
 
 WARM_START_NUMBERS = ("step",)  # numbers of which there are two, beside the counts
 CONTACT_NUMBERS = ("steps", "stays")
-BEFORE_STEP = {"load": 0, "value": 1, "pull": 2, "normal": 5, "along_a": 8}  # of joints, what a step starts with: from
-# which number of ``before`` on
+BEFORE_STEP = ("load", "pull", "normal", "along_a", "value")  # of joints, what a step starts with
 
 
 def saved_rows(record: Record, numbers: tuple[str, ...]) -> dict[str, Any]:
@@ -41,15 +39,8 @@ def put_joints_back(state: Record) -> None:
     """The forces and values that joints had before the step, if it has begun with them."""
     joints = state.solver.joints
     if joints.kept_in == state.step_number + 1:
-        for column, before in joint_columns(joints):
-            column[:] = before
-
-
-def joint_columns(joints: Record) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """What joints start a step with, and where it stands as it was before the step."""
-    for name, at in BEFORE_STEP.items():
-        column = getattr(joints, name)
-        yield column, joints.before[:, at : at + column.shape[1]] if column.ndim == 2 else joints.before[:, at]
+        for name in BEFORE_STEP:
+            getattr(joints, name)[:] = getattr(joints, f"old_{name}")
 
 
 def _stacked(record: Record) -> list[str]:

@@ -12,7 +12,7 @@ from ...components.part_of import Changes as PartChanges
 from ...components.part_of import PartOf
 from ...components.spin import Spin
 from ...framework import Plugin, World
-from ...systems.double_buffers import joint_columns
+from ...systems.double_buffers import BEFORE_STEP
 from ...systems.joints.own import Placed, rows_of
 from ...systems.joints.records import CUSTOM, FREE, HOLD, JOINTS, TURN
 from ...systems.joints.records import DRIVE as DRIVE  # for those who write a joint
@@ -221,8 +221,9 @@ class Joints(Plugin):
                 self._set.add(entity)
         self._joints = dict(sorted(self._joints.items()))
         self._released = {*saved.get("released", ()), *self._rows.put_back(saved)}
-        for column, before in joint_columns(self._record):
-            before[:] = column
+        record = self._record
+        for name in BEFORE_STEP:
+            getattr(record, f"old_{name}")[:] = getattr(record, name)
 
     # -- before a step ----------------------------------------------------------------------------
 

@@ -38,16 +38,6 @@ def row_near(state, entity, row):
     return row_of(state, entity)
 
 
-@inlined
-def keep_before(joints, j):
-    """What row j starts the step with; see double_buffers."""
-    kept = joints.before
-    kept[j, 0], kept[j, 1] = joints.load[j], joints.value[j]
-    pull, normal, along = joints.pull[j], joints.normal[j], joints.along_a[j]
-    for k in range(len(pull)):
-        kept[j, 2 + k], kept[j, 5 + k], kept[j, 8 + k] = item(pull, k), item(normal, k), item(along, k)
-
-
 @part
 def find_active(state):
     """The rows of joints that hold a body which may move, in their order."""
@@ -59,7 +49,8 @@ def find_active(state):
         joints.rows_version = state.version
     for j in range(joints.count):
         a, b = joints.row_a[j], joints.row_b[j]
-        keep_before(joints, j)
+        joints.old_load[j], joints.old_pull[j], joints.old_value[j] = joints.load[j], joints.pull[j], joints.value[j]
+        joints.old_normal[j], joints.old_along_a[j] = joints.normal[j], joints.along_a[j]
         joints.total[j], joints.thrust[j] = 0.0, zero_of(state)
         gone = (a < 0 and joints.entity_a[j] > 0) or (b < 0 and joints.entity_b[j] > 0)
         if gone or is_left_out(state, a) or is_left_out(state, b) or joints.rule[j] == FREE:

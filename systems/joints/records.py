@@ -42,7 +42,11 @@ JOINTS = Schema(
     along_a=vectors(unit="1"),  # of a CUSTOM: the same for the first body
     value=floats(unit="m or rad"),  # of a CUSTOM, after the last substep; of the first row of a joint in space with a
     # TURN or TWIST the angle of that, with whole turns: it stays with the joint while that holds the same bodies
-    before=table("float64", 11, unit="N, N m, m, rad or 1"),  # the same before the step: load, value, then vectors
+    old_load=floats(unit="N or N m"),  # the same before the step
+    old_pull=vectors(unit="N"),
+    old_normal=vectors(unit="1"),
+    old_along_a=vectors(unit="1"),
+    old_value=floats(unit="m or rad"),
     # pairs of bodies that joints keep from touching, the smaller id first, in order
     apart=integer(),
     apart_a=ints(),
