@@ -17,10 +17,10 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, item, replace, scale, sub
 from ..contacts.constants import DIRECT_STIFFNESS, DIRECT_STIFFNESS_MAX, FRAME_BEND
-from ..integration.turning import change_of_spin, cross_spin, twist
+from ..integration.turning import change_of_spin, compliance, cross_spin, twist
 from .custom import speed_of_custom
 from .order import NO_BLOCK, block_of, freedoms
-from .records import CUSTOM, HELD_AT_ONCE, LIMITED_AT_ONCE, POINT, TURN
+from .records import CUSTOM, HELD_AT_ONCE, LIMIT, LIMITED_AT_ONCE, POINT, TURN
 
 PUSH_PASS, RELAX_PASS, RESULT_OF = 0, 1, 2  # what is asked of rows; even: errors are pushed out
 
@@ -97,16 +97,18 @@ def carried_mass(solver, j):
 @inlined
 def inverse_mass_of(solver, j):
     """How stiff a row is: as if it bore the heaviest body of its group; of angles, at the end of a beam of welds."""
-    joints, a, b = solver.joints, solver.joints.first[j], solver.joints.second[j]
+    joints, a, b, axis = solver.joints, solver.joints.first[j], solver.joints.second[j], solver.joints.normal[j]
+    stiffness = solver.direct.stiffer * joints.stiffness * carried_mass(solver, j)
     w = max(solver.inverse_mass[a], solver.inverse_mass[b])
-    share = min(solver.direct.stiffer * joints.stiffness * carried_mass(solver, j) * w, DIRECT_STIFFNESS_MAX)
-    if joints.kind[j] < TURN:
-        return share / w
     if joints.kind[j] == CUSTOM:
-        return share * joints.mass[j]
-    axis = joints.normal[j]
-    moved = dot(axis, change_of_spin(solver, a, axis)) + dot(axis, change_of_spin(solver, b, axis))
-    return share / moved if moved > 0.0 else 0.0
+        return min(stiffness * w, DIRECT_STIFFNESS_MAX) * joints.mass[j]
+    if joints.kind[j] >= TURN:
+        moved = dot(axis, change_of_spin(solver, a, axis)) + dot(axis, change_of_spin(solver, b, axis))
+        return min(stiffness * w, DIRECT_STIFFNESS_MAX) / moved if moved > 0.0 else 0.0
+    if joints.kind[j] == POINT:
+        return min(stiffness, DIRECT_STIFFNESS_MAX * joints.mass[j])
+    moved = compliance(solver, a, joints.arm_a[j], axis) + compliance(solver, b, joints.arm_b[j], axis)
+    return min(stiffness, DIRECT_STIFFNESS_MAX / (solver.inverse_mass[a] + solver.inverse_mass[b] + moved))
 
 
 @inlined
@@ -381,8 +383,10 @@ def solve_limited(solver, j, pushes):
     for e in range(direct.begin, direct.end):
         q = direct.body[e]
         direct.push[q], direct.twist[q] = from_energy_norm(solver, q, zero)
-    moved = change_at(solver, j, 0)
-    new = min(joints.greatest[j], max(joints.least[j], old + missing / moved if moved > 0.0 else old))
+    moved, weight = change_at(solver, j, 0), inverse_mass_of(solver, j)
+    gives = direct.stiffer / weight if joints.rule[j] != LIMIT and weight > 0.0 else 0.0
+    change = (missing - gives * old) / (moved + gives) if moved > 0.0 else 0.0
+    new = min(joints.greatest[j], max(joints.least[j], old + change))
     impulse[j] = new
     if new == old:
         return
