@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...systems.joints.measuring import FOLDED, FULL_TURN
 from ...systems.joints.records import CUSTOM, POINT, TURN
-from ...systems.joints.rows import FOLDED, FULL_TURN
 from .joint import WORLD, Joint
 from .kinds import Cone, Distance, Hinge, Motor, Slider, Weld, Wheel
 

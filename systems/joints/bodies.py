@@ -15,8 +15,8 @@ from ..parts.rows import next_row, owner_of
 from ..shapes.poses import has_unequal_moments, row_of_axes
 from .coupling import first_of
 from .groups import join_held, may_move
+from .measuring import turn_about
 from .records import CUSTOM, DRIVE, FREE, POINT, SLIDE, TURN, TWIST
-from .rows import turn_about
 
 
 @inlined

@@ -11,8 +11,8 @@ from ...framework.jit.source import source_module
 from ...framework.vectors import add, dot
 from ..shapes.linking.user_functions import user_function
 from .custom import custom_signature
+from .measuring import turned_with
 from .own import OwnJoint, Placed, fields_of, seen_columns
-from .rows import turned_with
 
 
 def _fields_source(component: type[Component], dimensions: int) -> str:

@@ -1,4 +1,4 @@
-"""Rows of joints, which a plugin writes where joints or their fields change; see rows."""
+"""Rows of joints, which a plugin writes where joints or their fields change; see measuring."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ JOINTS = Schema(
     # in a substep
     arm_a=vectors(unit="m"),
     arm_b=vectors(unit="m"),
-    gap=vectors(unit="m"),  # of a POINT
+    gap=vectors(unit="m"),  # of a POINT, and what else holds a length
     turn_a=vectors(unit="1 or m"),  # of a CUSTOM: about which it turns them
     turn_b=vectors(unit="1 or m"),
     mass=floats(unit="kg or kg m^2"),

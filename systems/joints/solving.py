@@ -9,8 +9,9 @@ from ..integration.turning import cross_spin
 from . import calls
 from .custom import rates_of_custom
 from .direct import solve_direct
+from .measuring import measure_joints
 from .records import CUSTOM, POINT, TURN
-from .rows import add_joints, keep_joints, measure_joints, relax_open, solve_joints, start_joints, warm_start_joints
+from .rows import add_joints, keep_joints, relax_open, solve_joints, start_joints, warm_start_joints
 
 
 @part

@@ -11,7 +11,7 @@ import pytest
 from carom.components import RigidBody, Transform
 from carom.framework import Settings, World
 from carom.plugins import Physics
-from carom.plugins.joints import Ball, Hinge, Joints, MousePull, Slider, Weld
+from carom.plugins.joints import Ball, Distance, Hinge, Joints, MousePull, Slider, Weld
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 MODES = "discrete", "continuous", "event_driven"
@@ -247,5 +247,20 @@ def test_a_joint_that_is_torn_is_told():
         one = bar(world, 2, (0, 0), (2, 0), 1.0)
         world.component_for_entity(one, Spin).angular_velocity = 1000.0
         torn = hinge(world, 2, None, one, (0, 0))
+        world.step()
+        assert any("joints are torn open" in str(fault) and f"entity {torn}" in str(fault) for fault in world.faults)
+
+
+@pytest.mark.parametrize("joint", [Slider, Distance])
+def test_a_joint_that_a_game_tears_is_told(joint):
+    """A body is set 3 m beside where its joint holds it."""
+    world = World(Physics(dimensions=2), Rotation(), Joints(), settings=Settings(on_fault="ignore"))
+    with world:
+        bar = world.create_entity(Transform((1, 0)), RigidBody(1.0), BoxCollider((0.2, 0.2)), Spin())
+        options = {"direction": (1, 0)} if joint is Slider else {"point_a": (0, 0)}
+        torn = world.create_entity(joint(a=None, b=bar, **options))
+        world.step()
+        assert not list(world.faults)
+        world.component_for_entity(bar, Transform).position = (1, 3)
         world.step()
         assert any("joints are torn open" in str(fault) and f"entity {torn}" in str(fault) for fault in world.faults)
