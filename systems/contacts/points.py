@@ -222,13 +222,15 @@ def lay_first_touch(state, dt, r):
 
 def lay_arms(state, dt):
     """The points of all contacts at rest."""
-    solver, pairs = state.solver, state.pairs
+    solver, pairs, offset = state.solver, state.pairs, state.bodies.offset
     solver.lopsided = False
     for r in range(solver.contacts):
         if solver.point[r] == 0:
+            a, b = pairs.a[solver.pair[r]], pairs.b[solver.pair[r]]
             build_arms(state, dt, r, solver.gap[solver.slot[r]])
-            note_middles(state, r, False)
-            if turns_far(state, pairs.a[solver.pair[r]], pairs.b[solver.pair[r]]):
+            if dot(offset[a], offset[a]) + dot(offset[b], offset[b]) > 0.0:
+                note_middles(state, r, False)
+            if turns_far(state, a, b):
                 lay_first_touch(state, dt, r)
     for r in range(solver.contacts if solver.lopsided else 0):
         note_middles(state, r, True)

@@ -6,7 +6,7 @@ import math
 
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add_scaled, dot, item, length, replace, sub
+from ...framework.vectors import add, add_scaled, dot, item, length, replace, sub
 from ..ccd.search_bounds import FAST, is_swept, turns_far
 from ..ccd.turning_touch import is_followed
 from ..codes import NEED_REST, OK
@@ -215,6 +215,15 @@ def entry(state, a, b, d, travel, at_end, slop):
 
 
 @part
+def plane_of_end(state, a, b, d, travel, slop):
+    """(whether two convex shapes touch where the step ends and have all of the way there, from d, on the side of that
+    plane, but for the slop; gap at the start, normal). What slides off one of them onto another meets no corner."""
+    _, depth, n, _ = evaluate_pair(state, a, b, add(d, travel))
+    start = depth + dot(travel, n)
+    return depth >= 0.0 and max(depth, start) <= slop, -start, n
+
+
+@part
 def normal_varies(state, a, b, d, normal):
     """Whether the normal is another one a little beside, so that it stands for several faces of a concave shape."""
     near, varies = NORMAL_PROBE * smaller_extent(state.bodies, a, b), False
@@ -255,8 +264,12 @@ def linearise(state, dt):
         slides = convex and not struck and gap + dot(way, normal) >= -STAYS_SLOPS * slop  # its plane parts them
         moves, nears = not is_stationary(way, slop), apart and not slides
         if moves and (nears or parting != STATIONARY or meets_at_corner(state, a, b, d, (-gap, normal), slop)):
-            far, gap, normal = touch_of_long_way(state, dt, a, b, end)
-            if not far or parting != STATIONARY:
+            flush = far = False
+            if convex and parting == STATIONARY:
+                flush, gap, normal = plane_of_end(state, a, b, d, way, slop)
+            if not flush:
+                far, gap, normal = touch_of_long_way(state, dt, a, b, end)
+            if not flush and (not far or parting != STATIONARY):
                 gap, normal = entry(state, a, b, d, way, parting != STATIONARY, slop)
             forget_manifold(pairs, c)
         if gap == math.inf:  # deep in a map that has no face there, at neither end: one that it does not reach

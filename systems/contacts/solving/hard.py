@@ -12,7 +12,7 @@ from ...ccd.search_bounds import turns_far
 from ...integration.turning import is_turned
 from ..approach import centre_offset, centre_offset_at_start
 from ..constants import ALIGNED, NEGLIGIBLE, UNREACHED
-from .rows import closing_speed, separation, separation_from_rotation
+from .rows import closing_speed, separation_from_rotation
 
 
 @part
@@ -52,7 +52,7 @@ def select_rigid(state, dt, nothing, arms):
             way[a] = sub(way[a], solver.normal[k])
         elif not (pressed[a] > 0.0 and pressed[b] > 0.0) and is_loaded(solver, k, dt):
             pressed[a] = pressed[b] = 1.0
-    any_hard = any_apart = False
+    any_apart = False
     for k in range(solver.contacts):
         a, b, n = solver.first[k], solver.second[k], solver.normal[k]
         solver.hard[k] = False
@@ -62,7 +62,6 @@ def select_rigid(state, dt, nothing, arms):
             rested = state.any_warm_started and warm_started[solver.body_row[body]]
             hard = rested and along > ALIGNED and not (pressed[body] > 0.0 or solver.varies[k])
             solver.hard[k] = hard
-            any_hard |= hard
             any_apart |= hard and solver.apart[k]
             if hard and solver.apart[k]:
                 least = 0.0
@@ -71,7 +70,6 @@ def select_rigid(state, dt, nothing, arms):
                 solver.gap[k] = max(least, solver.gap[k])  # faces that meet in the end do not overlap at the start
                 if closing_speed(solver, k, arms) < 0.0:  # the body has passed the corner
                     solver.impulse[k], solver.tangent[k] = 0.0, nothing
-    solver.any_hard = any_hard
     if any_apart:
         disable_out_of_reach(state)
 
@@ -96,24 +94,3 @@ def disable_out_of_reach(state):
             travel = sub(centre_offset(bodies, a, b), centre_offset_at_start(bodies, a, b))
             if held[body] > 0.0 and solver.gap[k] + dot(travel, solver.normal[k]) > NEGLIGIBLE * solver.extent[k]:
                 solver.gap[k] += UNREACHED * solver.extent[k]
-
-
-@part
-def defer_open_contacts(solver, h, span, arms):
-    """A hard contact that was open when the step began and is not overlapped when it ends is left to the next step if
-    its body is held by another one: it slides on, and by then it may have passed the corner that it would stop at."""
-    start, stop, begin, end = span
-    held = solver.held
-    for q in range(begin, end):
-        held[q] = 0.0
-    for k in range(start, stop):
-        if solver.hard[k]:
-            body = moved_body(solver, k)
-            held[body] = max(held[body], solver.impulse[k])
-    for k in range(start, stop):
-        if solver.hard[k] and solver.apart[k]:
-            body = moved_body(solver, k)
-            room = separation(solver, k, arms)
-            idle = solver.impulse[k] <= NEGLIGIBLE * held[body]
-            if held[body] > 0.0 and idle and room > -NEGLIGIBLE * solver.extent[k]:
-                solver.target_speed[k] = UNREACHED * solver.extent[k] / h

@@ -48,7 +48,6 @@ SOLVER = Schema(
     soft=floats(unit="1"),  # share of its impulse that it gives back in the pass that pushes
     fixed=flags(),  # it has several points, and one of its bodies cannot be moved
     hard=flags(),
-    any_hard=flag(),
     has_friction=flag(),
     tips=flag(),  # some pair has several points
     has_rolling=flag(),

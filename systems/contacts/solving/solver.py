@@ -33,7 +33,7 @@ from ..constants import (
 from .chunks import find_chunks, load_masses
 from .faults import RESTRAINED, note_fault
 from .guard import finish_substep, island_of, islands_of, open_all
-from .hard import defer_open_contacts, select_rigid
+from .hard import select_rigid
 from .islands import is_hard_island
 from .overload import cap_mass_ratio, restore_mass
 from .passes import close_nearest_first, note_impulses, solve_passes
@@ -58,7 +58,7 @@ def measure(solver, h, springs, dt, stiff, ends, span, arms):
     pushing: in the pass that pushes, overlap is to open as well, softly where ``soft`` says so. Islands are ``struck``
     where the speed of some row is far from what the relaxing passes are to make of it; returns whether any is.
     """
-    asks = dt / solver.usual if ends else h, h, dt, springs, stiff
+    asks = dt / solver.usual if ends else h, ends, h, dt, springs, stiff
     if len(arms) > 0:
         turn_arms(solver, 1.0, span, arms)
     any_struck, islands = False, islands_of(solver, span)
@@ -147,8 +147,6 @@ def solve_substep(solver, springs, times, rule, ends, span, arms):
     if capped:
         restore_mass(solver, h, span, arms)
     any_struck = measure(solver, h, springs, dt, stiff, ends, span, arms)
-    if ends and solver.any_hard:
-        defer_open_contacts(solver, h, span, arms)
     for_joints(solver, calls.RELAX, times, span, arms)
     solve_passes(solver, False, last if ends else passes, stiff, h, span, arms)
     for_joints(solver, calls.RELAX_AGAIN, times, span, arms)
