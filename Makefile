@@ -20,6 +20,7 @@ test-all: .venv/test
 	$(PYTEST) $(ARGS)
 test-long: .venv/test  # more cases and steps of what the others test, before a release
 	$(PYTEST) -m long $(ARGS)
+	NUMBA_DISABLE_JIT=1 $(PYTEST) -m long tests/jit/test_plain_python.py
 test-numba: .venv/test  # some laws on kernels that numba has compiled here, not on the library of them
 	CAROM_LIBRARY=0 $(PYTEST) -m "not slow" $(addprefix tests/laws/test_,energy.py loads.py symmetry.py turning.py) $(ARGS)
 coverage: .venv/test  # which lines of the engine the tests run: kernels as plain Python, with the same bits as compiled

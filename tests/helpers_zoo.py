@@ -168,6 +168,25 @@ def joined(d: int, mode: str) -> World:
     return world
 
 
+def struck(d: int, mode: str) -> World:
+    """A ball strikes a beam of welds with a flap at its end."""
+    world = World(Physics(d, gravity=at(d, 0.0, -9.81)), Rotation(), Joints(), settings=Settings(collision=mode))
+    look, half = {"restitution": 0.5, "friction": 0.4}, (0.5, 0.25, 0.5)[:d]
+    beam = [
+        world.create_entity(Transform(at(d, 1.1 * k)), RigidBody(1.0 + k), Spin(), BoxCollider(half, **look))
+        for k in range(3)
+    ]
+    about: dict[str, object] = {"axis": (0.0, 0.0, 1.0)} if d == 3 else {}
+    for joint in (
+        Weld(None, beam[0], at(d, -0.5)), Weld(beam[0], beam[1], at(d, 0.55), breaking_force=1e4),
+        Hinge(beam[1], beam[2], at(d, 1.65), limits=(-0.1, 0.2), **about),
+    ):  # fmt: skip
+        world.create_entity(joint)
+    ball = RigidBody(0.5, at(d, 2.0, -20.0))
+    world.create_entity(Transform(at(d, 1.0, 0.9, 0.1)), ball, Spin(), SphereCollider(0.25, **look))
+    return world
+
+
 def ground(d: int, mode: str) -> World:
     """What rolls, slides, lands and is buried on hills."""
     plugins = Rotation(), terrain.plugin, capsule.plugin
@@ -424,6 +443,7 @@ def scenarios() -> Iterator[tuple[str, Callable[[], list[str]]]]:
         yield f"heavy on light {d}D", lambda d=d: play(heavy_on_light(d), 2)
         yield f"asked {d}D", lambda d=d: asked(d)
         yield f"tumbling {d}D", lambda d=d: play(tumbling(d, MODES[d - 2]), 12 - 3 * d)
+        yield f"struck {d}D", lambda d=d: play(struck(d, MODES[d - 1]), 3)
         yield f"joined {d}D", lambda d=d: play(joined(d, MODES[0]), 12 - 3 * d)
         yield f"characters {d}D", lambda d=d: characters(d)
         yield f"zones {d}D", lambda d=d: zones(d)

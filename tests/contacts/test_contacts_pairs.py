@@ -256,7 +256,6 @@ def test_a_closed_world_says_so():
     assert [len(column) for column in empty.between(Tag, Tag)] == [0, 0, 0]
 
 
-@pytest.mark.plain
 def test_what_is_no_type():
     world, _ = crowd(count=12)
     for verb in (world.contacts.pairs, world.contacts.between):

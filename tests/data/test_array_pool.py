@@ -97,6 +97,7 @@ def test_all_that_holds_an_array_keeps_it():
     assert np.array_equal(worlds[0].component_for_entity(changing, ConvexPolygonCollider).vertices, polygon(-5))
 
 
+@pytest.mark.compiled
 def test_a_step_that_fails_has_its_arrays_back():
     world = make_world(2)
     world.add_plugin(convex_polygon)

@@ -62,6 +62,7 @@ def fields_of(collider, axes):
     return dataclasses.make_dataclass("Fields", values)(**values)
 
 
+@pytest.mark.compiled
 @both
 @pytest.mark.parametrize("seed", [0, 1, *(pytest.param(k, marks=pytest.mark.long) for k in range(2, 12))])
 def test_what_is_drawn_reaches_as_far_as_the_support(d, seed):
@@ -195,6 +196,7 @@ def test_a_list_that_follows_its_world_is_that_of_a_new_drawing(d, seed):
             before = shown
 
 
+@pytest.mark.compiled
 @both
 def test_bodies_are_drawn_between_two_steps(d):
     """A ball and a box that fall and turn, by a quarter of a step behind the last but one."""

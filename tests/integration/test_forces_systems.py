@@ -35,6 +35,7 @@ class Field(ForceSystem):
         return float(-(3.0 * bodies.charge.value * bodies.position[:, 0]).sum())
 
 
+@pytest.mark.compiled
 @all_methods
 @pytest.mark.parametrize("charged", [(), (1,), (2, 4), (1, 2, 3, 4)], ids=["none", "one", "some", "all"])
 def test_only_bodies_with_what_it_requires_feel_a_force(method, charged):
@@ -98,6 +99,7 @@ def test_forces_without_force_systems_are_summed_once(method):
     assert world.stats().counters["force_evaluations"] == 3
 
 
+@pytest.mark.compiled
 @all_methods
 def test_two_force_systems_and_gravity_add_up(method):
     world = make_world(gravity=10.0, dt=DT, integrator=method)
@@ -108,6 +110,7 @@ def test_two_force_systems_and_gravity_add_up(method):
     np.testing.assert_allclose(velocity(world, 1), (2 * DT * 7.0 / 2.0, -2 * DT * 10.0), rtol=1e-14)
 
 
+@pytest.mark.compiled
 @all_methods
 def test_a_system_that_adds_to_force_acts_throughout_the_step(method):
     """In phase FORCES, after the sum: a constant push, the same at every stage: textbook x'' = -x + 0.5 t_n."""
@@ -167,6 +170,7 @@ def test_energy_does_not_depend_on_the_history():
 # -- bodies with a speed limit, and those that are not dynamic ---------------------------------------
 
 
+@pytest.mark.compiled
 @all_methods
 def test_speed_limit(method):
     """Falling at 10 m/s^2 with a cap of 3 m/s: never faster, and at the cap exactly 3 dt per step."""
@@ -182,6 +186,7 @@ def test_speed_limit(method):
     assert velocities[-1, 1, 1] == pytest.approx(-12 * 10.0 * DT, rel=1e-14)  # the other body has none
 
 
+@pytest.mark.compiled
 @all_methods
 @pytest.mark.parametrize("speed", [1e3, 1e200, 1e307])
 def test_speed_limit_holds_after_an_impulse(method, speed):
@@ -194,6 +199,7 @@ def test_speed_limit_holds_after_an_impulse(method, speed):
     np.testing.assert_allclose(world.bodies.position[0], (3.0 * DT, -4.0 * DT), rtol=1e-14)
 
 
+@pytest.mark.compiled
 @all_methods
 def test_drag_does_not_see_more_than_the_limit(method):
     """An impulse of 1e6 m/s against a drag that is stable at the limit: it slows down and never reverses."""
@@ -220,6 +226,7 @@ def test_speed_limit_of_zero_and_none():
     assert free.linear_velocity[1] == -1.0
 
 
+@pytest.mark.compiled
 @all_methods
 def test_kinematic_bodies_move_by_their_velocity_alone(method):
     """No gravity, no constant or applied force, no force system, no damping, no impulse, no cap: x = x0 + v t."""
@@ -258,6 +265,7 @@ def test_pushes_on_other_kinds_are_not_kept_for_later(kind, inside):
     assert not rigid.linear_velocity.any()
 
 
+@pytest.mark.compiled
 @all_methods
 def test_static_bodies_do_not_move(method):
     """A static RigidBody, even with a velocity, and a collider without one."""

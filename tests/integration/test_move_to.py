@@ -132,7 +132,6 @@ def test_where_it_is_called_from():
     np.testing.assert_allclose(velocity(world, entity), (60.0, 0.0))
 
 
-@pytest.mark.plain
 def test_it_stands_where_it_was_driven_in_snapshots_files_and_steps_that_fail(tmp_path):
     world = make_world(gravity=G)
     lift = mover(world, (0.0, 0.0), half=(1.0, 0.25))

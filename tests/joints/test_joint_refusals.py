@@ -40,7 +40,6 @@ def test_what_no_joint_can_be_is_refused_at_the_call(make, message):
         make()
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("number", [1e16, 1e160, 1e300])
 def test_numbers_that_no_step_can_take_are_refused_with_their_field(number):
     for make, field in (
@@ -210,7 +209,6 @@ def test_the_two_ends_of_a_length_are_set_together():
         spring.damping_ratio = -1.0
 
 
-@pytest.mark.plain
 def test_a_pull_by_the_mouse_has_no_other_body():
     world, joints = joint_world(gravity=0)
     one, other = disc(world, (2, 2)), disc(world, (4, 2))

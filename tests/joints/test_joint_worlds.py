@@ -52,7 +52,6 @@ def test_joints_of_deleted_bodies_are_lost():
     assert at(world, bodies[0]).y < before - 0.4 * G
 
 
-@pytest.mark.plain
 def test_joint_breaks_at_its_force():
     world, joints = joint_world()
     for x, most in enumerate((1.2 * G, 0.9 * G)):

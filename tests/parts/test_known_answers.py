@@ -249,7 +249,6 @@ def test_a_turning_platform_of_parts_carries_what_lies_on_its_arms():
     assert body_of(world, load).linear_velocity == pytest.approx((1, 0), abs=1e-3)
 
 
-@pytest.mark.plain
 def test_spheres_of_a_dumbbell_push_each_other_by_their_body_alone():
     """Two overlapping parts do not touch, and a body without a Spin or a collider of its own moves as one."""
     world, parts = parts_world()

@@ -143,6 +143,7 @@ def test_what_breaks_off_flies_on_by_itself():
     assert momentum[0] == pytest.approx(3.0)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("mass", [None, 0.0, 4.0])
 def test_what_breaks_off_takes_impulses_at_once(mass):
     """Mass and velocity are its own from the next step on; an impulse before that counts with them."""

@@ -84,6 +84,7 @@ def crosses(a, b, c, d):
     return side(a, b, c) * side(a, b, d) < 0 and side(c, d, a) * side(c, d, b) < 0
 
 
+@pytest.mark.compiled
 def test_the_filled_side_is_solid():
     """A ball lies on the disc in a ring's hole's lowest place, and one on top of the ring."""
     y, x = np.mgrid[:48, :48] + 0.5

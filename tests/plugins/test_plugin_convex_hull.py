@@ -78,7 +78,6 @@ def test_points_inside_are_left_out_at_any_size(size):
     assert np.array_equal(ConvexHullCollider(hull.hull).hull, hull.hull)
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("seed", range(30))
 def test_corners_and_volume_are_those_of_qhull(seed):
     """Of points anywhere, on a sphere, and of a lattice, which has many in a plane; read backwards it is the same."""

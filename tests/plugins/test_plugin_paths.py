@@ -134,7 +134,6 @@ def test_what_sleeps_on_a_lift_rides_on_when_it_goes_on(mode):
         path.points, path.travelled = [(1, 2), (1, 6)], 0.0
 
 
-@pytest.mark.plain
 def test_what_is_elsewhere_goes_to_its_path_at_its_speed():
     """And then on from where it was: never faster, and in the end on it."""
     world = world_of(dt=0.1)
@@ -152,7 +151,6 @@ def test_what_is_elsewhere_goes_to_its_path_at_its_speed():
     np.testing.assert_allclose(before, walked(SQUARE, travelled, "loop", False), rtol=0, atol=1e-12)
 
 
-@pytest.mark.plain
 def test_fields_may_change_on_the_way():
     world = world_of(dt=0.1)
     entity = mover(world, SQUARE, 1.0, travelled=1.0, at=(1.0, 0.0))
@@ -172,7 +170,6 @@ def test_fields_may_change_on_the_way():
     assert tuple(at(world, entity)) == (1.5, 5.0)
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("d", [2, 3])
 def test_snapshots_files_and_failed_steps_go_on_to_the_bit(d, tmp_path):
     class FailsOnce(System):

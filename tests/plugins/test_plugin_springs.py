@@ -77,6 +77,7 @@ def test_a_damped_oscillator_on_a_wall(integrator, tolerance):
     assert x(world, wall).tolist() == [0.0, 0.0]
 
 
+@pytest.mark.compiled
 def test_a_chain_of_100_hangs_as_it_should():
     """Weights on springs: the k-th from the top carries all below it, so its spring is (101 - k) m g / k longer."""
     world, springs = make(gravity=(0.0, -10.0), dt=1 / 200)

@@ -93,7 +93,6 @@ def test_corners_fill_what_sides_and_lines_say():
     assert areas == [1, *[0.5] * 4, 0.25, 0.75, 0.75, 0.25, 0.75, 0.25, 0.25, 0.75, 0.5, 0.5, 0]
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("seed", range(4))
 def test_overlaps_are_those_with_the_polygons(seed):
     """A circle overlaps where its distance to the polygons is less than the radius, by as much; in corners by more."""
@@ -119,7 +118,7 @@ def test_overlaps_are_those_with_the_polygons(seed):
 
 
 @pytest.mark.plain
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.compiled) for seed in (1, 2, 3))])
 def test_casts_end_where_the_polygons_begin(seed):
     rng, hits = np.random.default_rng(100 + seed), 0
     for _ in range(5):
@@ -269,7 +268,6 @@ def test_a_character_jumps_up_through_one_way_cells_and_drops():
     assert stage.place.y - stage.stands == pytest.approx(1.0, abs=1e-6)
 
 
-@pytest.mark.plain
 def test_half_tiles_leave_half_of_their_cells():
     """A body of .4 goes between a lower and an upper half one cell above, and stands half a tile high."""
     world = make_world("discrete", *grids("------------\n____________"))

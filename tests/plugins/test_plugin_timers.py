@@ -80,7 +80,6 @@ def test_what_repeats_keeps_its_phase():
     assert log == sorted(due)
 
 
-@pytest.mark.plain
 def test_events_of_a_step_come_in_order_of_the_entities_also_of_bulk_and_of_no_bodies():
     world, log = world_of(), []
     world.on("timer", lambda entity, timer: log.append(entity))
@@ -91,7 +90,6 @@ def test_events_of_a_step_come_in_order_of_the_entities_also_of_bulk_and_of_no_b
     assert log == sorted(ids)
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_created_inside_a_step_counts_from_its_end(kind):
     """Before, and in, and after the timers' own systems."""
@@ -112,7 +110,6 @@ def test_what_is_created_inside_a_step_counts_from_its_end(kind):
         assert log == [(5, made[-1])]
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("kind", ["loose", "dynamic"])
 def test_handlers_may_do_anything_to_timers(kind):
     """Delete, cancel and replace their own and those that are due after it."""
@@ -204,7 +201,6 @@ def test_a_handler_that_raises_loses_no_event(kind):
     assert log == [(5, ids[0]), (5, ids[1]), (5, ids[2]), (11, ids[1])]
 
 
-@pytest.mark.plain
 def test_bodies_are_none_the_wiser():
     """Timers move nothing, wake nothing, and do not make what is static be looked at anew."""
     hashes = []

@@ -122,6 +122,7 @@ def test_queries_know_shapes_with_arrays():
     assert hit.distance == pytest.approx(7.0)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("kind", [AABBCollider, BoxCollider, CapsuleCollider])
 def test_edges_that_shapes_tell_are_those_that_their_support_finds(kind):
     random, found = np.random.default_rng(60), 0

@@ -188,7 +188,6 @@ WRONG = {
 }
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("message", WRONG)
 @pytest.mark.parametrize("empty", [True, False])
 def test_wrong_arguments(message, empty):

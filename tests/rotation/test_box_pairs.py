@@ -50,6 +50,7 @@ def test_boxes_in_a_plane_meet_as_polygons_do(seed):
             same(level.met(way), level_polygon.met(way), size)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("seed", range(3))
 def test_a_ball_meets_a_turned_box_as_a_capsule_of_no_height_does(seed, d):

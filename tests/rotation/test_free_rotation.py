@@ -18,6 +18,7 @@ pytestmark = pytest.mark.plain
 METHODS = {"explicit_euler": 1, "semi_implicit_euler": 1, "velocity_verlet": 2, "yoshida4": 4, "rk4": 4}
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("damping", [0.0, 0.7])
 @pytest.mark.parametrize("method", METHODS)
 def test_a_constant_torque_in_a_plane(method, damping):
@@ -211,6 +212,7 @@ def test_a_mill_turns_with_its_angular_velocity_and_its_shape_with_it(collision)
     assert 20 <= sum(seen[:60]) * 15 <= 75  # 2 asin(.1 / 1.5) / pi of 60 steps are 2.5
 
 
+@pytest.mark.compiled
 def test_a_kinematic_body_in_space_turns_about_the_axis_that_it_is_given():
     w = np.array((0.3, -0.7, 1.1))
     with turning_world(3, integrator="velocity_verlet") as world:

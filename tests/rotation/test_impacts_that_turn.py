@@ -54,7 +54,6 @@ def test_a_rod_that_is_struck_off_centre_turns(mode):
             assert v_rod[1] - w * long / 2 == pytest.approx(0.0, abs=2e-5)
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("mode", MODES)
 def test_a_flat_landing_does_not_turn(mode):
     """To the bit: with e v, and w = 0."""

@@ -176,6 +176,7 @@ def lying(d, angle):
     return angle if d == 2 else rotation(0, 0, angle)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("floor", [HalfSpaceCollider, AABBCollider, BoxCollider])
 def test_a_box_on_the_floor_stands_on_all_its_corners(floor, d):

@@ -99,6 +99,7 @@ def test_inertia_of_uniform_shapes_is_the_sum_over_a_lattice(seed, d):
             assert world.kinetic_energy() == pytest.approx(0.5 * np.dot(w, np.dot(expected, w)), rel=0.05)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("seed", range(4))
 def test_an_impulse_at_a_point_gives_momentum_and_angular_momentum(seed, d):

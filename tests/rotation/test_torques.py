@@ -147,6 +147,7 @@ def test_the_energy_of_a_heavy_top_stays(method, faster, bound):
     assert abs(along - before) < bound * abs(before)
 
 
+@pytest.mark.compiled
 @methods
 @pytest.mark.parametrize("d", [2, 3])
 def test_a_failed_step_and_a_snapshot_bring_back_every_bit(d, method):
@@ -218,6 +219,7 @@ def test_a_torque_that_cannot_be_takes_its_body_out(wrong, d, method):
         assert body.position[0] > before[0][0]
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("name", ["force", "torque"])
 def test_what_would_be_lost_is_refused(name):
     """Forces and torques written where no step takes them; a force after FORCES is one that acts."""
@@ -299,6 +301,7 @@ def test_torques_end_with_their_system():
         assert "turn_on_way" not in {kernel.kernel for kernel in world.plan().kernels}
 
 
+@pytest.mark.compiled
 @methods
 @pytest.mark.parametrize("d", [2, 3])
 def test_limits_of_speed_and_damping_that_no_step_resolves(d, method):

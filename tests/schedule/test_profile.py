@@ -63,6 +63,7 @@ def test_a_profile_counts_the_calls_of_each_stage_and_kernel_by_system():
     assert "semi_implicit_euler" not in {name for _, name in calls}
 
 
+@pytest.mark.compiled
 def test_kernels_called_between_steps_stand_apart():
     world = bouncing()
     run(world, 1)
@@ -76,6 +77,7 @@ def test_kernels_called_between_steps_stand_apart():
     assert world.stats().kernels[-len(outside) :] == tuple(outside)
 
 
+@pytest.mark.compiled
 def test_means_are_over_the_steps_inside_profiles_since_the_last_reset():
     world = bouncing()
     run(world, 3)
@@ -96,6 +98,7 @@ def test_means_are_over_the_steps_inside_profiles_since_the_last_reset():
     assert world.stats().kernels == ()
 
 
+@pytest.mark.compiled
 def test_time_is_divided_by_what_the_counters_counted():
     world = bouncing()
     run(world, 1)

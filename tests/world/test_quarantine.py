@@ -239,6 +239,7 @@ def test_many_among_many():
     np.testing.assert_array_equal(broken.bodies.position[stay], healthy.bodies.position)
 
 
+@pytest.mark.compiled
 def test_it_stands_still_until_it_is_mended():
     world = make_world(gravity=9.81)
     box(world, (0.0, -0.5), half=(9.0, 0.5), kind="static")

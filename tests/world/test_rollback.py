@@ -66,7 +66,6 @@ def test_late_and_lost_inputs_end_in_the_same_bits(late, lost, most):
         assert peer.replayed > 0
 
 
-@pytest.mark.plain
 def test_worlds_that_differ_are_found_out():
     peers = [Rollback(*game()) for _ in range(2)]
     for peer in peers:

@@ -122,6 +122,7 @@ def test_a_world_that_cannot_be_made_leaves_no_context_behind():
     assert esper.list_worlds() == before
 
 
+@pytest.mark.compiled
 def test_several_worlds_side_by_side_do_not_disturb_each_other():
     def alone(velocity):
         world = make_world(gravity=9.81)

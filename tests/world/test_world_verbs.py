@@ -286,6 +286,7 @@ def test_deleting_many_leaves_what_deleting_each_leaves(seed):
     assert many.state_hash() == one.state_hash()
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("steps", [0, 1])
 @pytest.mark.parametrize("missing", [3, 999999])
 def test_one_that_does_not_exist_keeps_all(missing, steps):
