@@ -122,7 +122,7 @@ def in_order(systems: Sequence[System]) -> list[System]:
             for other in _named(system.before, members, system):
                 edges[other].add(index)
         _check_writers(members, edges)
-        ordered += [members[index] for index in _topological(members, edges)]
+        ordered += [members[index] for index in _topological(members, edges)] if any(edges.values()) else members
     return ordered
 
 

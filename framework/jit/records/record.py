@@ -24,6 +24,8 @@ class Record:
 
     schema: Schema
     dimensions: int
+    columns_at_first: list[tuple[str, tuple[int, ...], np.dtype]]  # where each is held, its shape and kind
+    inner: list[tuple[str, Schema]]
 
     if TYPE_CHECKING:  # fields are properties of the classes made below
 
@@ -35,12 +37,10 @@ class Record:
         self.address: int = self._words.ctypes.data
         if not JIT:
             remember(self.address, self)
-        for name, field in self.schema.fields.items():
-            if isinstance(field, Column):
-                shape = (field.numbers(self.dimensions) if field.apart else 0, 0)[-1 - field.rows_axis :]
-                setattr(self, name, np.empty((*shape, *field.item_shape(self.dimensions)), field.dtype))
-            elif isinstance(field, Schema):
-                setattr(self, name, make_record(field, self.dimensions))
+        for slot, shape, dtype in self.columns_at_first:  # of no rows: nobody asks where they are
+            setattr(self, slot, np.empty(shape, dtype))
+        for name, inner in self.inner:
+            setattr(self, name, make_record(inner, self.dimensions))
 
     def __getattr__(self, name: str) -> Any:  # for type checkers: fields are properties of the classes made below
         raise AttributeError(f"record {self.schema.name} has no field {name!r}")
@@ -82,6 +82,14 @@ class Record:
 def _record_class(schema: Schema, dimensions: int) -> type[Record]:
     held = tuple(_slot(name) for name, field in schema.fields.items() if isinstance(field, (Column, Schema)))
     body: dict[str, Any] = {"__slots__": held, "schema": schema, "dimensions": dimensions}
+    body["inner"] = [(name, field) for name, field in schema.fields.items() if isinstance(field, Schema)]
+    body["columns_at_first"] = [
+        (
+            _slot(name), (*(field.numbers(dimensions) if field.apart else 0, 0)[-1 - field.rows_axis :],
+            *field.item_shape(dimensions)), np.dtype(field.dtype),
+        )
+        for name, field in schema.fields.items() if isinstance(field, Column)
+    ]  # fmt: skip
     for name, field in schema.fields.items():
         at = schema.layout[name] // WORD
         if isinstance(field, Schema):
