@@ -38,33 +38,44 @@ def link_all(functions: Iterable[Linkable]) -> None:
         helpers = min(log.processes, len(missing) // 2) - 1
         shared = helpers > 0 and CAN_FORK and cache_folder() is not None
         try:
-            (_compile_together(missing, helpers) if shared else _compile(missing, range(len(missing))))
+            if shared:
+                _compile_together(missing, helpers)
+            else:
+                _compile(zip(range(len(missing), 0, -1), missing, strict=True))
         finally:
             log.left = 0
         for function in functions:
             function.link()
 
 
-def _compile(functions: Sequence[Linkable], numbers: Iterable[int]) -> None:
-    for number in numbers:
-        log.left = len(functions) - number
-        functions[number].link()
+def _compile(functions: Iterable[tuple[int, Linkable]]) -> None:
+    """Each with how many are left to compile, itself included."""
+    for log.left, function in functions:
+        function.link()
 
 
 def _compile_together(functions: Sequence[Linkable], helpers: int) -> None:
-    """This process and others each take the next function until none is left; those that take longest come first."""
-    functions = sorted(functions, key=lambda function: -function.dependency_count)
+    """This process and others each take a share, its longest first, and then what the others have not begun.
+
+    Functions that follow each other, such as those of 2D, are made of much the same, which each process compiles once.
+    """
     import multiprocessing  # half as long to import as numpy
 
+    share = -(-len(functions) // (helpers + 1))
+    starts = range(0, len(functions), share)
+    functions = [
+        function for start in starts
+        for function in sorted(functions[start : start + share], key=lambda each: -each.dependency_count)
+    ]  # fmt: skip
     context: Any = multiprocessing.get_context("fork")
-    following, compiled = context.Value("i", 0), context.SimpleQueue()
+    begun, compiled = context.Array("b", len(functions)), context.SimpleQueue()
     started = [
-        context.Process(target=_help, args=(functions, following, compiled), daemon=True) for _ in range(helpers)
+        context.Process(target=_help, args=(functions, begun, start, compiled), daemon=True) for start in starts[1:]
     ]
     for process in started:
         process.start()
     try:
-        _compile(functions, _taken(following, len(functions)))
+        _compile(_taken(functions, begun, 0))
         for process in started:  # each has one function left
             log.left = sum(other.is_alive() for other in started)
             process.join()
@@ -76,25 +87,25 @@ def _compile_together(functions: Sequence[Linkable], helpers: int) -> None:
             log.loaded -= 1  # this process loads what the other one has compiled
 
 
-def _taken(following: Any, count: int) -> Iterator[int]:
-    while True:
-        with following.get_lock():
-            number = following.value
-            following.value += 1
-        if number >= count:
-            return
-        yield number
+def _taken(functions: Sequence[Linkable], begun: Any, start: int) -> Iterator[tuple[int, Linkable]]:
+    """What no process has begun, from ``start`` on and then from the first one on."""
+    for number in (*range(start, len(functions)), *range(start)):
+        with begun.get_lock():
+            left = begun[:].count(0)
+            mine, begun[number] = not begun[number], 1
+        if mine:
+            yield left, functions[number]
 
 
-def _help(functions: Sequence[Linkable], following: Any, compiled: Any) -> None:
+def _help(functions: Sequence[Linkable], begun: Any, start: int, compiled: Any) -> None:
     """What another process does; a function that cannot be compiled raises in the first process when that links it."""
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches both; the first process ends this one
     log.listeners, log.announced, log.processes = [], True, 1
-    for number in _taken(following, len(functions)):
+    for _, function in _taken(functions, begun, start):
         known = len(log.compiled)
         with contextlib.suppress(Exception):
-            functions[number].link()
+            function.link()
         for item in log.compiled[known:]:
             compiled.put(item)
