@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 
+import pytest
+
 
 def pairwise(*values) -> list[tuple]:
     """Combinations of one value of each list, in which all pairs of values of two lists occur. Always the same ones."""
@@ -19,3 +21,11 @@ def pairwise(*values) -> list[tuple]:
         missing -= covered(best)
         chosen.append(best)
     return [tuple(of[k] for of, k in zip(values, case, strict=True)) for case in sorted(chosen)]
+
+
+def half(first, second) -> list:
+    """Combinations of one value of each, of which every second one is long: each value occurs in the others, too."""
+    return [
+        pytest.param(one, other, marks=[pytest.mark.long] * ((j + k) % 2))
+        for j, one in enumerate(first) for k, other in enumerate(second)
+    ]  # fmt: skip

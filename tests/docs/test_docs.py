@@ -202,7 +202,7 @@ def test_the_scene_file_page_has_every_option():
     assert set(re.findall(r"^\| `(--[a-z-]+)", text, re.MULTILINE)) == options - {"--help"}
 
 
-@pytest.mark.slow  # over a minute of compiling where the cache is empty
+@pytest.mark.long  # lab/test_cli_plugins.py offers plugins to carom, too, and the page's blocks run above
 def test_the_package_of_the_shape_page_can_be_built_found_and_tested(tmp_path):
     """The files as on the page, built into a wheel and put on Python's path; then the page's commands."""
     blocks, _ = split((ROOT / "docs" / "write-a-shape.md").read_text(encoding="utf-8"), "write-a-shape.md")

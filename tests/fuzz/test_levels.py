@@ -6,7 +6,7 @@ import pytest
 from fuzz.levels import play
 
 both = pytest.mark.parametrize("d", [2, 3])
-QUICK, STEPS, MANY = {2: 16, 3: 8}, 60, 5000  # levels, each with four characters
+QUICK, STEPS, MANY = {2: 8, 3: 4}, 60, 5000  # levels, each with four characters
 
 
 def wrong(d: int, first: int, stop: int, steps: int) -> dict[int, dict[str, str]]:

@@ -31,7 +31,8 @@ from carom.scenes import jump, spring, stack
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "seconds", "options"), [
-    ("spring", 0.7, {}), ("orbit", 1.5, {}), ("jump", 1.0, {}), ("bouncing", 3.3, {"n": 3}), ("oblique", 2.6, {}),
+    ("spring", 0.7, {}), ("jump", 1.0, {}), ("bouncing", 3.3, {"n": 3}),
+    *(pytest.param(name, seconds, {}, marks=pytest.mark.long) for name, seconds in (("orbit", 1.5), ("oblique", 2.6))),
 ])  # fmt: skip
 def test_errors_against_the_own_reference_are_those_against_the_closed_form(name, seconds, options):
     """Within three times what the reference says of itself, as it is extrapolated from two steps; and the scale, the

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers_pairwise import half
 from laws.helpers_walks import FLOORS, MODES, WALKERS, polygon, random_walk
 
 from carom.components import AABBCollider, RigidBody, Transform
@@ -25,8 +26,7 @@ def test_walks(walker):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("walker", WALKERS)
-@pytest.mark.parametrize("floor", FLOORS)
+@pytest.mark.parametrize(("walker", "floor"), half(WALKERS, FLOORS))
 def test_walks_over_one_kind_of_floor(floor, walker):
     check(range(1000, 1003), floors=(floor,), walkers=(walker,))
 

@@ -66,7 +66,7 @@ def test_answers_while_bodies_sleep(d, count, kinds, grids):
     for _ in range(120):
         world.step()
     start = world.snapshot()
-    for turn in range(14):
+    for turn in range(9):
         sleepers = world.bodies.entity[: state.sleepers]
         if turn % 7 == 1:
             gone = rng.choice(sleepers, 2, replace=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers_pairwise import half
 from rotation.helpers_turning import box, turning_world, wall
 from worlds import MODES
 
@@ -62,8 +63,7 @@ def count_passed(mode, ground, e, friction, seed, count):
     return passed.sum(), deepest
 
 
-@pytest.mark.parametrize("mode", MODES[1:])
-@pytest.mark.parametrize("ground", ["wall", "box", "half-space", "chain"])
+@pytest.mark.parametrize(("mode", "ground"), half(MODES[1:], ("wall", "box", "half-space", "chain")))
 @pytest.mark.parametrize("count", [25, pytest.param(500, marks=pytest.mark.long)])
 def test_no_thin_bar_passes_through_ground(count, ground, mode):
     for e, friction in ((0.0, 0.0), (0.0, 0.5), (0.5, 0.0), (1.0, 0.5)):

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 import scipy.linalg
-from helpers_pairwise import pairwise
+from helpers_pairwise import half, pairwise
 from rotation.helpers_turning import box, part, turned, turning_world, wall
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj
@@ -119,8 +119,7 @@ MOTIONS = {  # forces, the spin and the angle of the body, what is seen, its exa
 
 
 @pytest.mark.compiled
-@methods
-@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize(("motion", "method"), half(MOTIONS, ORDERS))
 def test_errors_fall_with_the_step_as_the_integrator_says(motion, method):
     """From four to eight times the steps."""
     add, spin, start, seen, exact, steps = MOTIONS[motion]

@@ -442,7 +442,7 @@ def play_for(steps):
 
 @pytest.mark.slow
 def test_games_of_some_hundred_steps():
-    play_for(600)
+    play_for(400)
 
 
 @pytest.mark.long
