@@ -1,6 +1,6 @@
 """Small worlds that together run every kernel: modes, methods, shapes, levels, grids and trees, queries, refusals.
 
-``python -m tests.helpers_zoo`` prints a hash per scenario of all that can be seen of it.
+``python -m tests.helpers_zoo NAME...`` prints a hash per scenario of all that can be seen of it.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import math
+import sys
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -455,4 +456,5 @@ def scenarios() -> Iterator[tuple[str, Callable[[], list[str]]]]:
 
 if __name__ == "__main__":
     for name, run in scenarios():
-        print(name, *run(), sep=",", flush=True)
+        if name in sys.argv[1:]:
+            print(name, *run(), sep=",", flush=True)

@@ -29,10 +29,11 @@ pytestmark = [
 
 
 @pytest.fixture(scope="module")
-def compiled():
+def compiled(request):
     """What another process sees whose kernels are compiled, by scenario."""
+    names = [item.callspec.params["name"] for item in request.session.items if item.module is request.module]
     zoo = "import runpy; runpy.run_module('tests.helpers_zoo', run_name='__main__')"
-    printed = output_of(zoo, cwd=Path(__file__).parents[2], NUMBA_DISABLE_JIT="0")
+    printed = output_of(zoo, *names, cwd=Path(__file__).parents[2], NUMBA_DISABLE_JIT="0")
     return {line.split(",")[0]: line.split(",")[1:] for line in printed.splitlines()}
 
 
