@@ -11,11 +11,11 @@ import pytest
 from carom import scenes
 
 HASHES = {
-    "pile2d": ({"n": 40}, "9142b236a207b714a281488ae95160caf4b25b2bf35df15695683925505c69c9"),
-    "pile3d": ({"n": 27}, "8dd881f2fba79a68a9e253abf8600714554a4b1fdb75dead1382c086a0386a12"),
+    "pile2d": ({"n": 40}, "db9b1fa37750d253586190e5ecd27710ec7762a7ba553529d2497c98fd04f62e"),
+    "pile3d": ({"n": 27}, "9ad266244af78d058c9aa2d952f57397bda578cb94a123711b905e59024ddbbe"),
     "tumbler": ({"n": 12}, "0c1980139e89fde1c589cce28d44e01f52c316eeab435314c4e599fccb103c62"),
-    "bridge": ({"n": 8, "crates": 2}, "f9ce66209486f0101560a32992fbb34c691fc66ca30616739b9d399df4e8acf8"),
-    "ragdoll": ({"n": 1}, "3f26a14796fcf79599b27e0c71157fbd6f34a956ad4e83a4fe7cdd5356adffeb"),
+    "bridge": ({"n": 8, "crates": 2}, "29cd80c832787d6b056b5254d088c13dc02c2533113f4c3e9120201e08db46f6"),
+    "ragdoll": ({"n": 1}, "a6d89a56361a341bc5c96601d8f0d77103c7695f6dd93f6a5b2f28036ecf044b"),
 }
 STEPS = 60
 
