@@ -70,13 +70,13 @@ def seams_in_space(seed, mode):
 def test_capsules_do_not_catch_at_the_seams_of_a_floor_in_space(mode):
     """They rose by up to 1.5 m: two points in rows for four were solved one after the other, and a plane along which
     one slid was given up for that of where it had left the tile."""
-    for seed in range(2):
+    for seed in (0, 1, 57):  # 57 was thrown .26 m high where it is swept
         rises, tips = seams_in_space(seed, mode)
         assert rises < 3e-3
         assert tips < 0.01
 
 
-# Missed today: 43 tips by .016 in each mode, 57 is thrown .26 m high where it is swept; 9 of 469 cases of fresh seeds.
+# Missed today: 43 turns by .016 about the vertical in each mode: its end lies within .6 mm of a seam along its way.
 @pytest.mark.long
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("seed", range(2, 60))
