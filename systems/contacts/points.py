@@ -138,6 +138,16 @@ def note_middles(state, r, all_alike):
 
 
 @part
+def rolls(state, a, b, normal):
+    """Whether what turns far of a pair is the surface of balls, whose middles go by less than a part of the smaller."""
+    bodies, way = state.bodies, 0.0
+    for i in (a, b):
+        reach = length(bodies.offset[i]) if is_ball(state, i, normal) else bodies.reach[i]
+        way += size_of_turn(bodies.turn[i]) * reach
+    return way <= FAST * smaller_extent(bodies, a, b)
+
+
+@part
 def lies_on_face(state, sides, d, turn, normal):
     """Whether of two bodies, of which one is a ball, the other is touched on a face that turns on by little.
     d: from a to b at the touch; turn: of the other body, from then to the end of the step, where its shape stands."""
@@ -230,7 +240,7 @@ def lay_arms(state, dt):
             build_arms(state, dt, r, solver.gap[solver.slot[r]])
             if dot(offset[a], offset[a]) + dot(offset[b], offset[b]) > 0.0:
                 note_middles(state, r, False)
-            if turns_far(state, a, b):
+            if turns_far(state, a, b) and not rolls(state, a, b, solver.normal[solver.slot[r]]):
                 lay_first_touch(state, dt, r)
     for r in range(solver.contacts if solver.lopsided else 0):
         note_middles(state, r, True)

@@ -161,8 +161,9 @@ def lopsided(seed, mode, d):
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
 def test_what_has_its_mass_off_the_middle_keeps_energy_and_period_as_it_rolls(d, mode):
-    """With the arms of where the step ends it kept .13 to .98 of its energy, its period up to a quarter off."""
-    for seed in range(2):
+    """With the arms of where the step ends it kept .13 to .98 of its energy, its period up to a quarter off. 700684, in
+    space, turns by more than .2 in a step, and gained as much again when its surface was taken to go so far."""
+    for seed in (0, 1, 700684)[: 2 + (d == 3)]:
         kept, period = lopsided(seed, mode, d)
         assert kept == pytest.approx(1.0, abs=0.05)
         assert period == pytest.approx(1.0, abs=0.02)
