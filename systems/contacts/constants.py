@@ -37,7 +37,7 @@ JOINT_DAMPING_RATIO = 2.0
 MOST_RATIO = 16.0  # between the masses of joined bodies: above it joints are solved at once, as those of beams and
 FRAME_BEND = 4.0  # frames are, which bend by this times the square of their welds as much as one
 DIRECT_STIFFNESS = 1e3  # times as stiff those are, and times that in the passes that do not push,
-DIRECT_STIFFNESS_MAX = 1e11  # at most against their own masses: more is rounding
+DIRECT_STIFFNESS_MAX = 1e11  # at most against what moves at them: more is rounding
 
 # The number of substeps of an island.
 MOST_SAG = 0.005  # extents: no contact sags more under the island's heaviest body,

@@ -173,18 +173,14 @@ def excess_speed(solver, k, arms):
 def update_targets(solver, k, arms, asks):
     """What row k asks, see ``measure``, without a branch; returns whether its speed is far from that.
 
-    asks: (s in which it may close, whether the step ends, s of a substep, of a step, springs, stiff). What was open and
-    pushes nothing when the step ends is left to the next one: by then what slides may have passed that corner.
+    asks: (s in which it may close, of a substep, of a step, springs, stiff).
     """
-    ahead, ends, h, dt, springs, stiff = asks
+    ahead, h, dt, springs, stiff = asks
     room, closing, impulse = separation(solver, k, arms), closing_speed(solver, k, arms), solver.impulse[k]
     extent, hard = solver.extent[k], solver.hard[k]
     softness = springs[1][0] if solver.fixed[k] else springs[0][0]
     bias_rate = springs[1][1] if solver.fixed[k] else springs[0][1]
-    pushed = solver.had_impulse[k] | (impulse > 0.0)
-    least = 0.0 if hard & solver.apart[k] else STRUCK_EXCESS
-    left = ends & (room > -NEGLIGIBLE * extent) & (not pushed) & (solver.gap[k] > least * extent)
-    opening = UNREACHED * extent / h if left else (room if room > 0.0 else 0.0) / ahead
+    opening = (room if room > 0.0 else 0.0) / ahead
     deep = -(FULL_PUSH_OVERLAP * extent + solver.loaded[k])
     at_once = room / (h * bias_rate)
     at_once = at_once if at_once > deep else deep
@@ -194,8 +190,19 @@ def update_targets(solver, k, arms, asks):
     soft = (room <= NEGLIGIBLE * extent) & (not solver.parting[k])  # just closed, give or take rounding
     solver.target_speed[k], solver.pushing[k] = opening, bias_rate * push if soft else opening
     solver.soft[k] = 0.0 if stiff or hard or not soft else softness
-    solver.had_impulse[k] = pushed
+    solver.had_impulse[k] |= impulse > 0.0
     return excess_of(closing, opening, impulse) * dt > STRUCK_EXCESS * extent
+
+
+@part
+def leave_open_rows(solver, h, span, arms):
+    """What was open when the step began, and has pushed nothing in it, is left to the next one when it ends: by then
+    what slides may have passed that corner."""
+    for k in range(span[0], span[1]):
+        least = 0.0 if solver.hard[k] and solver.apart[k] else STRUCK_EXCESS
+        was_open = not solver.had_impulse[k] and solver.gap[k] > least * solver.extent[k]
+        if was_open and separation(solver, k, arms) > -NEGLIGIBLE * solver.extent[k]:
+            solver.target_speed[k] = UNREACHED * solver.extent[k] / h
 
 
 @inlined

@@ -44,6 +44,7 @@ from .rows import (
     compute_effective_mass,
     excess_speed,
     integrate_rotation,
+    leave_open_rows,
     rotate_body,
     turn_arms,
     update_targets,
@@ -58,7 +59,7 @@ def measure(solver, h, springs, dt, stiff, ends, span, arms):
     pushing: in the pass that pushes, overlap is to open as well, softly where ``soft`` says so. Islands are ``struck``
     where the speed of some row is far from what the relaxing passes are to make of it; returns whether any is.
     """
-    asks = dt / solver.usual if ends else h, ends, h, dt, springs, stiff
+    asks = dt / solver.usual if ends else h, h, dt, springs, stiff
     if len(arms) > 0:
         turn_arms(solver, 1.0, span, arms)
     any_struck, islands = False, islands_of(solver, span)
@@ -66,6 +67,8 @@ def measure(solver, h, springs, dt, stiff, ends, span, arms):
         solver.struck[t] = False
     for k in range(span[0], span[1]):
         any_struck |= update_targets(solver, k, arms, asks)
+    if ends:
+        leave_open_rows(solver, h, span, arms)
     for k in range(span[0], span[1] if any_struck else span[0]):
         if excess_speed(solver, k, arms) * dt > STRUCK_EXCESS * solver.extent[k]:
             solver.struck[island_of(solver, k)] = True
