@@ -70,7 +70,7 @@ def seams_in_space(seed, mode):
 def test_capsules_do_not_catch_at_the_seams_of_a_floor_in_space(mode):
     """They rose by up to 1.5 m: two points in rows for four were solved one after the other, and a plane along which
     one slid was given up for that of where it had left the tile."""
-    for seed in (0, 1, 57):  # 57 was thrown .26 m high where it is swept
+    for seed in (0, 57, 1030):  # which were thrown .26 and .85 m high where they are swept
         rises, tips = seams_in_space(seed, mode)
         assert rises < 3e-3
         assert tips < 0.01
