@@ -31,11 +31,12 @@ FEW_IMPACTS, TRAPPED_IMPACTS = 16, 1000  # impacts of a body in a step, one afte
 def deflect(state, i, dv, now, dt):
     """Give a body its change of velocity, and the rest of the step with it.
 
-    In an event-driven world damping acts at the end of the step, for half of it. Else it acts all the time, and the
-    velocity of a straight path is that of the end already. What has been stopped stays where it is.
+    In an event-driven world damping acts at the end of the step, for half of it. Else it acts all the time; the
+    velocity of a straight path is that of the start, of all damping to come, or that of the end already. What has been
+    stopped stays where it is.
     """
     bodies, i = state.bodies, owner_of(state, i)
-    acting = dt - now if state.path_degree > 1 else 0.0
+    acting = dt - now if state.path_degree > 1 else dt * state.moves_with_old_velocity
     if state.impacts.sweeps and state.mode == EVENT_DRIVEN:
         acting = 0.5 * dt
     fading = bodies.linear_damping[i] * acting

@@ -11,7 +11,9 @@ import pytest
 from helpers_pairwise import pairwise
 from helpers_rest import G
 from laws.helpers_laws import MODES, SWEPT, cases, seeds, walls
-from worlds import ball, box, make_world
+from worlds import METHODS, ball, box, make_world, velocity
+
+from carom.components import RigidBody
 
 HALF, WALL, RADIUS, SPEED, BODIES = 7.0, 2.0, 0.6, 10.0, 60
 RESTITUTIONS = (0.0, 0.3, 0.8, 1.0)
@@ -105,6 +107,28 @@ def test_elastic_rooms_driven_by_events_keep_energy(masses, seed):
     """e = 1 and every impact at its time: no contact at rest, and energy is kept to rounding."""
     rise = room(seed, "event_driven", 1.0, masses)
     assert rise.run - 1.0 <= 1e-12
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("damping", [0.3, 3.0])
+def test_damping_goes_on_through_impacts(mode, damping, integrator):
+    """v' = -c v between elastic impacts, which keep |v|: |v| = |v0| e^(-c t), whatever is struck on the way.
+
+    Walls turn the velocity round to rounding where the path has it from one end of the step, and to the order of the
+    integrator, dt^2, where it follows the path.
+    """
+    start, dt, steps, struck = (30.0, 11.0), 1 / 30, 30, 0
+    with make_world(2, collision=mode, integrator=integrator, dt=dt) as world:
+        walls(world, 2.0, WALL, restitution=1.0)
+        one = ball(world, (0.0, 0.0), start, radius=0.4, restitution=1.0)
+        world.component_for_entity(one, RigidBody).linear_damping = damping
+        for _ in range(steps):
+            world.step()
+            struck += len(world.contacts.impacts)
+        kept = np.linalg.norm(velocity(world, one)) / np.linalg.norm(start)
+    assert struck > 1
+    assert abs(kept * np.exp(damping * steps * dt) - 1.0) <= struck * (damping * dt) ** 2
 
 
 # -- under gravity ---------------------------------------------------------------------------------
