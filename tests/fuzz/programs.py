@@ -59,6 +59,9 @@ INTEGRATORS = "explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4"
 REFUSED = ValueError, CaromError, OverflowError  # what the docs name: the deed was refused, or the step put back
 HALF = 4.0  # m, of the room in which bodies come
 MOST = 24  # bodies
+# What is spawned inside of another body is pushed out, by a bounded push: 0.4 % of the energy of the heaviest here at
+# the speed of pushing, which is 1.7 m/s for the largest at the shortest substep.
+OVERLAP, PUSH = 0.003, 0.2  # m, J
 
 
 class BrokenError(AssertionError):
@@ -344,7 +347,8 @@ class Game:
         world, bodies = self.world, self.world.bodies
         forces = np.any(world.gravity) or bodies.dynamic.constant_force.any()
         drives = forces or len(self.joints) or bodies.kinematic.linear_velocity.any() or world.get_component(PartOf)
-        return np.inf if drives else (1.0 + 1e-9) * world.kinetic_energy() + 1e-9
+        overlapping = np.count_nonzero(world.contacts.manifold.depth > OVERLAP)
+        return np.inf if drives else (1.0 + 1e-9) * world.kinetic_energy() + 1e-9 + PUSH * overlapping
 
     def check(self) -> None:
         """After steps."""
