@@ -55,27 +55,29 @@ def _compile(functions: Iterable[tuple[int, Linkable]]) -> None:
 
 
 def _compile_together(functions: Sequence[Linkable], helpers: int) -> None:
-    """This process and others each take a share, its longest first, and then what the others have not begun.
+    """This process and others each take a share, its longest first, and then what the others have not begun, its
+    shortest first.
 
-    Functions that follow each other, such as those of 2D, are made of much the same, which each process compiles once.
+    Functions that follow each other, such as those of 2D, are made of much the same, which each process compiles once:
+    of another share it takes what asks for the least of that anew.
     """
     import multiprocessing  # half as long to import as numpy
 
-    share = -(-len(functions) // (helpers + 1))
-    starts = range(0, len(functions), share)
+    size = -(-len(functions) // (helpers + 1))
+    shares = [range(len(functions))[start : start + size] for start in range(0, len(functions), size)]
     functions = [
-        function for start in starts
-        for function in sorted(functions[start : start + share], key=lambda each: -each.dependency_count)
+        function for share in shares
+        for function in sorted((functions[k] for k in share), key=lambda each: -each.dependency_count)
     ]  # fmt: skip
     context: Any = multiprocessing.get_context("fork")
     begun, compiled = context.Array("b", len(functions)), context.SimpleQueue()
     started = [
-        context.Process(target=_help, args=(functions, begun, start, compiled), daemon=True) for start in starts[1:]
+        context.Process(target=_help, args=(functions, begun, share, compiled), daemon=True) for share in shares[1:]
     ]
     for process in started:
         process.start()
     try:
-        _compile(_taken(functions, begun, 0))
+        _compile(_taken(functions, begun, shares[0]))
         for process in started:  # each has one function left
             log.left = sum(other.is_alive() for other in started)
             process.join()
@@ -87,9 +89,9 @@ def _compile_together(functions: Sequence[Linkable], helpers: int) -> None:
             log.loaded -= 1  # this process loads what the other one has compiled
 
 
-def _taken(functions: Sequence[Linkable], begun: Any, start: int) -> Iterator[tuple[int, Linkable]]:
-    """What no process has begun, from ``start`` on and then from the first one on."""
-    for number in (*range(start, len(functions)), *range(start)):
+def _taken(functions: Sequence[Linkable], begun: Any, share: range) -> Iterator[tuple[int, Linkable]]:
+    """What no process has begun: of the share, then of all from the last one on."""
+    for number in (*share, *reversed(range(len(functions)))):
         with begun.get_lock():
             left = begun[:].count(0)
             mine, begun[number] = not begun[number], 1
@@ -97,13 +99,13 @@ def _taken(functions: Sequence[Linkable], begun: Any, start: int) -> Iterator[tu
             yield left, functions[number]
 
 
-def _help(functions: Sequence[Linkable], begun: Any, start: int, compiled: Any) -> None:
+def _help(functions: Sequence[Linkable], begun: Any, share: range, compiled: Any) -> None:
     """What another process does; a function that cannot be compiled raises in the first process when that links it."""
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches both; the first process ends this one
     log.listeners, log.announced, log.processes = [], True, 1
-    for _, function in _taken(functions, begun, start):
+    for _, function in _taken(functions, begun, share):
         known = len(log.compiled)
         with contextlib.suppress(Exception):
             function.link()
