@@ -7,17 +7,18 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 PYTEST := $(BIN)/pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 unexport PYTHONDONTWRITEBYTECODE  # or every worker would compile all tests and carom anew in each run
 
-.PHONY: run install test test-slow test-all test-long test-numba coverage kernels wheel wheels release docs bench figures typecheck lint clean
+.PHONY: run install check test test-slow test-long test-numba coverage kernels wheel wheels release docs bench figures typecheck lint clean
 
 run: .venv/plot  # a scene, with pictures in out/
 	$(BIN)/carom run $(SCENE) --out out $(ARGS)
 install: .venv/checks  # all that the checks need
 test: .venv/test
 	$(PYTEST) -m "not slow" $(ARGS)
+check: .venv/checks  # before a release: all but the long ones, on the library of kernels, on numba's own and in plain Python
+	.ci/run
+	$(MAKE) test-slow coverage test-numba
 test-slow: .venv/test
 	$(PYTEST) -m slow $(ARGS)
-test-all: .venv/test
-	$(PYTEST) $(ARGS)
 test-long: .venv/test  # more cases and steps of what the others test, before a release
 	$(PYTEST) -m long $(ARGS)
 	NUMBA_DISABLE_JIT=1 $(PYTEST) -m long tests/jit/test_plain_python.py

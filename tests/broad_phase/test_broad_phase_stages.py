@@ -46,6 +46,7 @@ def test_the_search_by_the_numbers_of_bodies(d, moving, static, search):
     assert FIND_IN_PYTHON not in boxes.asked
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize("crowd", [spread, mixed])
 @pytest.mark.parametrize(("moving", "static"), [(1, 0), (40, 10), (300, 20), (300, 400)])
@@ -59,6 +60,7 @@ def test_sleepers_are_found_by_what_moves_and_look_for_nothing(d, crowd, moving,
     assert pair_set(*boxes.find()) == expected
 
 
+@pytest.mark.slow
 @both_dimensions
 @settings(max_examples=12, deadline=None)
 @given(data=st.data())

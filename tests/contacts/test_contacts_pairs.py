@@ -97,6 +97,7 @@ def change(world, entities):
     world.contacts.enabled[::11] = False
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize("changed", [False, True])
 def test_pairs_and_between_of_every_list_and_all_types(d, changed):

@@ -90,6 +90,7 @@ def test_with_and_without_memory_are_the_same_to_the_bit(dimensions):
     assert hashes[:2] == hashes[2:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dimensions", [2, 3])
 @pytest.mark.parametrize("name", OTHERS)
 def test_a_value_by_handle_column_or_constructor_is_the_same(name, dimensions):

@@ -51,6 +51,7 @@ def go_on(world):
     return json.dumps([hashes, log, springs, world.step_count, world.alpha, world.stats().counters])
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 def test_loaded_worlds_go_on_with_the_same_bits_in_another_process(tmp_path):
     futures = []

@@ -119,6 +119,7 @@ def seen(world):
     return world.state_hash(), contacts, sorted(near), world.faults
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize(
     "build", [Level, lambda d: Level(d, 3.0), lambda d: Turning(d, 6)], ids=["grid", "uneven", "turning"]

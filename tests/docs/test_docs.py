@@ -163,6 +163,7 @@ def test_the_game_of_the_readme_prints_what_the_page_says(namespace, capsys):
     assert capsys.readouterr().out == "".join(block.text for block in blocks if block.info == ["text"])
 
 
+@pytest.mark.slow
 def test_the_scene_file_runs_for_as_long_as_it_says(monkeypatch, tmp_path):
     from carom.lab.cli.main import cli
 

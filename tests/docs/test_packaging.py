@@ -138,6 +138,7 @@ def test_a_wheel_holds_exactly_the_packages(source_copy, tmp_path):
     assert "carom = carom.__main__:main" in entry_points
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("installed", ["editable", "wheel"])
 def test_a_clone_named_carom_in_the_working_folder_hides_nothing(source_copy, tmp_path, installed):
     """An editable install puts src on the path; a folder without __init__.py comes after any package of its name."""
@@ -150,6 +151,7 @@ def test_a_clone_named_carom_in_the_working_folder_hides_nothing(source_copy, tm
     assert run_elsewhere(code, source_copy.parent, place).startswith(str(place / "carom" / "__init__.py"))
 
 
+@pytest.mark.slow
 def test_a_source_distribution_holds_the_tests(source_copy, tmp_path):
     archive = build("sdist", source_copy, tmp_path)
     with tarfile.open(archive) as tar:

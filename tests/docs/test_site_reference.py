@@ -23,6 +23,7 @@ def components() -> list[type[Component]]:
     return [each for each in values if isinstance(each, type) and issubclass(each, Component) and not each._abstract]
 
 
+@pytest.mark.slow
 def test_a_component_has_the_signature_and_the_table_of_its_columns(read):
     rigid_body = read["components.rigid_body.RigidBody"]
     shown = {each.name: (str(each.annotation), each.default) for each in rigid_body.parameters}

@@ -170,6 +170,7 @@ OPERATIONS = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @both
 @pytest.mark.parametrize("seed", [0, 1, *(pytest.param(k, marks=pytest.mark.long) for k in range(2, 12))])
 def test_a_list_that_follows_its_world_is_that_of_a_new_drawing(d, seed):

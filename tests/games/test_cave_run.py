@@ -83,6 +83,7 @@ def test_boots_spikes_walkers_and_the_switch():
     assert door.enabled
 
 
+@pytest.mark.slow
 def test_walkers_turn_and_the_map_has_no_mistake():
     assert maps.check(cave.MAP, cave.COMPONENTS) == []
     world = cave.build(keys=None)

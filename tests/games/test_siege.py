@@ -28,6 +28,7 @@ def test_castles_stand_until_something_hits_them():
     assert siege.game_of(world).state == "title"
 
 
+@pytest.mark.slow
 def test_two_peers_over_the_network_have_the_same_world():
     random, frames, peers = np.random.default_rng(3), 180, [siege.Peer(0, port=0, rows=3)]
     peers.append(siege.Peer(1, "localhost", peers[0].link.getsockname()[1], rows=3))

@@ -11,6 +11,7 @@ from helpers_games import fuzz, load, recorded
 swarm = load("swarm")
 
 
+@pytest.mark.slow
 def test_recorded_keys_kill_the_queen():
     world = swarm.play(islice(recorded("swarm.keys"), 30), waves=3)
     game, most = swarm.game_of(world), 0

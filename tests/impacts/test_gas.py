@@ -96,6 +96,7 @@ SWEPT += [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mode", "dt", "seeds", "seconds", "noise", "of_rate"), SWEPT)
 def test_pressure_and_rate_at_true_times(mode, dt, seeds, seconds, noise, of_rate):
     """They do not depend on the step; nothing rests, so no overlap but rounding; energy to 1e-11; and velocities at

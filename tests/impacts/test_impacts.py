@@ -62,6 +62,7 @@ def test_impact_time_on_the_path_of_the_integrator(d, integrator):
     assert abs(hit.normal[1]) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("integrator", "maker"), list(zip(INTEGRATORS, (ball, box, ball, box, ball), strict=True)))
 def test_bouncing_ball_comes_to_rest(maker, integrator):
     """Impacts end at T0 (1+e)/(1-e) (Zeno), less 2 * 2 dt / (1-e) below the threshold; then rest, without sinking."""
@@ -99,6 +100,7 @@ def test_a_floor_takes_any_number_of_impacts():
     assert all(velocity(world, b)[1] > 4.5 for b in balls)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("integrator", "rate"), [*((name, 60) for name in INTEGRATORS), *((name, 240) for name in (*LAG, "yoshida4"))]
 )

@@ -52,6 +52,7 @@ def assert_kept(states, masses, before, energy):
         np.testing.assert_allclose(kinetic, (masses[:, None] * before**2).sum(), rtol=4e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mode", "restitution", "gap"),
     pairwise(("discrete", "continuous", "event_driven"), (1.0, 0.9, 0.5), (0.0, 1 / 32)),
@@ -71,6 +72,7 @@ def test_a_rack_of_fifteen(mode, restitution, gap):
         np.testing.assert_array_equal(again, states)
 
 
+@pytest.mark.slow
 @both_dimensions
 @each_collision
 def test_any_order_of_ids(mode, d):

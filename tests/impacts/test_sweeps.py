@@ -221,6 +221,7 @@ def test_they_touch_then_and_not_before(pair, d):
     assert missed.sum() > 500
 
 
+@pytest.mark.slow
 @both_dimensions
 @every_pair
 def test_what_is_missed_is_missed_by_something(pair, d):

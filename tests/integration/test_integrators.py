@@ -96,6 +96,7 @@ def energy_ratio(positions, velocities, stiffness):
 Z = np.array([0.1, 0.5, 1.1, 1.9, 1.99])  # omega dt, below the limit 2; at 1 six samples repeat for ever
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("steps", "tenth"), [(2400, 800), pytest.param(40_000, 2000, marks=pytest.mark.long)])
 @pytest.mark.parametrize("method", ["semi_implicit_euler", "velocity_verlet"])
 def test_undamped_spring_stays_in_its_energy_band(method, steps, tenth):
@@ -213,6 +214,7 @@ FIGURE_EIGHT = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.early
 @pytest.mark.parametrize("steps", [1000, pytest.param(10_000, marks=pytest.mark.long)])
 @all_methods

@@ -82,6 +82,7 @@ TAU, G = 0.8, 9.81
 V_T = G * TAU  # terminal speed
 
 
+@pytest.mark.slow
 @all_methods
 @pytest.mark.parametrize("dt", [1e-3, 1 / 60, 0.5 * TAU])
 def test_terminal_speed_is_a_fixed_point(method, dt):
@@ -181,6 +182,7 @@ def return_error(method, steps=600):
     return np.abs(world.bodies.position - start).max()
 
 
+@pytest.mark.slow
 @all_methods
 def test_time_reversal(method):
     """B8: 100 bodies, springs, no collisions. VV and YO4 are their own adjoints and return; the others do not."""

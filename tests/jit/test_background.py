@@ -88,6 +88,7 @@ def run(code, cache, background="1"):
     return output_of(code, anew=True, **environment).splitlines()
 
 
+@pytest.mark.slow
 def test_one_function_after_the_other_and_nobody_waits(tmp_path):
     lines = run(FUNCTIONS + ONE_AFTER_THE_OTHER, tmp_path)
     assert lines == ["[True, False, True] 2 0.0", "3", "TypingError"]

@@ -105,6 +105,7 @@ def compiled(first_run, program):
     return program
 
 
+@pytest.mark.slow
 def test_a_second_process_loads_what_the_first_has_compiled(program):
     """Kernels made by a factory, closures over each other: numba's own cache never finds these again."""
     first = program.run(anew=True, PYTHONHASHSEED="1")
@@ -124,6 +125,7 @@ print(total(np.arange(3.0)), twice(np.arange(3.0)), len(log.compiled), log.loade
 """
 
 
+@pytest.mark.slow
 def test_loading_reads_nothing_of_numbas_own_functions_and_a_loaded_kernel_compiles_into_another(compiled):
     """They take .7 s and 50 MB, and what loads has no need of them; the first kernel that compiles has."""
     before = compiled.main

@@ -34,6 +34,7 @@ def carom(tmp_path):
     return lambda *arguments: run_carom("warm-up", *arguments, cwd=tmp_path, **environment)
 
 
+@pytest.mark.slow
 def test_the_second_time_everything_is_there_already(carom, tmp_path):
     there = len(list((tmp_path / "kernels").glob("*.kernel")))
     first = carom("falling.py", "--json")

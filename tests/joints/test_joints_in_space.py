@@ -143,6 +143,7 @@ FREE_PAIRS = {  # what holds two free blocks, beside each other along x
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", FREE_PAIRS)
 def test_two_free_blocks_keep_their_angular_momentum(kind: str):
     """To the gap of the joint, of order (w h)^2 with w h = 0.02 in a substep; and none gives energy of itself."""

@@ -130,6 +130,7 @@ def test_springs_without_damping_give_no_energy(springs, frequency):
     assert springs * frequency > 40.0 or late > 0.98 * early
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("arm", [0.0, 0.5, 1.0])
 def test_door_on_a_spring_swings_about_its_edge_at_the_frequency_of_the_spring(d, arm):
@@ -145,6 +146,7 @@ def test_door_on_a_spring_swings_about_its_edge_at_the_frequency_of_the_spring(d
     assert period(values(world, joints, door, 600), 1 / 60) == pytest.approx(1.0, abs=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("frequency", "leaves", "substeps"), pairwise((1.0, 8.0, 20.0, 29.0), (1, 4), (2, 4)))
 def test_springs_of_doors_give_no_energy(frequency, leaves, substeps):
     world, _ = joint_world(0, substeps=substeps)
@@ -171,6 +173,7 @@ def test_slider_on_a_spring_swings_at_its_frequency_wherever_its_axis_is(beside)
     assert period(values(world, joints, slider, 600), 1 / 60) == pytest.approx(1.0, abs=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("d", "kind", "stiff", "beside"),
     pairwise((2, 3), (Slider, Wheel), ((8.0, 2), (8.0, 4), (20.0, 4)), (-0.6, -2.0)),

@@ -59,6 +59,7 @@ def random_chain(seed: int, d: int, gravity: float) -> tuple[World, bool]:
     return world, first == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("gravity", [0.0, 9.81])
 def test_no_chain_gains_energy(d, gravity):
@@ -95,6 +96,7 @@ def chain_in_a_room(seed: int, d: int) -> World:
     return world
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 def test_no_chain_gains_energy_from_what_it_touches(d):
     touched = 0

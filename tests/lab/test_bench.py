@@ -40,6 +40,7 @@ def plane(gravity=(0.0, -9.81), *plugins, **settings) -> World:
 # -- the same bodies ------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @both
 def test_every_scene_begins_alike(name, monkeypatch):
     """Places, velocities, angles and spins are those of the scene, to the peer's precision; after two steps most bodies

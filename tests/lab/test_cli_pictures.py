@@ -91,6 +91,7 @@ def test_a_view_of_another_dimension_is_refused(carom):
     assert "view has 3 dimensions, the world 2" in refusal(carom("run", "jump", "--view", "0,0,0,4,4,4"))
 
 
+@pytest.mark.slow
 def test_3d_is_drawn_too(carom, tmp_path, ball):
     text = ball.read_text().replace("dimensions=2", "dimensions=3").replace("-9.81)", "-9.81, 0.0)")
     text = (
@@ -122,6 +123,7 @@ def test_pictures_into_a_file_are_refused_before_the_run(carom, tmp_path):
     assert "--out" in refusal(carom("run", "jump"))
 
 
+@pytest.mark.slow
 def test_an_empty_world_is_drawn_too(carom, tmp_path):
     for dimensions in (2, 3):
         text = (

@@ -78,6 +78,7 @@ def test_the_worlds_faults_are_shown(carom, ball):
     assert "impacts beyond 64 of a body in one step" in result.stdout
 
 
+@pytest.mark.slow
 def test_the_progress_says_what_compiles(tmp_path):
     """The names of kernels appear while they compile; of two here, the others are in the cache."""
     cache = copied_cache(tmp_path / "cache", "sum_forces", "match_warm_start")

@@ -51,6 +51,7 @@ def test_ctrl_c_while_importing_is_one_line():
     assert (result.returncode, result.stdout, result.stderr) == (130, "", "carom: stopped\n")
 
 
+@pytest.mark.slow
 def test_ctrl_c_inside_of_code_made_of_a_string_has_its_exit_code(tmp_path):
     """Python notes it there, and would end by the signal."""
     (tmp_path / "scene.py").write_text("def build(settings, seed=0):\n    exec('raise KeyboardInterrupt')\n")
@@ -59,6 +60,7 @@ def test_ctrl_c_inside_of_code_made_of_a_string_has_its_exit_code(tmp_path):
     assert (result.returncode, result.stdout, result.stderr.strip()) == (130, "", "carom: stopped")
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="no groups of processes")
 def test_ctrl_c_while_compiling_is_one_line(tmp_path):

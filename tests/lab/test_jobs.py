@@ -106,6 +106,7 @@ def test_a_changed_file_or_question_is_measured_anew(carom, tmp_path):
     assert builds() == first
 
 
+@pytest.mark.slow
 def test_without_joblib_one_process_does_it_and_says_so_once(carom, tmp_path, monkeypatch):
     with_it = carom("trade", "jump", *SHORT, "--json")
     monkeypatch.setattr(jobs, "joblib", None)

@@ -33,6 +33,7 @@ def build(settings, seed=0):
 """
 
 
+@pytest.mark.slow
 def test_the_command_tells_the_limits_of_a_scene(carom):
     """50 rad/s: 2 / 50 s; a third smaller for Yoshida's method, none for explicit Euler."""
     Path("spring.py").write_text(SPRING)

@@ -45,6 +45,7 @@ def test_each_value_is_measured_in_each_repeat_another_one_first():
 # -- the command and its pages -------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_study_prints_draws_and_fills_a_page(studies, tmp_path):
     page = tmp_path / "page.md"
     page.write_text("# Page\n\n<!-- studies limits -->\nold\n<!-- end of studies limits -->\nafter\n")
@@ -154,6 +155,7 @@ def test_startup_times_processes_with_caches_of_their_own(studies, monkeypatch):
     assert "jump shipped 3 4.50 3.00 .. 6.00 0.250 0.125 2.00 130" in re.sub(" +", " ", done.stdout)
 
 
+@pytest.mark.slow
 def test_a_process_is_timed_and_one_that_fails_is_no_measurement():
     found = startup._start("jump", os.environ["CAROM_CACHE_DIR"], "")
     assert 0 < found["imports"] < found["seconds"]

@@ -79,6 +79,7 @@ def test_not_inside_a_step():
 # -- the world is not changed --------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("collision", ["discrete", "continuous", "event_driven"])
 def test_asking_changes_no_bit_of_what_follows(collision):
     """Bouncing and resting bodies on springs, with calls before each of eight steps around the first impacts, against

@@ -72,6 +72,7 @@ def turning(d, method, stiffness, drag, damping=0.0, dt=1 / 60):
 # -- the published table -------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", TABLE)
 def test_the_limits_are_those_of_the_table(method):
     """B6, for w = 40 /s, of places and of turns: 0.9 of the limit is suggested; 0 where no step is stable."""
@@ -196,6 +197,7 @@ def test_coupled_bodies_grow_from_about_the_limit_on(method, seed):
     world.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("d", "method"), [(2, "semi_implicit_euler"), (3, "velocity_verlet"), (2, "rk4")])
 def test_a_turning_body_grows_beyond_the_limit_alone(d, method):
     for drag in (0.0, 20.0):

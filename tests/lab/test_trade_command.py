@@ -71,6 +71,7 @@ def test_what_a_game_prints_does_not_go_to_stdout(carom, tmp_path):
     assert "said" in result.stderr
 
 
+@pytest.mark.slow
 def test_json_alone_goes_to_stdout_and_nothing_runs_twice(carom, monkeypatch):
     pytest.importorskip("joblib")
     first = carom("jump", *SHORT, "--json")
@@ -94,6 +95,7 @@ def test_several_scenes_one_of_them_refused(carom, tmp_path):
     assert "crowd.py: not measured: crowd.py is chaotic" in plain.stdout
 
 
+@pytest.mark.slow
 def test_options_reach_the_scene_and_the_grid(carom, tmp_path):
     scene_file(tmp_path, BALL)
     result = carom(
@@ -121,6 +123,7 @@ def test_the_chart_tells_what_is_noticed_what_failed_and_what_to_use(tmp_path):
     assert "position error" in figure(case, "position").axes[0].get_xlabel()
 
 
+@pytest.mark.slow
 def test_without_matplotlib_everything_but_pictures(carom, monkeypatch):
     for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"] + ["carom.lab.trading.chart"]:
         monkeypatch.delitem(sys.modules, name, raising=False)

@@ -76,6 +76,7 @@ def compared(world):
 shots.compared = compared
 
 
+@pytest.mark.slow
 def test_a_game_that_spawns_is_compared_by_means_over_its_seeds():
     result = trade(shots, seconds=1.5, vary={"dt": (1 / 30,), **METHOD}, **FEW).scenes[0]
     assert result.chaotic
@@ -175,6 +176,7 @@ def runner(settings=None, seed=0):
 runner.compared = lambda world: {"hero": world.bodies.position[0]}
 
 
+@pytest.mark.slow
 def test_inputs_act_at_their_times_in_every_run_and_their_age_is_told_apart():
     """A key acts up to a step early and ends up to a step late, each of which is 5 m/s times the step."""
     plan = {"seconds": 0.8, "repeats": 4, "timing": False, "thorough": True}
@@ -212,6 +214,7 @@ def test_steps_are_not_tried_that_inputs_would_cut_into_pieces():
     assert max(cell.dt for cell in grid(facts, {})) == facts.settings.dt
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("returned", "words"), [
     (3, "compared must return a dict"), ({"x": "much"}, "compared must give a number"), ({"x": [1, 2, 3]}, "a place"),
 ])  # fmt: skip

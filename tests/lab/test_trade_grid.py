@@ -117,6 +117,7 @@ def test_the_reason_why_a_world_cannot_be_measured(build, reason):
         case_of(build, seconds=20.0 if build is stars else 2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("options", "words"), [
     ({"norms": ("positon",)}, "did you mean 'position'"),
     ({"norms": "position"}, "norms must be a sequence"),

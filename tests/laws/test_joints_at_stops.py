@@ -84,6 +84,7 @@ def test_a_door_flung_at_its_stop_stays_on_its_hinge(d):
         assert gaps[1] < gaps[0] / 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 def test_trees_of_hinges_with_limits_gain_nothing_and_hold(d):
     """Six balls of 1 to 10 or 1 to 1,000 kg on hinges with limits, thrown at random: no energy is gained, and with

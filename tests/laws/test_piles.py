@@ -109,6 +109,7 @@ def test_ten_thousand_discs_come_to_rest(seed):
 # -- without friction, as published -------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("e", [0.8, *(pytest.param(e, marks=pytest.mark.long) for e in (0.3, 0.0))])
 def test_a_pile_of_a_thousand(e):
     """After 15 to 20 s all is at rest except single discs: mean overlap 0.2 %, greatest 2 % of a diameter."""

@@ -96,6 +96,7 @@ def crowd(seed, mode, *, steps=80):
         return Crowd(most, lost, [text for text in world.faults if "no room" not in text])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("seed", seeds(1, 8, known=(5,)))
 def test_a_crowd_without_room_stays_slow(seed, mode):

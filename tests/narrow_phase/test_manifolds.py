@@ -40,6 +40,7 @@ def heap(slope: float, **options) -> World:
     return world
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slope", [0.0, 0.2])
 @pytest.mark.parametrize("collision", ["discrete", "event_driven"])
 def test_contacts_of_a_step_are_those_at_its_end(slope, collision):
@@ -61,6 +62,7 @@ def test_contacts_of_a_step_are_those_at_its_end(slope, collision):
     assert max(depths) > 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slope", [0.0, 0.2])
 def test_contacts_that_a_system_reads_are_those_at_the_end_of_free_flight(slope):
     """Also of pairs that rested, of which the step itself looks at its start; and reading changes nothing."""

@@ -102,6 +102,7 @@ def test_a_piece_on_a_hinge_has_the_period_of_a_physical_pendulum():
     assert np.diff(passes).mean() / 120 == pytest.approx(2 * math.pi * swing / m, rel=3e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
 def test_free_collisions_keep_momentum_and_angular_momentum_and_elastic_ones_energy(d, mode):
@@ -196,6 +197,7 @@ def test_what_bounces_on_a_part_of_what_rests_finds_it_at_rest():
     assert at(world, table[0]).rotation == pytest.approx(0.0, abs=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["continuous", "event_driven"])
 @pytest.mark.parametrize("restitution", [0.0, 1.0])
 def test_fast_pieces_do_not_pass_walls(mode, restitution):

@@ -66,6 +66,7 @@ def walked(points, distance, mode, ease):
             return points[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
 def test_each_step_ends_on_the_path(mode, d):
@@ -83,6 +84,7 @@ def test_each_step_ends_on_the_path(mode, d):
             np.testing.assert_allclose(at(world, entity), expected, rtol=0, atol=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ease", [False, True])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 50, 0.1, 1 / 30])
 def test_it_arrives_at_corners_to_the_bit_in_the_step_it_should(dt, ease):

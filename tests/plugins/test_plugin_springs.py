@@ -37,6 +37,7 @@ def run(world, seconds):
         world.step()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dimensions", [2, 3])
 @pytest.mark.compiled
 def test_two_masses_swing_as_the_closed_form_says(dimensions):
@@ -61,6 +62,7 @@ def test_two_masses_swing_as_the_closed_form_says(dimensions):
     np.testing.assert_allclose(world.momentum(), 0.0, atol=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("integrator", "tolerance"), [("velocity_verlet", 2e-5), ("rk4", 1e-9)])
 @pytest.mark.compiled
 def test_a_damped_oscillator_on_a_wall(integrator, tolerance):
@@ -93,6 +95,7 @@ def test_a_chain_of_100_hangs_as_it_should():
     assert [spring.tension for spring in springs][::33] == pytest.approx([10.0, 6.7, 3.4, 0.1], rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 def test_a_rope_only_pulls():
     world, springs = make(integrator="velocity_verlet", dt=1 / 1000)

@@ -44,6 +44,7 @@ def thrown(*plugins, gravity=0.0, systems=(), collider=True, **settings):
     return world
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize(
     ("place", "moves"),
@@ -208,6 +209,7 @@ def columns(world):
     return {name: np.array(getattr(world.bodies, name)) for name in COLUMNS}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("colliders", [True, False])
 @pytest.mark.parametrize("systems", [(), (Idle,)], ids=["alone", "with a system"])
 @pytest.mark.parametrize("anchor", ["check_columns", "keep_start", "check_flight", "close_step"])

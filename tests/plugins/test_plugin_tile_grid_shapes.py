@@ -117,6 +117,7 @@ def test_overlaps_are_those_with_the_polygons(seed):
     assert touching > 40
 
 
+@pytest.mark.slow
 @pytest.mark.plain
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.compiled) for seed in (1, 2, 3))])
 def test_casts_end_where_the_polygons_begin(seed):
@@ -141,6 +142,7 @@ def test_casts_end_where_the_polygons_begin(seed):
     assert hits > 10
 
 
+@pytest.mark.slow
 @each_mode
 @pytest.mark.parametrize("name", BODIES)
 def test_seams_of_level_tiles_are_silent(mode, name):
@@ -160,6 +162,7 @@ def test_seams_of_level_tiles_are_silent(mode, name):
         world.close()
 
 
+@pytest.mark.slow
 @each_mode
 @pytest.mark.parametrize("fields", [{}, {"make": single}], ids=["two", "one"])
 @pytest.mark.parametrize("slope", [1.0, 0.5])

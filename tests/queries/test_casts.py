@@ -42,6 +42,7 @@ def check_cast(hits, many, i, bodies, cast, tolerance):
         np.testing.assert_array_equal(many.point[i], first.point)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("d", "n", "sizes"), pairwise((2, 3), (60, 800), ("even", "power", "clusters")))
 def test_casts_through_many_bodies(d, n, sizes):
     """Of a point, of spheres and boxes, some without extent."""

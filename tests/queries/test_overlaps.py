@@ -47,6 +47,7 @@ def depths(bodies, centre, half, sphere):
     return np.where(bodies.sphere, of_spheres + bodies.half[:, 0], -bodies.gap(centre, half, False))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("d", "n", "sphere"), pairwise((2, 3), (60, 800), (True, False)))
 def test_overlaps_of_many_bodies(d, n, sphere):
     """Which, how deep, in order, by layers, masks, groups and what is left out; moved out by the depth, they touch."""
@@ -91,6 +92,7 @@ def test_overlaps_of_many_bodies(d, n, sphere):
     assert world.bodies.entity[hits.rows].tolist() == hits.entities.tolist()
 
 
+@pytest.mark.slow
 @both_dimensions
 def test_casts_meet_what_a_body_would_meet(d):
     """The nearest of those that layers, masks and groups let meet, that the call asks for and does not leave out."""

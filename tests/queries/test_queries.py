@@ -46,6 +46,7 @@ def test_nearest_of_many_bodies(d, n, sizes):
         assert abs(on_surface) < 10 * tolerance
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize(("n", "sizes"), [(60, "even"), (800, "even"), (800, "spread")])
 def test_touching_many_bodies(d, n, sizes):

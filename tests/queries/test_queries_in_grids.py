@@ -31,6 +31,7 @@ def compare(world, bodies, rng):
             assert min(rays.distance[i], 4.0) == pytest.approx(min(met.min(), 4.0), abs=1e-6)
 
 
+@pytest.mark.slow
 @both_dimensions
 def test_answers_follow_steps_and_writes(d):
     """Bodies that stay near their cells in the grid of the step, cross a few, or are moved far away: a few or many."""
@@ -51,6 +52,7 @@ def test_answers_follow_steps_and_writes(d):
     assert outside > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("d", "count", "kinds", "grids"),
     [

@@ -105,6 +105,7 @@ def test_the_manifold_has_the_corners_that_bear_it():
         assert [contact.entity_a for contact in points] == points.entity_a.tolist()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seconds", [10, pytest.param(60, marks=pytest.mark.long)])
 def test_a_pyramid_of_fifty_rows_stands_still(seconds):
     """1,275 boxes: from 5 s on none creeps by a millimetre, and none overlaps by .0125."""
@@ -121,6 +122,7 @@ def test_a_pyramid_of_fifty_rows_stands_still(seconds):
         assert world.contacts.depth.max() < 0.0125
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 2))])
 def test_a_house_of_cards_stands(seed):
     """Five storeys of cards that lean on each other's corners, about 20 degrees from upright."""
@@ -295,6 +297,7 @@ def test_stones_come_to_rest_on_a_floor():
             assert world.kinetic_energy() < 1e-10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 def test_stones_of_many_corners_lie_still(mode):
     """Each on three points, of which some hardly push. One of 30 may rock on: of 1,800 others 14 do, on faces that are

@@ -171,6 +171,7 @@ def test_where_two_have_bounced_they_do_not_touch_again_as_they_have_turned_sinc
         assert world.kinetic_energy() == pytest.approx(before, rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize(("mu", "e"), [(0.0, 1.0), (0.4, 0.0), (0.4, 0.5), (0.4, 1.0)])
 def test_a_gas_of_boxes_and_balls_never_gains_energy_and_keeps_it_if_smooth_and_elastic(mu, e, mode):
@@ -190,6 +191,7 @@ def test_a_gas_of_boxes_and_balls_never_gains_energy_and_keeps_it_if_smooth_and_
     assert last == pytest.approx(first, rel=given) if mu == 0.0 else last < 0.9 * first
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("seed", [4, pytest.param(6, marks=pytest.mark.long)])
 def test_a_smooth_elastic_gas_of_boxes_in_space_keeps_energy(seed, mode):

@@ -124,6 +124,7 @@ def turned(random, d, lay, tilt, yaw=True):
 # -- against it -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("seed", range(4))

@@ -191,6 +191,7 @@ def test_what_turns_farther_than_contacts_can_follow_is_told():
         assert any(f"entity {entity}: turns so far in a step" in text for text in world.faults)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize(
     ("half", "r", "w", "e"), [(0.1, 0.2, 15.0, 0.0), (0.1, 0.2, 15.0, 0.5), (0.05, 0.1, 25.0, 0.0),

@@ -68,6 +68,7 @@ def distance_to(corners, x):
     return np.where(inside, 0.0, best)
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("seed", range(3))
@@ -247,6 +248,7 @@ def test_a_collider_that_is_gone_for_a_moment_leaves_the_inertia_as_it_was(seed,
         np.testing.assert_array_equal(kept, without)
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("seed", range(2))

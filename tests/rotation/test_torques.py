@@ -118,6 +118,7 @@ MOTIONS = {  # forces, the spin and the angle of the body, what is seen, its exa
 }
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize(("motion", "method"), half(MOTIONS, ORDERS))
 def test_errors_fall_with_the_step_as_the_integrator_says(motion, method):
@@ -128,6 +129,7 @@ def test_errors_fall_with_the_step_as_the_integrator_says(motion, method):
     assert math.log2(errors[0] / errors[1]) == pytest.approx(ORDERS[method], abs=0.2), errors
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize(
     ("method", "faster", "bound"),

@@ -55,6 +55,7 @@ def first_touch(box, start, way, radius, farthest):
     return at if at <= farthest else None
 
 
+@pytest.mark.slow
 def test_a_heap_goes_on_from_files_to_the_bit_falls_asleep_and_is_woken_by_a_blow(d, mode, tmp_path):
     """From snapshots too: in mid-air, in contact and asleep, where it stays to the bit without a spin."""
     with pit(d, mode, sleeping=True) as world:
@@ -87,6 +88,7 @@ def test_a_heap_goes_on_from_files_to_the_bit_falls_asleep_and_is_woken_by_a_blo
         assert np.abs(part(world, top, Transform).rotation - turned).max() > 1e-5
 
 
+@pytest.mark.slow
 def test_queries_meet_the_boxes_as_they_are_turned(d, mode):
     random, found = np.random.default_rng(1), 0
     with pit(d, mode) as world:

@@ -44,6 +44,7 @@ def bars_and_balls(seed, fastest):
     return *motions, least_gaps(*motions, dt), least_gaps(*motions, 1.25 * dt)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("fastest", [50.0, 500.0])
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
@@ -103,6 +104,7 @@ def test_boxes_that_turn_and_fall_through_more_than_a_floor_in_a_step_stay_above
         assert world.bodies.dynamic.position[:, 1].min() > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 def test_what_turns_fast_does_not_sink_into_what_the_floor_stops(mode):
     """A box that turns and the bar below it fall as fast: on their free ways they may not touch, but the bar is

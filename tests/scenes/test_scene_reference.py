@@ -22,6 +22,7 @@ def run(world, seconds):
     return world
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stiffness", "damping"), [(OMEGA**2, 0.0), (OMEGA**2, 0.5), (OMEGA**2, 5.0), (10.0, 0.1), (0.0, 2.0)]
 )

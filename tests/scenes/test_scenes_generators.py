@@ -111,6 +111,7 @@ def test_walls_stand_on_the_edge_and_overlap_in_the_corners(name, side, thicknes
 SMALL = {name: {"n": 400} for name in (*GENERATORS, "maze", "platforms")} | {"pyramid": {"rows": 12}}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("name", sorted({*scenes.names()} - {"rubble", "tumbler"}))
 def test_nothing_overlaps_at_the_start(name, seed):

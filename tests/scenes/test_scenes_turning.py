@@ -74,6 +74,7 @@ def test_the_tumbler_carries_its_boxes_up_and_loses_none():
     assert highest > -3.0  # the bottom is at -12, or the corner at -17
 
 
+@pytest.mark.slow
 def test_what_bears_the_others_in_a_tumbler_keeps_its_shape():
     """The deepest overlap of boxes of 0.5 m, in half of the steps: below 0.07 m as a mean of three sizes, each of which
     is off by a fifth by chance."""

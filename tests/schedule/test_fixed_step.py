@@ -187,6 +187,7 @@ def test_seconds_that_are_none_are_refused(seconds):
     assert world.clock.state() == state
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [0.1, 0.25, 1 / 3, 1.0, 2.5, 10])
 def test_slow_motion_takes_the_same_steps_less_often(hashes_by_step, scale):
     """After n frames floor(n scale 60 / rate) steps, each with the bits that it has at any scale; alpha the rest."""

@@ -66,6 +66,7 @@ def hashes(change, frames):
         return [*result, world.state_hash()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frames", [1 / 60, 1 / 25])
 @pytest.mark.parametrize("name", CHANGES)
 def test_the_flat_step_has_the_bits_of_all_parts_whatever_changes(name, frames, monkeypatch):

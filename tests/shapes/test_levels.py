@@ -66,6 +66,7 @@ def crowd(d, turned, seed):
     return world, shapes
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_pair_hits_if_every_level_hits(d, turned):

@@ -136,6 +136,7 @@ except StopIteration:
 """
 
 
+@pytest.mark.slow
 def test_a_window_of_pyglet():
     done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True)
     if done.stdout.startswith("SKIP"):

@@ -11,6 +11,7 @@ QUICK = ("billiards", "pyramid", "hills", "crane", "ragdoll", "lift")
 NAMES = [pytest.param(name, marks=() if name in QUICK else pytest.mark.long) for name in scenes.names()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_scene_is_seen(name):
     world = scenes.get(name).build(None, seed=0)

@@ -147,6 +147,7 @@ def test_what_is_near_hides_what_is_far_and_walls_between_are_glass(painter, wor
 # -- a window --------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_window_on_a_world_in_3d(painter, world, tmp_path):
     body = world.create_entity(Transform((1.0, 0.5, 0.5)), RigidBody(), SphereCollider(0.5))
     player = Player(world, (300, 200), record=tmp_path / "film.gif")

@@ -38,6 +38,7 @@ class Plain:
             esper.process(self.world.settings.dt)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "rk4"])
 def test_plain_esper_gives_the_same_bits_as_the_facade(integrator):
     worlds = [settled(integrator=integrator) for _ in range(2)]

@@ -72,6 +72,7 @@ def assert_like_deleted(broken, healthy, steps=8, entity=VICTIM):
         assert rest_of(broken, entity) == rest_of(healthy, entity), f"step {step}"
 
 
+@pytest.mark.slow
 @mostly_2d
 @each_mode
 @pytest.mark.compiled
@@ -94,6 +95,7 @@ def test_others_go_on_as_if_it_was_deleted(d, mode):
             assert all(np.isfinite(np.frombuffer(part)).all() for part in found[-1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "settings",
     [
