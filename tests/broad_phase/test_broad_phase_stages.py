@@ -86,6 +86,7 @@ def test_any_boxes(d, data):
         assert pair_set(*boxes.find()) == overlapping(lower, upper, moving)
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize(("moving", "static"), [(600, 0), (600, 30), (600, 700), (20, 700)])
 def test_uneven_boxes_are_left_to_trees(d, moving, static):

@@ -32,6 +32,7 @@ def check_uniform(lower, upper, inside, grid=None):
     return len(found[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("d", "filling", "offset"), pairwise((2, 3), (0.01, 0.3, 1.0, 2.5), (0.0, -1e7)))
 def test_even_boxes_and_some_of_any_size(d, filling, offset):
     rng = np.random.default_rng(1)
@@ -64,6 +65,7 @@ def test_lattices_lines_and_touching(d, data):
     check_uniform(lower, upper, data.draw(st.integers(max(1, n - BRUTE_FORCE_MAX), n)))
 
 
+@pytest.mark.slow
 @both_dimensions
 def test_full_cells(d):
     """More objects in a row of cells than are looked at together, up to the limit of a cell, and beyond it none."""
@@ -122,6 +124,7 @@ def check(lower, upper, moving):
     return len(expected)
 
 
+@pytest.mark.slow
 @both_dimensions
 @settings(max_examples=12, deadline=None)
 @given(data=st.data())
@@ -243,6 +246,7 @@ def test_a_level_is_seen_as_it_is(d, movers):
             world.component_for_entity(sphere, RigidBody).linear_velocity = (0.0,) * d
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize("fixed", [0, 40, 900])
 def test_long_kinematic_boxes_leave_the_others_in_their_grid(d, fixed):

@@ -113,6 +113,7 @@ def test_any_boxes_at_all(d, data):
     check_everything(np.ascontiguousarray(boxes[:, 0]), np.ascontiguousarray(boxes[:, 1]), rng)
 
 
+@pytest.mark.slow
 @both_dimensions
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10**6), exponent=st.integers(-300, 300), n=st.integers(25, 300))

@@ -32,6 +32,7 @@ def laden_plank(world, d, x):
         world.create_entity(Transform((x + k, 20.75, 0.0)[:d]), RigidBody(), Spin(), box)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("seed", range(3))
 def test_a_pile_has_the_same_bits_alone_and_beside_a_heap(seed, d):

@@ -191,6 +191,7 @@ def disturb(world, rng, entities, found):
             pass
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_what_the_loop_changes_counts_at_once(seed):
     """Deleted, tagged, untagged, disabled by the body of the loop: the rows that follow are as by definition."""

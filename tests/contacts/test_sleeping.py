@@ -33,6 +33,7 @@ def test_off_by_default_and_nothing_sleeps():
     assert not any(name in str(world.plan()) for name in ("rest_sleepers", "update_sleep", "leave_out_still"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mode", "method", "d", "substeps"), pairwise(MODES, METHODS, (2, 3), (1, 4)), ids=lambda value: str(value)
 )
@@ -128,6 +129,7 @@ def halves(sleeping: bool, d: int, mode: str) -> tuple[World, list[int], list[in
     return world, still, lively
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
 def test_what_is_awake_has_the_same_bits_as_without_sleeping(d, mode):

@@ -81,6 +81,7 @@ def test_components_changed_inside_a_step_count_from_the_next(world, kind, speed
     assert matches_esper(world)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("invariants")
 def test_any_sequence_of_changes_leads_to_what_esper_has():
     """Random operations, with plain esper, through the facade and in bulk, looked at in some rounds."""

@@ -44,6 +44,7 @@ WRONG = [
 CASES = [(make, field, value) for make, field, values in WRONG for value in values]
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize(("make", "field", "value"), CASES, ids=[f"{f}={str(v)[:20]}" for _, f, v in CASES])
 def test_wrong_values_are_refused_by_constructor_and_setter_which_names_the_entity(make, field, value):

@@ -133,6 +133,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_cannot_be_loaded_is_refused_in_one_line_and_leaves_nothing_behind(case, tmp_path):
     change, given, message = REFUSED[case]
@@ -149,6 +150,7 @@ def test_what_cannot_be_loaded_is_refused_in_one_line_and_leaves_nothing_behind(
     assert len(World.load(path, *GOOD, springs, components=[Bullet]).bodies) == 2  # plugins are as free as before
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 def test_a_file_of_which_an_array_was_edited_is_refused(tmp_path):
     """Whatever the array is, and whether it is shorter or holds other numbers: no step meets it."""
@@ -165,6 +167,7 @@ def test_a_file_of_which_an_array_was_edited_is_refused(tmp_path):
                     World.load(path, *GOOD, Springs(), components=[Bullet])
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 def test_no_damaged_byte_makes_another_world_or_another_error(tmp_path):
     path = tmp_path / "game.carom"

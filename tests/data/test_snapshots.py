@@ -150,6 +150,7 @@ def test_a_world_is_not_copied(do):
             do(thing)
 
 
+@pytest.mark.slow
 def test_two_peers_with_delayed_inputs_end_with_the_same_world(capsys):
     source = (ROOT / "examples" / "rollback.py").read_text(encoding="utf-8")
     example = {"__name__": "__main__"}

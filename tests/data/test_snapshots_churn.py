@@ -157,6 +157,7 @@ def future(world):
     return [(world.step(), world.state_hash(), len(world.contacts.begin))[1:] for _ in range(3)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(9))
 def test_snapshots_of_a_random_history_bring_back_the_world_and_its_future(seed, tmp_path):
     game, kept = Game(seed), []

@@ -102,6 +102,7 @@ def test_importing_physics_imports_no_drawing_and_no_command_line():
     assert not [m for m in modules if m in unwanted or m.startswith(tuple(f"{name}." for name in unwanted))]
 
 
+@pytest.mark.slow
 def test_importing_the_window_and_the_maps_loads_no_package_of_an_extra():
     """Extras are loaded when they are used, so the rooms can be imported, and read about, without them."""
     rooms = "carom.drawing", "carom.maps", "carom.view", "carom.lab"
@@ -122,6 +123,7 @@ def source_copy(tmp_path_factory) -> Path:
     return copy
 
 
+@pytest.mark.slow
 def test_a_wheel_holds_exactly_the_packages(source_copy, tmp_path):
     wheel = build("wheel", source_copy, tmp_path)
     with zipfile.ZipFile(wheel) as archive:
@@ -167,6 +169,7 @@ def test_a_source_distribution_holds_the_tests(source_copy, tmp_path):
     assert not [name for name in names if "/_kernels." in name or "deleted" in name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("code", ["import carom.framework, carom.plugins, carom.scenes", "import carom.lab.cli.main"])
 def test_the_compiler_is_not_loaded_by_an_import(code):
     """numba and llvmlite take longer than all the rest; a program that asks for help or lists scenes needs neither."""

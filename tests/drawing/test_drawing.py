@@ -62,6 +62,7 @@ def fields_of(collider, axes):
     return dataclasses.make_dataclass("Fields", values)(**values)
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @both
 @pytest.mark.parametrize("seed", [0, 1, *(pytest.param(k, marks=pytest.mark.long) for k in range(2, 12))])

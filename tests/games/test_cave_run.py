@@ -39,6 +39,7 @@ def test_recorded_keys_lead_out_of_the_cave():
     assert not world.faults
 
 
+@pytest.mark.slow
 def test_a_saved_game_goes_on_with_the_same_bits(tmp_path):
     world = cave.build(keys=None)
     cave.play([{"right"}] * 10, world)
@@ -110,6 +111,7 @@ def check(world):
     assert me.state in ("air", "floor", "steep", "climb")
 
 
+@pytest.mark.slow
 def test_any_keys_for_4_seconds():
     fuzz(cave, 4, check)
 

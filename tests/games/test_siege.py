@@ -21,6 +21,7 @@ def test_recorded_keys_bring_down_a_king():
     assert not world.faults
 
 
+@pytest.mark.slow
 def test_castles_stand_until_something_hits_them():
     world = siege.play([set()] * 600)
     assert siege.compared(world) == {"winner": -1, "stones": 152}
@@ -64,6 +65,7 @@ def check(world):
         assert (catapult.state != "empty") == world.entity_exists(catapult.sling)
 
 
+@pytest.mark.slow
 def test_any_keys_for_4_seconds():
     fuzz(siege, 4, check)
 

@@ -29,6 +29,7 @@ def test_recorded_keys_kill_the_queen():
     assert (game.gems, game.state) == (gems, "won")
 
 
+@pytest.mark.slow
 def test_who_stands_still_is_overrun():
     world = swarm.play([{"space"}])
     game = swarm.game_of(world)
@@ -60,6 +61,7 @@ def check(world):
     assert game.state != "play" or not late.any()  # what is over is gone in the step that follows
 
 
+@pytest.mark.slow
 def test_any_keys_for_4_seconds():
     fuzz(swarm, 4, check)
 

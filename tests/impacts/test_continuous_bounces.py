@@ -109,6 +109,7 @@ def test_parabolas_onto_static_geometry(method, dt, target, d):
     np.testing.assert_allclose(position(world, mover), touch + after * 0.1 + gravity * 0.005, atol=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mode", "dt", "target", "d"), pairwise(("continuous", "event_driven"), (0.25, 1.0), ("ball", "box"), (2, 3))
 )

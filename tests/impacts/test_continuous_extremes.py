@@ -135,6 +135,7 @@ def brawl(mode, *, length=1.0, time=1.0, mass=1.0):
     return positions(world, entities), velocities(world, entities), hits
 
 
+@pytest.mark.slow
 @every_mode
 @pytest.mark.parametrize(
     ("length", "time", "mass"),

@@ -55,6 +55,7 @@ OBLIQUE = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize(
     ("mode", "dt", "radius"),

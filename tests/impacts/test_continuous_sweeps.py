@@ -104,6 +104,7 @@ def test_a_bullet_and_its_partners_partners(mode):
     assert velocities(world, chain)[:, 0].tolist() == pytest.approx([0, 0, 0, 0, -6000], abs=1e-9)
 
 
+@pytest.mark.slow
 @each_sweep
 def test_what_a_step_of_several_searches_has_found_is_told(mode):
     """A sensor crossed on the way back, a contact disabled, a wall struck: all before pairs are searched again. What is

@@ -66,6 +66,7 @@ def test_nothing_passes_through(mode, d, kind, restitution):
         assert gap > 0.0 if restitution > 0.0 else gap > -1e-11
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet"])
 @swept

@@ -56,6 +56,7 @@ def check_galperin(settings, digits, seconds):
     return hits
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mode", "dt", "digits"), pairwise(MODES, (1 / 240, 1 / 60, 1.0), (0, 1, 2, 3)))
 def test_b17_galperin(mode, dt, digits):
     """Several impacts of one pair in a step: at dt = 1 all but the first and the last few fall into one."""

@@ -80,6 +80,7 @@ def mean_of(runs):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("dt", "seeds", "seconds", "noise", "of_rate"), DISCRETE)
 def test_pressure_and_rate_in_discrete_worlds(dt, seeds, seconds, noise, of_rate):
     """Z and the rate fall short by 2 v dt / sigma at most (B20), and never exceed."""

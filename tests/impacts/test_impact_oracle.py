@@ -120,6 +120,7 @@ def test_many_fast_bodies_in_several_rounds(mode, d):
         assert world.stats().counters["rounds"] > 0
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
 def test_several_strike_one_at_the_same_time(mode, d):
@@ -149,6 +150,7 @@ def test_several_strike_one_at_the_same_time(mode, d):
     assert left_out > 0 or mode == "discrete"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("d", "cap", "pillar"), pairwise((2, 3), (1, 2), (False, True)))
 def test_beyond_the_cap_nothing_is_lost(d, cap, pillar):
     """50 clusters of elastic bullets: stopped bodies keep their velocity, so each keeps momentum and energy."""
@@ -181,6 +183,7 @@ def test_beyond_the_cap_nothing_is_lost(d, cap, pillar):
     assert capped > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cap", [1, 2])
 @each_sweep
 def test_what_loses_energy_sticks(mode, cap):

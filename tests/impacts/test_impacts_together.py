@@ -94,6 +94,7 @@ def test_any_order_of_ids(mode, d):
             np.testing.assert_array_equal(again, states)
 
 
+@pytest.mark.slow
 @both_dimensions
 @each_collision
 def test_light_and_heavy_keep_their_energy(mode, d):

@@ -146,6 +146,7 @@ def test_boxes_by_face_edge_and_corner():
     assert box_box_sweep(point, point, (1.0, 2.0, -3.0), (-4.0, -8.0, 11.0)) == MISS
 
 
+@pytest.mark.slow
 def test_finite_numbers_of_any_size_give_a_time():
     """Lengths from 1e-300 to 1e300, all in one call."""
     rng = np.random.default_rng(4)

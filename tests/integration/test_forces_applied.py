@@ -70,6 +70,7 @@ def test_impulse_inside_a_system_acts_once(phase):
     assert rigid.linear_velocity.tolist() == [2.5, 0.0]
 
 
+@pytest.mark.slow
 @all_methods
 @pytest.mark.parametrize("with_force_system", [False, True])
 @pytest.mark.parametrize("phase", list(Phase))

@@ -123,6 +123,7 @@ def test_undamped_spring_stays_in_its_energy_band(method, steps, tenth):
             np.testing.assert_allclose(invariant, np.broadcast_to(Z**2, invariant.shape), rtol=tolerance)
 
 
+@pytest.mark.slow
 def test_yoshida_keeps_the_energy_of_a_spring():
     """B2's band for the fourth order: a symplectic method's energy oscillates by O(z^4) and does not drift."""
     z = np.array([0.05, 0.1, 0.2])
@@ -135,6 +136,7 @@ def test_yoshida_keeps_the_energy_of_a_spring():
 DAMPING_RATIOS = np.array([0.0, 0.05, 0.5, 1.0, 1.5])  # under, critically and over-damped
 
 
+@pytest.mark.slow
 @all_methods
 def test_damped_spring_is_the_matrix_power(method):
     """B3: 400 steps of every damping equal the textbook method's matrix power at rounding; mass 2 instead of 1."""
@@ -149,6 +151,7 @@ def test_damped_spring_is_the_matrix_power(method):
         np.testing.assert_allclose(got / scale, expected / scale, rtol=0, atol=10 * steps * EPS)
 
 
+@pytest.mark.slow
 @all_methods
 def test_observed_order(method):
     """B3: the error after 4/5 of a period falls by 2^p within 5 %; Yoshida's composition only without damping."""

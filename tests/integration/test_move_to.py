@@ -65,6 +65,7 @@ def test_the_step_ends_there_and_the_next_one_too(d, mode):
     assert not np.any(spin.angular_velocity)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @mostly_2d
 def test_a_tween_carries_a_crate(d, mode):

@@ -65,6 +65,7 @@ def test_double_root_of_semi_implicit_euler():
     assert np.array_equal(x, (-1.0) ** n * (1 + 2 * n))
 
 
+@pytest.mark.slow
 def test_what_explodes_is_reported():
     """B6, B7: growth by 1.5 per step; once not finite, a fault names the body, and others are as without it."""
     world = oscillators("explicit_euler", 1.0, 0.0, [2.5, 0.5], v0=1.0)
@@ -111,6 +112,7 @@ def damped_fall(method, dt, steps, staged=False):
     return positions[:, 0, 0], velocities[:, 0, 0]
 
 
+@pytest.mark.slow
 @all_methods
 @pytest.mark.parametrize("dt", [1e-9, 1 / 60, 2.5 * TAU, 100 * TAU])
 @pytest.mark.parametrize("staged", [False, True])
@@ -129,6 +131,7 @@ def test_linear_damping_is_exact(method, dt, staged):
         np.testing.assert_allclose(y, V_T * (t + TAU * np.expm1(-t / TAU)), rtol=1e-11, atol=1e-15)
 
 
+@pytest.mark.slow
 @all_methods
 def test_linear_damping_has_the_methods_order_with_a_spring(method):
     """Damping beside a force that depends on position keeps the method's order: exact solution of B3, zeta = 0.5."""

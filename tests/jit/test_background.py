@@ -108,6 +108,7 @@ def test_what_queries_need_is_compiled_while_the_game_runs(tmp_path):
     assert run(WORLD, tmp_path) == ["['find_hits'] True", "2 True 1"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not CAN_FORK, reason="processes are not forked here")
 def test_several_processes_compile_the_same_functions_as_one(tmp_path):
     """Of the two that are alike the second is loaded, or compiled by the other process at the same time."""

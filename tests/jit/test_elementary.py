@@ -52,6 +52,7 @@ def error(found: float, true: Decimal) -> float:
     return float(abs(Decimal(found) - true) / Decimal(math.ulp(found)))
 
 
+@pytest.mark.slow
 @pytest.mark.plain
 @pytest.mark.parametrize("name", list(FUNCTIONS))
 def test_less_than_a_unit_in_the_last_place(name):

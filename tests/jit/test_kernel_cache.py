@@ -175,6 +175,7 @@ print(width(Rock(1.0, 2.0)), size(Rock(1.0, 2.0)), len(log.compiled), log.loaded
 """
 
 
+@pytest.mark.slow
 def test_named_tuples_of_one_name_with_swapped_fields_are_two_types(program):
     program.main = FIELDS.format(fields="width height")
     assert program.run()[:2] == (1.0, 21.0)
@@ -182,6 +183,7 @@ def test_named_tuples_of_one_name_with_swapped_fields_are_two_types(program):
     assert program.run()[:3] == (2.0, 21.0, 2)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="permissions of files")
 def test_a_folder_that_others_may_write_to_is_refused_before_it_is_read(compiled):
     for mode in (0o770, 0o707):
@@ -207,6 +209,7 @@ def flipped(content: bytes) -> bytes:
     return content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "damages",
     [(lambda _: b"", lambda _: b"garbage" * 20), (lambda content: content[: len(content) // 2], flipped)],
@@ -219,6 +222,7 @@ def test_a_damaged_file_is_compiled_again_and_replaced(compiled, damages):
     assert compiled.run()[2:4] == (0, 2)
 
 
+@pytest.mark.slow
 def test_without_any_folder_to_write_to_everything_works_and_nothing_is_kept(program):
     blocked = program.folder / "a file"
     blocked.write_text("no folder can be made in here")
@@ -237,6 +241,7 @@ def test_without_any_folder_to_write_to_everything_works_and_nothing_is_kept(pro
     assert not list(program.folder.rglob("*.kernel"))
 
 
+@pytest.mark.slow
 def test_processes_that_compile_at_once_share_the_folder(program):
     """Each finds whole files or none; both write the same ones."""
     processes = [program.start() for _ in range(2)]

@@ -18,6 +18,7 @@ from carom.plugins.rotation import BoxCollider, Rotation, Spin
 HALF, RADIUS, SPEED = 0.1, 0.2, 15.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
 @pytest.mark.parametrize("e", [0.0, 0.5])
 @pytest.mark.parametrize("above", [0.0, 0.3])

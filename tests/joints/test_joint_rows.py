@@ -66,6 +66,7 @@ def test_a_world_that_goes_back_writes_the_rows_of_what_has_changed(monkeypatch)
     assert joints.columns()["entity"].tolist() == hinges
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_joints_that_come_go_and_change_move_as_if_all_were_written_again(seed):
     """Twins: one goes back to where it is before each step, which writes all rows from the components."""

@@ -65,6 +65,7 @@ CHANGES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", CHANGES)
 def test_what_hangs_asleep_wakes_when_its_joint_changes_and_not_before(change, tmp_path):
     """Also in a world that goes back, or is loaded, between the change and the next step."""

@@ -139,6 +139,7 @@ def joints_of_a_plugin():
     return world, joints
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("build", [hanging_chain, car_of_five_wheels, joints_of_a_plugin])
 def test_worlds_with_joints_go_on_to_the_bit(build, tmp_path):
     """As others that are made alike, also if a step fails; and after they went back, or were loaded from what was saved
@@ -270,6 +271,7 @@ def test_columns_have_values_and_the_speeds_at_which_these_change(d):
     assert (abs(after["speed"][exact]) > 0.01).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["continuous", "event_driven"])
 @pytest.mark.parametrize("ropes", [False, True])
 def test_fast_boxes_pass_no_thin_wall_whether_something_holds_them_or_not(mode, ropes):

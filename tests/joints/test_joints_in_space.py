@@ -74,6 +74,7 @@ def hinged(limits: Any = None, **fields: Any) -> tuple[World, Joints, int, int]:
     return world, joints, body, world.create_entity(hinge)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limits", [(0.0, 3.2), (-0.5, 6.5), (-1.0, 15.0), (-1.0, 3.0)])
 def test_hinge_turns_to_its_limit_however_far_that_is(limits: Any):
     world, joints, body, hinge = hinged(limits, motor_speed=4.0, max_torque=8.0)
@@ -212,6 +213,7 @@ def test_cone_bounds_swing_and_twist():
     assert math.atan2(math.hypot(x, y), z) == pytest.approx(0.5, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_wide_cone_bounds_its_twist_and_holds():
     """The twist is 2 atan2(q . axis, q_w) of the turn q of b against a, at any swing; without gravity, energy falls."""
     for seed in range(12):

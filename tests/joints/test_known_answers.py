@@ -40,6 +40,7 @@ def values(world, joints, joint, steps):
     return np.array(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rate", "bound"), [(60, 3e-4), (120, 1e-4), (240, 3e-5)])
 def test_physical_pendulum_has_the_period_of_the_elliptic_integral(rate, bound):
     world, _ = joint_world(dt=1.0 / rate)
@@ -87,6 +88,7 @@ def test_chain_of_50_hangs_for_a_minute():
     assert gaps(world, hinges).max() < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("substeps", [2, 4, 8])
 @pytest.mark.parametrize("ratio", [0.0, 0.1, 0.5, 1.0])
 def test_spring_has_its_period_and_decay(substeps, ratio):
@@ -117,6 +119,7 @@ def highest_energies(world):
     return highest
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("springs", "frequency"), [(1, 2.0), (1, 20.0), (8, 5.0), (32, 10.0), (64, 15.0)])
 def test_springs_without_damping_give_no_energy(springs, frequency):
     """Where they are stiff, or many at one body, they may lose some."""
@@ -164,6 +167,7 @@ def test_springs_of_doors_give_no_energy(frequency, leaves, substeps):
     assert late < 1.05 * early
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("beside", [0.0, 1.5, 3.0])
 def test_slider_on_a_spring_swings_at_its_frequency_wherever_its_axis_is(beside):
     world, joints = joint_world(0)
@@ -196,6 +200,7 @@ def test_springs_beside_the_centres_of_their_bodies_give_no_energy(d, kind, stif
     assert late < 1.05 * early
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("frequency", "damping_ratio"), [(3.0, 0.0), (29.0, 1.0), (31.0, 0.0), (100.0, 1.0), (1e4, 0.0), (1e4, 1.0)]
 )

@@ -111,6 +111,7 @@ def test_no_chain_gains_energy_from_what_it_touches(d):
     assert touched > 300
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 7])
 def test_bodies_of_three_moments_that_tumble_about_a_joint_gain_nothing(seed):
     """In 20 s. The first two steps make their velocities fit together."""

@@ -251,6 +251,7 @@ def tiny(monkeypatch):
     return some
 
 
+@pytest.mark.slow
 def test_ratios_are_within_repeats_and_queries_find_the_same(tiny):
     """But for boxes: pymunk tests the bounding boxes of the discs, and finds a few more."""
     result = run(timing.axes(), repeats=3)

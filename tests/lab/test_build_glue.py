@@ -158,6 +158,7 @@ def test_rounding_is_exact_and_keeps_signs(library):
     assert all(math.isnan(value) for value in into)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not ZIG, reason="the extra build is not installed")
 @pytest.mark.parametrize("name", PLATFORMS)
 def test_every_platform_is_linked_from_here_always_to_the_same_file(name, tmp_path):

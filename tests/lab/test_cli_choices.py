@@ -117,6 +117,7 @@ def test_what_a_file_prints_stays_out_of_the_json(carom, ball):
         assert words in result.stderr
 
 
+@pytest.mark.slow
 def test_a_file_says_its_view_and_its_seconds(carom, ball):
     text = ball.read_text()
     ball.write_text(f"{text}\nseconds = 0.25\nview = ((-5, -1), (5, 12))\n")

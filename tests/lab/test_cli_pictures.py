@@ -33,6 +33,7 @@ from carom.plugins.tile_grid import TileGridCollider
 carom, ball = helpers_cli.carom, helpers_cli.ball  # fixtures
 
 
+@pytest.mark.slow
 def test_run_prints_the_tables_and_draws_two_pictures(carom, tmp_path):
     result = carom("run", "billiards", "--seconds", "0.3", "--out", "pictures")
     assert result.exit_code == 0, result.stderr
@@ -48,6 +49,7 @@ def test_run_prints_the_tables_and_draws_two_pictures(carom, tmp_path):
         assert picture.stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_the_picture_of_the_paths_alone_and_a_part_of_it(carom, tmp_path):
     whole = report_of(carom("run", "shots", "--out", "new/whole.png", "--json"))
     part = report_of(carom("run", "shots", "--out", "part.png", "--view", "-1,-1.2,16,2.2", "--json"))
@@ -63,6 +65,7 @@ def test_the_picture_of_the_paths_alone_and_a_part_of_it(carom, tmp_path):
     assert shapes[1][1] < 0.4 * shapes[1][0]  # as wide and flat as the part is
 
 
+@pytest.mark.slow
 def test_a_recording_shows_every_third_step_and_changes_none(carom, tmp_path):
     plain = report_of(carom("run", "jump", "--steps", "30", "--no-pictures", "--json"))
     for name in ("film.gif", "new/film.webp"):
@@ -110,6 +113,7 @@ def test_3d_is_drawn_too(carom, tmp_path, ball):
     assert all((tmp_path / p).is_file() for p in report["pictures"])
 
 
+@pytest.mark.slow
 def test_without_matplotlib_the_run_goes_on_and_says_what_is_missing(tmp_path):
     code = "import sys; sys.modules['matplotlib'] = None; import carom.lab.cli.main as c; c.main()"
     result = run_python(code, "run", "jump", "--steps", "2", "--json", cwd=tmp_path)

@@ -50,6 +50,7 @@ def test_bodies_beyond_the_walls_and_broken_ones_count_as_escaped(carom, ball):
     assert report["escaped"] == {"outside": 1, "non_finite": 0}  # through the floor; the upper side is open
 
 
+@pytest.mark.slow
 def test_bodies_that_are_not_finite_are_counted_and_the_rest_is_still_drawn(carom, ball):
     """1e200 m/s: the kinetic energy overflows at once, the position after some steps of 1e150 s."""
     fast = "    world.create_entity(Transform((5, 5)), RigidBody(linear_velocity=(1e200, 0)))"
@@ -90,6 +91,7 @@ def test_the_progress_says_what_compiles(tmp_path):
     assert "100%" in result.stderr
 
 
+@pytest.mark.slow
 def test_energy_that_is_not_conserved_says_why(carom):
     result = carom("run", "jump", "--no-pictures")
     for words in ("restitution below 1", "everything else", "escaped bodies +0 "):
@@ -100,6 +102,7 @@ def test_energy_that_is_not_conserved_says_why(carom):
     assert "joints that drive, spring or stop" in report["energy_changes"]
 
 
+@pytest.mark.slow
 def test_energy_that_is_kept_has_no_reason_to_change(carom):
     """Boxes at rest: their restitution is 0, and no impact has taken anything."""
     result = carom("run", "stack", "--no-pictures")

@@ -91,6 +91,7 @@ def test_the_axes_of_a_study_have_names_of_their_own(name):
 # -- scaling, ladder, startup --------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rungs", [features.LADDER, features.SPINS], ids=["ladder", "spins"])
 def test_features_are_measured_beside_the_same_scene_without(rungs, monkeypatch):
     monkeypatch.setattr(features, "STEPS", 2)
@@ -125,6 +126,7 @@ def test_a_feature_adds_what_it_says():
         assert added >= more if more else not added
 
 
+@pytest.mark.slow
 def test_what_substeps_and_shorter_steps_buy_joints():
     """A quarter of the gap for twice the rate, or nearly."""
     tables, _ = joints.report(run(joints.axes(quick=True), 1))

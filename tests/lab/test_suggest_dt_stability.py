@@ -144,6 +144,7 @@ def test_an_integrator_of_a_plugin():
 # -- what takes part -----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "d", "share"), [(2, 2, 0), (7, 3, 0), (30, 2, 0), (60, 2, 0.01), (320, 2, 0.01)])
 def test_chains_of_springs(n, d, share):
     """n bodies between two walls, w_max = 2 sqrt(k / m) sin(n pi / (2 (n + 1))), is found to rounding of the
@@ -175,6 +176,7 @@ def growth_of_system(method, force, damping, h):
     return np.abs(np.linalg.eigvals(np.array(columns).T)).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "seed"), list(zip(METHODS, range(len(METHODS)), strict=True)))
 def test_coupled_bodies_grow_from_about_the_limit_on(method, seed):
     """Random springs, dampers and linear damping of two to four bodies: the eigenvalues of the world's own step. Modes

@@ -39,6 +39,7 @@ class Disables(System):
         self.world.contacts.enabled[:] = False
 
 
+@pytest.mark.slow
 def test_it_imports_neither_the_command_line_nor_a_test_framework():
     code = "import sys, carom.lab.testing; print('\\n'.join(sys.modules))"
     modules = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()

@@ -116,6 +116,7 @@ def test_a_chaotic_crowd_is_named_and_measured_by_statistics(tmp_path):
     assert measured.refused == ""
 
 
+@pytest.mark.slow
 def test_what_rests_is_judged_by_what_it_sinks(tmp_path):
     case = case_of(scene_file(tmp_path, REST), vary={"dt": (1 / 60,), "substeps": (4,)})
     assert (case.chaotic, case.norm) == (False, "overlap")

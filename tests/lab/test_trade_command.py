@@ -61,6 +61,7 @@ def test_a_newcomers_file_is_measured_and_the_line_keeps_the_error(carom, tmp_pa
         assert world.bodies.dynamic.position[0, 1] == pytest.approx(1.25 - 5 * since_apex**2, abs=1e-3 * 3.0 * 1.7)
 
 
+@pytest.mark.slow
 def test_what_a_game_prints_does_not_go_to_stdout(carom, tmp_path):
     speaks = "class Speaks(System):\n    def process(self, dt):\n        print('said')\n"
     world = "world = World(Physics(dimensions=2, gravity=(0.0, -10.0)), settings=settings)"
@@ -112,6 +113,7 @@ def test_options_reach_the_scene_and_the_grid(carom, tmp_path):
     assert charts == {"trade-mine-py-count.png", "trade-mine-py-position.png"}
 
 
+@pytest.mark.slow
 def test_the_chart_tells_what_is_noticed_what_failed_and_what_to_use(tmp_path):
     case = trade_module.trade(scene_file(tmp_path, BULLET), vary={"dt": (1 / 30,)}, timing=False).scenes[0]
     (axes,) = figure(case).axes
@@ -134,6 +136,7 @@ def test_without_matplotlib_everything_but_pictures(carom, monkeypatch):
     assert not list(Path("out/trade").iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("target", "words"), [
     (("--max-error", "1e-4", "--integrators", "explicit_euler"), "no settings keep the position error below 0.0001"),
     pytest.param(
@@ -147,6 +150,7 @@ def test_a_target_that_nothing_meets(carom, target, words):
     assert result.stderr.splitlines()[-1].startswith("carom: spring: ")
 
 
+@pytest.mark.slow
 def test_a_cost_that_nothing_meets(carom):
     result = carom("jump", "--max-cost", "1e-9", "--dt", "1/30", "--repeats", "1", "--seconds", "0.5")
     assert result.exit_code == 2

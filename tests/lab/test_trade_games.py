@@ -121,6 +121,7 @@ def test_a_game_may_begin_without_a_body_that_moves_by_itself():
     assert survey(Subject.of(begins_with_a_title), 1.0, Jobs(1)).trial.values == {"balls": [1.0]}
 
 
+@pytest.mark.slow
 def test_balls_on_a_line_touch_in_order():
     def line(settings, seed=0):
         world = World(Physics(dimensions=2, gravity=(0, 0)), settings=settings)
@@ -233,6 +234,7 @@ def test_what_cannot_be_compared_is_refused(returned, words):
             trade(game, norms=("wher",), **FEW)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "options"), [("survivors", {"enemies": 40}), ("platformer", {}), ("pool", {})])
 def test_the_games_of_the_examples_play(name, options):
     game = Subject.of(str(ROOT / "examples" / "games" / f"{name}.py"), options)

@@ -150,6 +150,7 @@ def test_functions_are_measured_here_and_their_options_reach_them():
     assert found["velocity_verlet", "discrete", 1 / 10] < 1e-12
 
 
+@pytest.mark.slow
 def test_a_build_with_settings_of_its_own_is_measured_with_those_that_are_asked_for():
     case = case_of(lambda settings, seed=0: scenes.get("jump").build(None), seconds=1.0, vary={"dt": (1 / 60, 1 / 120)})
     assert {point.settings.dt for point in case.points} == {1 / 60, 1 / 120}

@@ -78,6 +78,7 @@ def test_masses_of_1e_minus_12_and_1e12_in_one_island(seed, e, mode):
     check(mixed_heap(seed, e, mode), mode)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("masses", [(1e-12, 1e12), (1e12, 1e-12), (1e-12, 1e-12, 1e12), (1e12, 1e-12, 1e12)])
 def test_stacks_of_1e_minus_12_and_1e12(masses, mode):
@@ -92,6 +93,7 @@ def test_stacks_of_1e_minus_12_and_1e12(masses, mode):
 # -- places ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [200, pytest.param(1000, marks=pytest.mark.long)])
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("e", [0.0, 1.0])

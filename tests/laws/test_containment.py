@@ -69,12 +69,14 @@ def test_what_is_swept_stays_inside(seed, mode):
     assert found.out == 0, found.faults[-1:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", seeds(9, 500))
 def test_discrete_bodies_stay_inside_or_are_called_too_fast(seed):
     found = room(seed, "discrete")
     assert found.out == 0 or too_fast(found), found.faults[-1:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.45, 0.55, 0.9])
 def test_what_is_struck_into_a_thin_wall_stays_or_is_called_too_fast(share):
     """What is struck within a step meets nothing else until the next, which pushes it out on the side where its centre
@@ -92,6 +94,7 @@ def test_what_is_struck_into_a_thin_wall_stays_or_is_called_too_fast(share):
             assert told or (world.bodies.dynamic.position[:, 0] < 10.0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", SWEPT)
 @pytest.mark.parametrize("seed", seeds(5, 1000, known=(508, 2073, 2905, 3539)))
 def test_what_is_swept_stays_inside_under_any_pull(seed, mode):

@@ -96,6 +96,7 @@ def test_rooms_in_space_gain_nothing(mode, e, masses):
     check(room(0, mode, e, masses, d=3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mode", "e", "masses"), cases(pairwise(MODES, RESTITUTIONS, MASSES), 6))
 def test_rooms_of_boxes_gain_nothing(mode, e, masses):
     check(room(0, mode, e, masses, maker=box))

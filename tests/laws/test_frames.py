@@ -108,6 +108,7 @@ def test_scissors_stand(d):
             assert worst_gap(joints) < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 def test_a_motor_holds_a_lift(d):
     """Scissors whose second foot slides, held by a motor alone, bear 20 to 200 kg: the deck sinks by less than 5 mm;
@@ -143,6 +144,7 @@ def test_a_motor_holds_a_lift(d):
                 assert sunk < 0.005 if share > 1.0 else sunk > 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 def test_sliders_in_a_row_stay_on_their_rails(d):
     """Each slides along the one before it by up to 6 m, and the last is pulled over with 500 to 5,000 N: none leaves
@@ -192,6 +194,7 @@ def test_beams_of_welds_do_not_bend(d):
             assert worst_gap(joints) < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 def test_chains_swing_with_what_is_a_thousand_times_as_heavy(d):
     """2 to 12 links of 1 kg that fall from the horizontal with 30 to 1,000 kg at their end: no hinge opens by a

@@ -61,6 +61,7 @@ def test_a_resting_box_does_not_give_way(d):
     assert overlaps(world, [base])[0] == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize("e_floor", [0.0, 0.5, 1.0])
 def test_a_ball_falls_on_a_ball_at_rest(d, e_floor):

@@ -211,6 +211,7 @@ def test_a_cradle_on_pins_swings_on(lifted, joint, d):
         assert 0.95 * start < energy_of(world) - lowest < 1.02 * start
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", seeds(1, 60, (3,)))
 @pytest.mark.parametrize("mode", MODES)
 def test_rings_of_welds_under_stones_gain_no_energy(seed, mode):

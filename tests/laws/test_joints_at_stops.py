@@ -26,6 +26,7 @@ def vector(d, *numbers):
     return np.array([*numbers, 0.0, 0.0, 0.0][:d])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 def test_what_presses_on_a_stop_rests_there(d):
     """A ball on an arm of 10 to 100 times its radius (m r^2 / I up to 25,000), which a motor or a spring turns against
@@ -58,6 +59,7 @@ def test_what_presses_on_a_stop_rests_there(d):
             assert world.kinetic_energy() < 1e-9 * most
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 def test_a_door_flung_at_its_stop_stays_on_its_hinge(d):
     """A door of 2 m that meets its stop with 1 to 10 rad/s: its hinge opens by less than 1 cm, which is a quarter of
@@ -115,6 +117,7 @@ def test_trees_of_hinges_with_limits_gain_nothing_and_hold(d):
             assert gap < 0.08 or ratio > 10.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["rope", "driven rope", "weld"])
 @pytest.mark.parametrize("d", [2, 3])
 def test_what_is_far_from_where_a_joint_asks_comes_back_at_a_bounded_speed(d, what):

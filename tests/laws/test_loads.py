@@ -59,6 +59,7 @@ def test_boxes_carry_a_load(count, load, mode, d):
     assert not found.faults
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "load", "mode"), pairwise((1, 3, 7), HUGE, MODES))
 def test_a_load_beyond_all_bounds_passes_through_nothing(count, load, mode):
     """It stands, or a fault says that it is too much; in any case all stay in order, and what lies below stays."""
@@ -67,6 +68,7 @@ def test_a_load_beyond_all_bounds_passes_through_nothing(count, load, mode):
     assert found.faults or (found.overlap <= 0.005 and found.speed < 1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("masses", [(1, 1, 1, 1e4), (1, 1e4, 1, 1e4), (1e4, 1, 1, 1e4), (1e4, 1, 1e4, 1)])
 def test_heavy_on_light_comes_to_rest(mode, masses):
@@ -89,6 +91,7 @@ def test_a_tower_of_forty_is_at_rest(mode, d):
     assert stand(mode, (1.0,) * 40, d=d).speed < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 def test_a_tower_of_two_hundred_stands(mode):
     found = stand(mode, (1.0,) * 200, seconds=20)

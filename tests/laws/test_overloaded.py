@@ -49,6 +49,7 @@ def told(world):
     return any("too heavy" in text for text in world.faults)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("d", "mode", "kind"), CASES)
 def test_what_falls_freely_keeps_momentum_and_energy(d, mode, kind):
     """In the frame that falls with it no force acts: there momentum stays, and kinetic energy never rises."""
@@ -74,6 +75,7 @@ def test_what_falls_freely_keeps_momentum_and_energy(d, mode, kind):
         assert highest < 1.01 * start
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("d", "mode", "kind"), CASES)
 def test_a_floor_without_friction_takes_no_momentum_along_it(d, mode, kind):
     """It bears the pile, but what a blow gives along the floor stays, and no energy comes from it."""
@@ -94,6 +96,7 @@ def test_a_floor_without_friction_takes_no_momentum_along_it(d, mode, kind):
             assert world.component_for_entity(boxes[2], Transform).position[1] == pytest.approx(2.5, abs=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("d", "mode", "speed"), pairwise((2, 3), MODES, (1.0, -1.0, -3.0)))
 def test_a_lift_carries_an_overloaded_tower(d, mode, speed):
     """As a floor does, whichever way it moves."""

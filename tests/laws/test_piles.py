@@ -58,6 +58,7 @@ def heap(seed, mode, columns, rows, e, friction, *, seconds, maker=ball):
         return Pile(last, rms, int((~inside).sum()), gained)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("seed", seeds(1, 12))
 def test_equal_discs_that_lean_on_friction_come_to_rest(seed, mode):
@@ -206,6 +207,7 @@ def check_bin(found):
     assert found.fastest < REST
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mode", "e", "heavy"), pairwise(MODES, RESTITUTIONS, HEAVY))
 def test_bins_come_to_rest(mode, e, heavy):
     check_bin(settle(0, mode, e, heavy))

@@ -56,6 +56,7 @@ def out(first, count, mode):
     return {seed: farthest for seed, farthest in found.items() if not farthest <= HALF + WALL}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 def test_nothing_is_thrown_out_of_a_tight_room(mode):
     assert out(0, 30, mode) == {}

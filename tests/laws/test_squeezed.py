@@ -131,6 +131,7 @@ def behind_a_thin_wall(seed, mode, rate, count=2):
         return int(behind.sum())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [20, 30, 60])
 @pytest.mark.parametrize("mode", MODES[1:])
 def test_what_turns_stays_in_front_of_the_wall(mode, rate):

@@ -168,6 +168,7 @@ def test_boxes_in_each_other_part_gently(friction):
         assert speed(world) < 1e-9  # without friction the rows continue to slide apart
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.6, 0.0])
 def test_a_pyramid_of_fifty_rows_stands_without_drift(friction):
     """5 s. The boxes of a row touch without force between them: no sideways push, so no friction is needed."""

@@ -95,6 +95,7 @@ def play(seed, folder, count):
     return loaded
 
 
+@pytest.mark.slow
 def test_changed_maps_are_loaded_or_refused(tmp_path):
     assert 20 < play(1, tmp_path, 150) < 140
 

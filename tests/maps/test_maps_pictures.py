@@ -131,6 +131,7 @@ def test_a_missing_image_is_told_once_and_drawn_as_a_box(tmp_path, world):
     assert finding.text == f"image {tmp_path / 'basic.png'} is missing; what it shows is drawn as boxes"
 
 
+@pytest.mark.slow
 def test_no_module_of_maps_imports_what_is_heavy():
     """pygame is imported when something is drawn, and nothing else is needed."""
     roots = {name.partition(".")[0] for path in (ROOT / "maps").rglob("*.py") for name in imported(path)}

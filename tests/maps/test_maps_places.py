@@ -78,6 +78,7 @@ def test_tiles_and_tile_objects_are_flipped_in_all_eight_ways(flips, tmp_path):
     world.close()
 
 
+@pytest.mark.slow
 @FORMATS
 def test_objects_of_each_shape_are_where_they_were_drawn(suffix, tmp_path):
     """Turned clockwise around their corner, by degrees, in a group with an offset; against pixels."""

@@ -163,6 +163,7 @@ BROKEN = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BROKEN)
 def test_a_broken_map_names_the_place_and_leaves_nothing(name, tmp_path):
     broken, texts = BROKEN[name]

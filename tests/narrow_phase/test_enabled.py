@@ -62,6 +62,7 @@ def seen(world):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @mostly_2d
 @pytest.mark.parametrize("mode", MODES)
 def test_a_world_goes_on_as_if_they_were_not_there(mode, d, tmp_path):

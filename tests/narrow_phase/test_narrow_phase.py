@@ -94,6 +94,7 @@ def radius_of(a, b):
     return next(body[4] for body in (a, b) if body[0] == "sphere")
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize("first", [ball, box])
 @pytest.mark.parametrize("second", [ball, box])

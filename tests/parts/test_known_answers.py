@@ -150,6 +150,7 @@ def test_exact_flights_do_not_depend_on_the_step():
     assert ends[0] == pytest.approx(ends[1], abs=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["continuous", "event_driven"])
 @pytest.mark.parametrize("cut", [True, False])
 @pytest.mark.parametrize("struck", [False, True])

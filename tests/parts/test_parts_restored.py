@@ -35,6 +35,7 @@ def test_pieces_are_drawn_as_one_and_anew_where_they_were_put(kind):
         np.testing.assert_array_equal(drawn, [exact] * 2)
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 def test_snapshots_rollback_and_files_go_on_to_the_bit(tmp_path):
     world, parts = parts_world((0, -G))

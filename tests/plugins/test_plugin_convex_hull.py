@@ -78,6 +78,7 @@ def test_points_inside_are_left_out_at_any_size(size):
     assert np.array_equal(ConvexHullCollider(hull.hull).hull, hull.hull)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(30))
 def test_corners_and_volume_are_those_of_qhull(seed):
     """Of points anywhere, on a sphere, and of a lattice, which has many in a plane; read backwards it is the same."""
@@ -114,6 +115,7 @@ def test_inertia_of_tetrahedron_octahedron_and_of_what_is_off_its_centre():
 # -- in a world -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize(
     ("lean", "place", "turn", "spin", "e"),

@@ -117,6 +117,7 @@ def test_at_its_end_it_stands_and_what_stands_can_sleep():
     assert world.state_hash() == before
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize("mode", MODES)
 def test_what_sleeps_on_a_lift_rides_on_when_it_goes_on(mode):

@@ -119,6 +119,7 @@ def test_damping_never_makes_a_rope_push():
     assert rope.tension == pytest.approx(0.1 - 50.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("integrator", "collision"),
     [("semi_implicit_euler", "discrete"), ("velocity_verlet", "continuous"), ("semi_implicit_euler", "event_driven")],

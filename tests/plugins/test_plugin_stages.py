@@ -151,6 +151,7 @@ def bouncing(*plugins, gravity=-9.81, **more):
     return world
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 def test_a_stage_that_changes_nothing_changes_no_bit(mode):
     idle = Plugin("idle")
@@ -188,6 +189,7 @@ class Drag(ForceSystem):
         bodies.force -= 0.2 * bodies.linear_velocity
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4"])
 @pytest.mark.parametrize("forced", [False, True])
 def test_a_force_at_the_sum_of_forces_counts_whenever_they_are_summed(integrator, forced):
@@ -255,6 +257,7 @@ def uses_mass(state, dt):
     state.bodies.mass[0] = 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("function", "options", "message"),
     [
@@ -399,6 +402,7 @@ def test_columns_that_a_stage_names_have_rows_where_nothing_else_needs_them():
             assert (world.bodies.constant_force == (0.5, 0.25)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [{"integrator": name} for name in METHODS] + [{"collision": "event_driven"}])
 def test_forces_that_depend_on_where_bodies_are_have_the_bits_of_a_force_system(settings):
     """A spring to the origin with drag, beside a push: integrators of several evaluations sum them again."""

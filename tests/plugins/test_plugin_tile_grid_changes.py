@@ -134,6 +134,7 @@ def test_what_shares_a_map_keeps_its_own():
 # -- in a world --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_step_goes_on_as_if_the_whole_map_had_been_assigned():
     """Among balls that roll and rest on it; the hashes are equal in each step."""
     rng = np.random.default_rng(3)

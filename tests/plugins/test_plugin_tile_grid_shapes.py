@@ -93,6 +93,7 @@ def test_corners_fill_what_sides_and_lines_say():
     assert areas == [1, *[0.5] * 4, 0.25, 0.75, 0.75, 0.25, 0.75, 0.25, 0.25, 0.75, 0.5, 0.5, 0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_overlaps_are_those_with_the_polygons(seed):
     """A circle overlaps where its distance to the polygons is less than the radius, by as much; in corners by more."""
@@ -213,6 +214,7 @@ def test_a_hill_is_as_its_outline(mode, name):
     assert np.diff(energy).max() < 0.01  # 46 J/kg
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["box 2D", "capsule 2D"])
 def test_a_character_walks_over_hills(name):
     """At its speed, on the floor all the way, and as high as on the outline, with one collider and with two."""
@@ -243,6 +245,7 @@ LADDER = """
 """
 
 
+@pytest.mark.slow
 @each_mode
 @pytest.mark.parametrize("name", BODIES)
 def test_what_jumps_passes_one_way_cells_and_lands_on_them(mode, name):

@@ -69,6 +69,7 @@ def test_a_timer_fires_once_in_the_step_that_ends_with_its_seconds(kind, dt):
         assert kind == "loose" or not world.has_component(entity, Timer)
 
 
+@pytest.mark.slow
 def test_what_repeats_keeps_its_phase():
     """The n-th event is in the step in which n times the seconds end, and once a step at most."""
     world, due = world_of(dt=1 / 60), set()
@@ -90,6 +91,7 @@ def test_events_of_a_step_come_in_order_of_the_entities_also_of_bulk_and_of_no_b
     assert log == sorted(ids)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_created_inside_a_step_counts_from_its_end(kind):
     """Before, and in, and after the timers' own systems."""

@@ -150,6 +150,7 @@ def test_a_raft_rights_itself_as_its_metacentre_says(d, half):
     np.testing.assert_allclose(velocity(world, raft), 0.0, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [{"integrator": name} for name in METHODS] + [{"collision": "event_driven"}])
 def test_the_terminal_velocity_in_water(settings):
     """Weight less lift over drag, beside the flow: v = g (m / (rho V) - 1) / drag, exact in every method."""
@@ -213,6 +214,7 @@ ORBITS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("integrator", "error"), ORBITS[1:])
 @mostly_2d
 def test_orbits_close_as_well_as_the_method_is(d, integrator, error):

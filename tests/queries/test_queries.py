@@ -19,6 +19,7 @@ from carom.plugins.standard_sweeps import ball as ball_sweep
 from carom.systems.queries import batch
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("d", "n", "sizes"), pairwise((2, 3), (60, 800), ("even", "power", "clusters")))
 def test_nearest_of_many_bodies(d, n, sizes):
     world, bodies, side = scene(d, n, seed=n, sizes=sizes)
@@ -68,6 +69,7 @@ def test_touching_many_bodies(d, n, sizes):
     np.testing.assert_array_equal(world.bodies.entity[spheres.rows], spheres.entities)
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize("n", [60, 800])
 def test_neighbours_of_many_bodies(d, n):
@@ -107,6 +109,7 @@ def test_ties_go_to_the_smaller_id(d):
     assert world.query_nearest(away, exclude=entities[0]).entity == entities[1]
 
 
+@pytest.mark.slow
 @both_dimensions
 def test_the_order_of_rows_does_not_matter(d):
     """The kinds of bodies decide on rows and trees; ids and positions are the same, and so are the bits."""
@@ -282,6 +285,7 @@ WRONG = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.plain
 @pytest.mark.parametrize("message", WRONG)
 @pytest.mark.parametrize("empty", [True, False])

@@ -111,6 +111,7 @@ def test_the_free_top_is_that_of_jacobis_functions(method):
         assert np.linalg.norm(spin_top(dt, 4.0, integrator=method)[0] - exact) < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize(
     ("method", "beside"),
@@ -127,6 +128,7 @@ def test_momentum_energy_and_the_quaternions_length_stay(method, beside):
     assert beside or np.linalg.norm(after - before) <= 1e-12 * np.linalg.norm(before)
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize("turn", [0.5, 2.0, 5.0])
 @pytest.mark.parametrize("method", ["velocity_verlet", "rk4"])
@@ -152,6 +154,7 @@ def test_what_turns_far_in_a_step_keeps_its_energy(method, turn):
             assert abs(energies() / start - 1).max() <= 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 def test_the_middle_axis_flips_when_it_should():
     """Dzhanibekov: the times at which w2 passes 0 are those of the closed form, to .01 s in 50 s at 60 Hz."""

@@ -76,6 +76,7 @@ LYING = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize("mode", [pytest.param("discrete", marks=pytest.mark.plain), "continuous", "event_driven"])
 @pytest.mark.parametrize("shape", LYING)
@@ -116,6 +117,7 @@ def boxes_and_balls(world, seed, n=36, speed=3.0, **collider):
     assert len(world.bodies.dynamic) == n  # all are in the world
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mu", "e"), [(0.0, 1.0), (0.5, 1.0), (0.5, 0.5)])
 def test_a_thousand_pairs_keep_momentum_angular_momentum_and_smooth_ones_energy(mu, e):
     """Boxes of any size, mass, angle and spin meet off their centres, each pair on its own."""
@@ -242,6 +244,7 @@ def test_boxes_that_bounce_come_to_rest(e, mode):
         assert np.abs((moving.rotation + math.pi / 4) % (math.pi / 2) - math.pi / 4).max() < 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 def test_a_needle_in_a_room_gains_nothing(mode):
     """Smooth, it spins by some rad in a step about its length, of which it has hardly any inertia. What is pushed out

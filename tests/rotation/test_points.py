@@ -177,6 +177,7 @@ def lying(d, angle):
     return angle if d == 2 else rotation(0, 0, angle)
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("floor", [HalfSpaceCollider, AABBCollider, BoxCollider])

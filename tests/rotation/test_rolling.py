@@ -69,6 +69,7 @@ def test_rolling_friction_stops_a_ball_and_holds_it_on_a_slope(d):
             assert v[0] < 1e-3 if slope < b / r else v[0] > 4e-3  # m/s: of the first steps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
 def test_on_a_slope_it_rolls_or_slips_as_newton_says(d, mode):

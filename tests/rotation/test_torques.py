@@ -148,6 +148,7 @@ def test_the_energy_of_a_heavy_top_stays(method, faster, bound):
     assert abs(along - before) < bound * abs(before)
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @methods
 @pytest.mark.parametrize("d", [2, 3])
@@ -179,6 +180,7 @@ def test_a_failed_step_and_a_snapshot_bring_back_every_bit(d, method):
         assert world.state_hash() == later
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("wrong", "d", "method"), pairwise((math.nan, -math.inf, 1e200), (2, 3), tuple(ORDERS)))
 def test_a_torque_that_cannot_be_takes_its_body_out(wrong, d, method):
     """As a force that cannot be does: it is named once, stands still, and others go on to the bit as without it."""
@@ -302,6 +304,7 @@ def test_torques_end_with_their_system():
         assert "turn_on_way" not in {kernel.kernel for kernel in world.plan().kernels}
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @methods
 @pytest.mark.parametrize("d", [2, 3])
@@ -330,6 +333,7 @@ def test_limits_of_speed_and_damping_that_no_step_resolves(d, method):
                     assert abs(part(world, entity, Transform).rotation) <= 2 * (step + 1) / 60 + 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @methods
 @pytest.mark.parametrize("d", [2, 3])

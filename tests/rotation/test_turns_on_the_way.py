@@ -83,6 +83,7 @@ def test_a_turntable_whose_rim_goes_far_carries_a_box_level(w, mode):
     assert np.hypot(x[0], x[2]) == pytest.approx(np.exp(out), rel=1e-3 + w * dt * out)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES[1:])
 @pytest.mark.parametrize("d", [2, 3])
 def test_boxes_that_turn_and_fall_through_more_than_a_floor_in_a_step_stay_above_it(d, mode):

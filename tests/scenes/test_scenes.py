@@ -37,6 +37,7 @@ def test_names_and_get():
         scenes.get("moon")
 
 
+@pytest.mark.slow
 def test_every_scene_has_a_row_in_the_manual_with_its_bodies():
     page = (Path(__file__).resolve().parents[2] / "docs" / "scenes.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `(\w+)` \| [^|]+ \| ([\d,]+) \|", page, re.MULTILINE)

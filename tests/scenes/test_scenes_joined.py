@@ -30,6 +30,7 @@ def mechanical_energy(world):
     return world.kinetic_energy() + world.potential_energy() + turning
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "planks", "crates", "gap"), [(0, 30, 8, 0.1), (1, 30, 8, 0.1), (0, 60, 12, math.inf)])
 def test_the_bridge_bears_what_falls_on_it_and_blows_give_no_energy(seed, planks, crates, gap):
     """Islands that are struck have more substeps for a moment; their joints stay as stiff as they are."""

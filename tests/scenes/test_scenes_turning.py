@@ -25,6 +25,7 @@ def test_cue_balls_follow_stop_and_come_back_with_two_sevenths_of_their_speed():
     np.testing.assert_allclose(-spins * billiards_spin.RADIUS, sevenths, rtol=0, atol=1e-3 * billiards_spin.SPEED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_the_flippers_throw_and_no_ball_is_lost(seed):
     """All balls stay above the flippers' tips, and are thrown to the upper half again and again."""

@@ -256,6 +256,7 @@ def test_a_system_stops_time_from_the_next_frame_on():
     assert [world.advance(3 / 60), world.advance(3 / 60)] == [3, 0]
 
 
+@pytest.mark.slow
 def test_replacing_other_settings_leaves_time_exact():
     """Only a new dt starts a new count; a game that changes another setting in every step has no rounding either."""
     world = make_world()

@@ -180,6 +180,7 @@ assert len(counts) > 500 and len(set(counts)) == 1, sorted(set(counts))
 """
 
 
+@pytest.mark.slow
 def test_the_game_of_the_readme_waits_for_nothing_after_its_first_frame():
     readme = Path(__file__).parents[2] / "README.md"
     output_of(README_LOOP, readme)

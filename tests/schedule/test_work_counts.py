@@ -37,6 +37,7 @@ def settled(scene: str, steps: int, **options) -> World:
     return world
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scene", "steps", "options"), [("pyramid", 500, {}), ("pile2d", 900, {"n": 200})])
 def test_a_pair_at_rest_is_evaluated_once_a_step(scene, steps, options):
     """Where the step starts; all that follows reads this manifold. Those that are near but do not touch: twice more."""

@@ -73,6 +73,7 @@ def test_what_is_no_camera_is_refused(change, text):
         Camera(**change)
 
 
+@pytest.mark.slow
 def test_a_camera_needs_no_drawing_library_and_sprites_say_what_they_need():
     code = (
         "import sys; sys.modules['pygame'] = None\n"

@@ -30,6 +30,7 @@ def frames_of(path):
         return np.array(found), film.info["duration"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["gif", "webp"])
 def test_a_window_is_filmed_as_it_is(world, tmp_path, kind):
     player = Player(world, (400, 300), record=tmp_path / "new" / f"film.{kind}", controls=False)
@@ -46,6 +47,7 @@ def test_a_window_is_filmed_as_it_is(world, tmp_path, kind):
     assert np.abs(frames[-1] - shown[-3]).mean() < 3  # picture 27 of 60 a second is number 9 of 20 a second
 
 
+@pytest.mark.slow
 def test_an_mp4_has_as_many_seconds_as_the_world(world, tmp_path):
     film = Recording(world, tmp_path / "film.mp4")
     for step in range(1, 61):

@@ -96,6 +96,7 @@ def test_fields_of_the_picked_body_are_typed(player):
     assert {"SphereCollider", "radius", "force", "inverse_mass", "kind", "row", "asleep"} <= shown
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("of", "name", "text", "reason"),
     [

@@ -427,6 +427,7 @@ def play(games, rules, **chosen):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 def test_a_few_games():
     play(4, 30)

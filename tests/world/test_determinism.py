@@ -158,6 +158,7 @@ def expected():
     return run_history(straight)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("build", HISTORIES, ids=lambda build: build.__name__)
 def test_any_history_with_the_same_ids_gives_the_same_bits(build, expected):
     """ACCURACY C22: the order of creation, and deleted bodies, change nothing."""

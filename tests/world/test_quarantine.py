@@ -119,6 +119,7 @@ def test_with_every_integrator_and_without_forces_or_bounces(settings):
         assert rests(broken, VICTIM, 8) == expected, name
 
 
+@pytest.mark.slow
 @both_dimensions
 @each_mode
 @pytest.mark.compiled
@@ -148,6 +149,7 @@ def test_a_sum_of_forces_that_is_infinite(d, mode):
     assert (position(broken, VICTIM) != before).any()
 
 
+@pytest.mark.slow
 @each_mode
 @pytest.mark.compiled
 def test_what_a_system_of_the_game_writes(mode):
@@ -188,6 +190,7 @@ VIEWS = {  # of one row, of a handle that is bound later, of one kind
 }
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize("field", VIEWS)
 def test_a_view_of_one_row_or_of_one_kind(field, tmp_path):

@@ -28,6 +28,7 @@ def pushes(random, frames):
     return (random.integers(-1, 2, frames // 7 + 1).repeat(7)[:frames] * 0.5).tolist()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("late", "lost", "most"), [(0, 0.0, 8), (5, 0.0, 8), (12, 0.3, 8), (3, 0.2, 2)])
 def test_late_and_lost_inputs_end_in_the_same_bits(late, lost, most):
     random, frames = np.random.default_rng(late), 120

@@ -110,6 +110,7 @@ def test_a_world_cannot_be_closed_from_within():
     world.close()
 
 
+@pytest.mark.slow
 def test_a_world_that_cannot_be_made_leaves_no_context_behind():
     gc.collect()  # worlds of other tests leave now, not meanwhile
     before = esper.list_worlds()

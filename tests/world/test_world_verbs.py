@@ -170,6 +170,7 @@ def test_a_deletion_that_says_too_much_does_not_stop_the_world(entity):
     assert len(world.bodies) == (1 if entity == "unknown to esper" else 0)
 
 
+@pytest.mark.slow
 def test_handlers_are_held_strongly_and_called_in_order():
     world, log = World(), []
     world.events.define("hit")
