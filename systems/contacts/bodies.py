@@ -124,7 +124,7 @@ def gather(state, dt):
                 if bodies.warm_started[i]:
                     a = sub(a, bodies.warm_start_velocity[i])
                 a = scale(a, 1.0 / dt)
-                if state.impacts.sweeps and bodies.impact_count[i] > 0:
+                if state.collides and state.impacts.sweeps and bodies.impact_count[i] > 0:  # in this step
                     x = start_of_flight(state, i, v, a, dt)
         solver.velocity[q], solver.shift[q], solver.acceleration[q] = v, x, a
     for q in range(solver.bodies if state.spinning else 0):

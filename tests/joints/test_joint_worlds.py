@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from joints.helpers_joints import G, at, chain, disc, joint_world, plank, run_failing
 from joints.helpers_machines import Gear, Pulley, machine_world, machines
-from worlds import run
+from worlds import MODES, run
 
-from carom import Physics, RigidBody, Settings, SphereCollider, StepError, Transform, World
+from carom import AABBCollider, Physics, RigidBody, Settings, SphereCollider, StepError, Transform, World
 from carom.plugins.joints import Ball, Cone, Distance, Hinge, Joints, Motor, Slider, Weld, Wheel
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
@@ -62,6 +62,25 @@ def test_joint_breaks_at_its_force():
     assert broken == [(pytest.approx(0.9 * G), broken[0][1])]
     assert broken[0][1] < 3
     assert len(joints) == 1
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_an_impact_of_the_step_before_moves_nothing_once_colliders_are_gone(mode):
+    """A weld holds its body where it is, but for the slack of one step of its springs."""
+    settings = Settings(collision=mode)
+    with World(Physics(dimensions=2), Rotation(), Joints(), settings=settings) as world:
+        shape, body = SphereCollider(0.25, restitution=0.5), RigidBody(linear_velocity=(9, 2))
+        one = world.create_entity(Transform((0, 0)), body, shape, Spin(inertia=1.0))
+        wall = world.create_entity(Transform((1, 0)), RigidBody(kind="static"), AABBCollider((0.25, 5)))
+        while not len(world.contacts.impacts):
+            world.step()
+        world.remove_component(one, SphereCollider)
+        world.delete_entity(wall, immediate=True)
+        place = np.array(at(world, one).position)
+        world.create_entity(Weld(None, one, anchor=tuple(place)))
+        world.component_for_entity(one, RigidBody).apply_impulse((3.0, -4.0))
+        world.step()
+        np.testing.assert_allclose(at(world, one).position, place, rtol=0, atol=1e-5)
 
 
 @pytest.mark.parametrize("event", ["joint_broken", "joint_lost"])
