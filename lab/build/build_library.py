@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Sequence
+import multiprocessing
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from itertools import repeat
 from pathlib import Path
 
 from carom import __version__
@@ -29,20 +32,30 @@ def build_library(
     wide
         some of the kernels as they are for processors with AVX2, which take these; with the same bits
     """
-    objects = [retarget(kernel.bitcode, platform, {kernel.compiled_as: kernel.symbol}) for kernel in kernels]
+    objects = _objects(kernels, platform, {kernel.symbol: kernel.symbol for kernel in kernels})
     entries = [
         Entry(kernel.symbol, kernel.symbol, kernel.arguments, kernel.result)
         for kernel in kernels if kernel.arguments is not None
     ]  # fmt: skip
     addresses = {kernel.symbol: kernel.symbol for kernel in kernels if kernel.arguments is None}
+    symbols = {kernel.symbol: kernel.symbol + AVX2 for kernel in wide}
     with_avx2 = dataclasses.replace(platform, features="+avx2")  # no more than that: what has it is asked for it alone
-    for kernel in wide:
-        symbol = kernel.symbol + AVX2
-        objects.append(retarget(kernel.bitcode, with_avx2, {kernel.compiled_as: symbol}))
-        addresses[symbol] = symbol
+    objects += _objects(wide, with_avx2, symbols)
+    addresses |= {symbol: symbol for symbol in symbols.values()}
     hashes = {kernel.symbol: kernel.hash for kernel in kernels} if compared else {}
     facts = {
         "layout": LAYOUT, "carom": __version__, "python": PYTHON, "writing": writing_digest(),
         "hashes": json.dumps(hashes),
     }  # fmt: skip
     link([*objects, assemble(glue(NAME, entries, addresses, facts, platform), platform)], output, platform)
+
+
+def _objects(kernels: Sequence[BuiltKernel], platform: Platform, symbols: Mapping[str, str]) -> list[bytes]:
+    """An object file of each kernel, on all processors. symbols: their names there, by those they have."""
+    if not kernels:
+        return []
+    bare = dataclasses.replace(platform)  # without LLVM's part of it, which stays in its process
+    exported = [{kernel.compiled_as: symbols[kernel.symbol]} for kernel in kernels]
+    with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
+        bitcodes = (kernel.bitcode for kernel in kernels)
+        return [*pool.map(retarget, bitcodes, repeat(bare), exported, chunksize=8)]
