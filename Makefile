@@ -16,7 +16,7 @@ test: .venv/test
 	$(PYTEST) -m "not slow" $(ARGS)
 check: .venv/checks  # before a release: all but the long ones, on the library of kernels, on numba's own and in plain Python
 	.ci/run
-	$(MAKE) test-slow coverage test-numba
+	$(MAKE) test-slow coverage test-numba docs
 test-slow: .venv/test
 	$(PYTEST) -m slow $(ARGS)
 test-long: .venv/test  # more cases and steps of what the others test, before a release
