@@ -23,9 +23,9 @@ test-long: .venv/test  # more cases and steps of what the others test, before a 
 	$(PYTEST) -m long $(ARGS)
 	NUMBA_DISABLE_JIT=1 $(PYTEST) -m long tests/jit/test_plain_python.py
 test-numba: .venv/test  # some laws on kernels that numba has compiled here, not on the library of them
-	CAROM_LIBRARY=0 $(PYTEST) -m "not slow" $(addprefix tests/laws/test_,energy.py loads.py symmetry.py turning.py) $(ARGS)
+	CAROM_LIBRARY=0 $(PYTEST) $(addprefix tests/laws/test_,energy.py loads.py symmetry.py turning.py) $(ARGS)
 coverage: .venv/test  # which lines of the engine the tests run: kernels as plain Python, with the same bits as compiled
-	NUMBA_DISABLE_JIT=1 $(PYTEST) -m "plain and not slow and not compiled" --cov --cov-report=term $(ARGS) \
+	NUMBA_DISABLE_JIT=1 $(PYTEST) -m "plain and not compiled" --cov --cov-report=term $(ARGS) \
 	  $$(grep -rl --include="test_*.py" "mark\.plain" tests | sort)  # all others would be collected in vain
 kernels: .venv/build  # a library of all that ships, beside the package: what is not edited then compiles no more
 	$(BIN)/carom build
