@@ -325,7 +325,8 @@ def cases():
         kind, _, mode = name.rpartition(" ")
         first, share = MODES.index(mode), SHARES[kind]
         for part in range(2):
-            marks = [pytest.mark.slow, *[pytest.mark.long] * (part or "3D" not in name or mode == "continuous")]
+            marks = [pytest.mark.slow, pytest.mark.compiled]
+            marks += [pytest.mark.long] * (part or "3D" not in name or mode == "continuous")
             victims = slice(first % share + part * share, None, 2 * share)
             yield pytest.param(build, victims, first, id=f"{name} {part}", marks=marks)
 
