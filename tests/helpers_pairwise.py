@@ -12,14 +12,16 @@ def pairwise(*values) -> list[tuple]:
     pairs = list(itertools.combinations(range(len(values)), 2))
     every = list(itertools.product(*map(range, map(len, values))))
 
-    def covered(case):
-        return {(i, case[i], j, case[j]) for i, j in pairs}
-
-    missing, chosen = set().union(*map(covered, every)), []
+    bits = {}  # of each pair of values, the number of a bit
+    for case in every:
+        for i, j in pairs:
+            bits.setdefault((i, case[i], j, case[j]), len(bits))
+    covered = [sum(1 << bits[i, case[i], j, case[j]] for i, j in pairs) for case in every]
+    missing, chosen = (1 << len(bits)) - 1, []
     while missing:
-        best = max(every, key=lambda case: len(covered(case) & missing))
-        missing -= covered(best)
-        chosen.append(best)
+        best = max(range(len(every)), key=lambda k: (covered[k] & missing).bit_count())
+        missing &= ~covered[best]
+        chosen.append(every[best])
     return [tuple(of[k] for of, k in zip(values, case, strict=True)) for case in sorted(chosen)]
 
 
