@@ -26,6 +26,7 @@ def mixed(rng, count, d):
     return centre - half, centre + half
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize(
     ("moving", "static", "search"),

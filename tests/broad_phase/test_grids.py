@@ -50,6 +50,7 @@ def test_even_boxes_and_some_of_any_size(d, filling, offset):
         assert check_uniform(lower[:inside], upper[:inside], inside, grid) is not None
 
 
+@pytest.mark.slow
 @both_dimensions
 @settings(max_examples=20, deadline=None)
 @given(data=st.data())
@@ -145,6 +146,7 @@ def test_any_boxes_look_into_even_ones(d, data):
     check(lower, upper, 100)
 
 
+@pytest.mark.slow
 @both_dimensions
 @settings(max_examples=10, deadline=None)
 @given(data=st.data())
@@ -196,6 +198,7 @@ def test_what_does_not_suit(d):
         assert check(lower, upper, 0) is None
 
 
+@pytest.mark.slow
 def test_too_many_pairs_are_left_to_the_tree():
     """Each of 8,500 boxes meets all 1,000 in the grid: what the limit does not allow, no grid finds."""
     centre = np.random.default_rng(4).random((9500, 2)) * 60
@@ -226,6 +229,7 @@ def touching(world):
     return found
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize("movers", [1, 60, 400])
 def test_a_level_is_seen_as_it_is(d, movers):

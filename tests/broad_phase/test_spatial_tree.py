@@ -99,6 +99,7 @@ coordinate = st.one_of(
 )
 
 
+@pytest.mark.slow
 @both_dimensions
 @settings(max_examples=25, deadline=None)
 @given(data=st.data())

@@ -12,6 +12,7 @@ from carom.components import SphereCollider, Transform
 DT = 1 / 60
 
 
+@pytest.mark.slow
 @each_mode
 @both_dimensions
 @pytest.mark.parametrize("gap", [1e-4, 1e-9, 1e-12])

@@ -65,6 +65,7 @@ def test_a_turntable_drives_more_points_than_there_are_bodies():
         np.testing.assert_allclose(moving.linear_velocity, np.cross((0.0, 0.1, 0.0), moving.position), atol=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 def test_an_order_is_kept_while_pairs_are_and_is_that_of_a_new_one(d):
     ends = []

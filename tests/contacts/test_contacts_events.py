@@ -88,6 +88,7 @@ def test_no_step_no_events():
     assert len(world.contacts.end) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [15, 30, 144, 0])
 def test_events_do_not_depend_on_the_frame_rate(rate):
     """Every event of 2 s, in order, equals those at 60 Hz; rate 0: irregular frames."""

@@ -52,6 +52,7 @@ def test_falls_asleep_and_stays_to_the_bit(mode, method, d, substeps):
     assert not any(is_asleep(world, *boxes))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gap", [0.006, 0.009, 0.012, 0.015, 0.03])
 @pytest.mark.parametrize("mode", MODES)
 def test_neighbours_that_do_not_touch_do_not_wake_each_other_in_turns(mode, gap):

@@ -38,6 +38,7 @@ def go_on(world: World, boxes: list[int], steps: int = 12) -> list[str]:
     return hashes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("when", ["due", "asleep", "woken"])
 def test_snapshots_and_files_go_on_to_the_bit(when, tmp_path):
     world = World(Physics(2, gravity=(0.0, -GRAVITY)), convex_polygon.plugin, settings=Settings(sleeping=True))

@@ -110,6 +110,7 @@ def test_the_contacts_of_the_last_sleeper_end_when_nothing_can_move_any_more():
     assert (len(world.contacts), len(world.contacts.end)) == (0, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cause", CAUSES)
 def test_what_wakes_an_island(asleep, cause):
     world, boxes, others, snapshot = asleep

@@ -28,6 +28,7 @@ class Once(System):
             action()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("immediate", [False, True])
 @pytest.mark.parametrize("where", ["START", "INTEGRATION", "BROAD", "NARROW", "RESPONSE", "END"])
 def test_entities_may_be_deleted_in_any_phase(world, where, immediate):

@@ -28,6 +28,7 @@ def polygon(number, corners=12):
     return (1.0 + 1e-6 * number) * np.stack((np.cos(angles), np.sin(angles)), axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 def test_a_map_that_changes_in_each_step_takes_no_more_room():
     """A thousand maps one after the other: there is room for those that are new, and for a few more."""
@@ -59,6 +60,7 @@ def test_a_map_that_changes_in_each_step_takes_no_more_room():
     assert np.array_equal(world.component_for_entity(ground, TileGridCollider).cells, tiles)
 
 
+@pytest.mark.slow
 def test_all_that_holds_an_array_keeps_it():
     """Bodies of two worlds, prefabs, values for many, handles of what was deleted, snapshots and copies of them."""
     worlds = [make_world(2) for _ in range(2)]
@@ -97,6 +99,7 @@ def test_all_that_holds_an_array_keeps_it():
     assert np.array_equal(worlds[0].component_for_entity(changing, ConvexPolygonCollider).vertices, polygon(-5))
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 def test_a_step_that_fails_has_its_arrays_back():
     world = make_world(2)

@@ -199,6 +199,7 @@ def test_errors_of_many_name_field_and_row_and_create_nothing(d, many, message):
     assert world.state_hash() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("d", "one", "other", "message"), ONE, ids=[message for *_, message in ONE])
 def test_errors_of_one_say_what_was_meant_and_create_nothing(d, one, other, message):
     world = make_world(d)

@@ -247,6 +247,7 @@ def test_components_of_carom_are_not_left_out(tmp_path):
         make_world().save(tmp_path / "w", leave_out=[Bullet])
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 def test_a_world_that_is_dropped_is_collected_with_its_context():
     world = make(2, "discrete")

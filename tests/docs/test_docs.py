@@ -281,6 +281,7 @@ def dead_links(page: Path, root: Path = ROOT) -> list[str]:
     return dead
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_the_links_lead_somewhere(page):
     assert dead_links(page) == []

@@ -95,6 +95,7 @@ def test_each_floor_imports_only_from_the_floors_below(floor):
         assert not above, f"{path.relative_to(ROOT)} imports from {sorted(above)}"
 
 
+@pytest.mark.slow
 def test_importing_physics_imports_no_drawing_and_no_command_line():
     modules = run_elsewhere("import sys, carom.plugins; print('\\n'.join(sys.modules))", ROOT, ROOT / "src").split()
     unwanted = ("click", "rich", "matplotlib", "carom.lab", "carom.scenes")

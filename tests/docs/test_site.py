@@ -93,6 +93,7 @@ def test_links_to_code_become_links_to_pages_of_it():
     assert code == {Path("examples/rollback.py"), Path("scenes")}
 
 
+@pytest.mark.slow
 def test_each_live_scene_has_a_picture_that_its_page_shows(tmp_path):
     pages.copy_pages(tmp_path)
     add_buttons(tmp_path)  # ValueError for a page without the picture

@@ -55,6 +55,7 @@ def test_a_saved_game_goes_on_with_the_same_bits(tmp_path):
     assert np.array_equal(cave.compared(again)["hero"], cave.compared(world)["hero"])
 
 
+@pytest.mark.slow
 def test_boots_spikes_walkers_and_the_switch():
     world = cave.play([{"right"}])
     game, (_, me, transform) = cave.game_of(world), hero_of(world)

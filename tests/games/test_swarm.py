@@ -38,6 +38,7 @@ def test_who_stands_still_is_overrun():
     assert (game.state, game.wave) == ("over", 3)
 
 
+@pytest.mark.slow
 def test_the_horde_has_a_most_and_the_guns_a_rate():
     world = swarm.play([{"space"}])
     game = swarm.game_of(world)

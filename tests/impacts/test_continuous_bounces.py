@@ -50,6 +50,7 @@ def test_b11_times_and_flights(mode, integrator):
             assert now == pytest.approx(G * DROP * e ** (2 * sure), rel=1e-11)
 
 
+@pytest.mark.slow
 @exact
 def test_b11_zeno_without_a_threshold_ends(mode, integrator):
     """Threshold 0: infinitely many impacts in a finite time. The step stays bounded, nothing sinks, and they end."""
@@ -72,6 +73,7 @@ def test_b11_zeno_without_a_threshold_ends(mode, integrator):
 # -- other parabolas -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "dt", "target", "d"),
     pairwise(

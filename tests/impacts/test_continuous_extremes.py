@@ -39,6 +39,7 @@ def test_c4_sizes_from_1e_minus_9_to_1e9(mode, d):
     np.testing.assert_allclose(velocities(world, [a, b])[:, 0], [-1e-6 / 3, 5e-6 / 3], rtol=1e-9)
 
 
+@pytest.mark.slow
 @mostly_2d
 @each_mode
 @pytest.mark.parametrize("offset", [0.0, 1e5, 1e7, 1e9, 1e12, 1e15])
@@ -57,6 +58,7 @@ def test_c6_head_on_far_from_the_origin(mode, d, offset):
     np.testing.assert_allclose(positions(world, [a, b])[:, 0], expected, rtol=0, atol=10 * ulp)
 
 
+@pytest.mark.slow
 @each_mode
 @pytest.mark.parametrize("integrator", ["velocity_verlet", "rk4"])
 @pytest.mark.parametrize(("dt", "steps"), [(1e-9, 100), (1e-6, 100), (0.25, 80), (1.0, 20), (10.0, 2)])

@@ -20,6 +20,7 @@ makers = pytest.mark.parametrize("maker", [ball, box])
 every_mode = pytest.mark.parametrize("mode", ["discrete", *MODES])
 
 
+@pytest.mark.slow
 @both_dimensions
 @every_mode
 @makers

@@ -88,6 +88,7 @@ def test_what_falls_beside_a_wall_of_tiles_falls_on():
     assert not len(world.contacts.impacts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mode", "integrator", "tolerance"),
     [("discrete", "semi_implicit_euler", 1e-12), ("continuous", "semi_implicit_euler", 1e-12),

@@ -31,6 +31,7 @@ def test_b15_a_thousand_passes(mode, d, radius):
     assert world.stats().counters["capped_impacts"] == 0
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize(
     ("mode", "e"), [("continuous", 1.0), *((mode, e) for mode in ("continuous", "event_driven") for e in (0.9, 1.5))]

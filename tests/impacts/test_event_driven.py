@@ -17,6 +17,7 @@ from carom.scenes import galperin
 DT, G = 1 / 60, 9.81
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mode", "maker", "speed", "gap", "arriving"),
     pairwise(("discrete", *MODES), (ball, box), (1.0, 120.0), (0.0, 1e-6, 0.01), (1, 2, 3, 4)),

@@ -128,6 +128,7 @@ def test_a_light_ball_is_not_shot_out_between_two_heavy_ones(restitution):
         assert world.kinetic_energy() <= energy * (1.0 + 1e-12)
 
 
+@pytest.mark.slow
 def test_groups_take_no_more_work_than_a_step_has():
     """Four hundred elastic balls that overlap: ten thousand impacts at one time, which kept a step busy for seconds."""
     random = np.random.default_rng(0)

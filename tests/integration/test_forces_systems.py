@@ -35,6 +35,7 @@ class Field(ForceSystem):
         return float(-(3.0 * bodies.charge.value * bodies.position[:, 0]).sum())
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @all_methods
 @pytest.mark.parametrize("charged", [(), (1,), (2, 4), (1, 2, 3, 4)], ids=["none", "one", "some", "all"])

@@ -40,6 +40,7 @@ ARCS = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @all_methods
 @pytest.mark.parametrize(("v0", "g", "hz", "ee", "si", "others"), ARCS)
 def test_jump_arc(method, v0, g, hz, ee, si, others):
@@ -73,6 +74,7 @@ def test_jump_arc(method, v0, g, hz, ee, si, others):
         assert positions[landing, 0] == pytest.approx(vx * (2 * n0 + sign) * dt, rel=1e-12)
 
 
+@pytest.mark.slow
 @all_methods
 @pytest.mark.parametrize("dt", [1e-9, 1e-6, 0.25, 1.0, 10.0])
 def test_extreme_steps_keep_the_closed_form(method, dt):

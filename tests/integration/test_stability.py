@@ -43,6 +43,7 @@ def step_matrices(method, stiffness, drag):
     return np.stack(columns, axis=-1)
 
 
+@pytest.mark.slow
 @all_methods
 def test_stability_limits(method):
     """B6: at 0.999 of a limit no eigenvalue of the step leaves the unit circle; at 1.01 one grows millionfold."""

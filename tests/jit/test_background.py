@@ -94,6 +94,7 @@ def test_one_function_after_the_other_and_nobody_waits(tmp_path):
     assert lines == ["[True, False, True] 2 0.0", "3", "TypingError"]
 
 
+@pytest.mark.slow
 def test_it_ends_with_the_program(tmp_path):
     run(FUNCTIONS + THE_END, tmp_path)
     assert len(list(tmp_path.glob("*.kernel"))) < 400

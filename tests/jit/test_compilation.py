@@ -111,6 +111,7 @@ def shear(x, y, out):
         out[2 * k], out[2 * k + 1] = x[2 * k] + 0.1 * y[2 * k], x[2 * k + 1] + 0.1 * y[2 * k + 1]
 
 
+@pytest.mark.slow
 def test_a_packed_kernel_is_another_one_with_the_same_bits(monkeypatch, tmp_path):
     """LLVM's SLP vectorizer works on both components of a vector at once, and reorders no sum."""
     monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path))

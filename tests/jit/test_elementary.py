@@ -94,6 +94,7 @@ def test_powers_at_the_edges():
     assert math.isnan(power(2.0, math.nan))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not JIT, reason="nothing compiles")
 @pytest.mark.parametrize("name", list(FUNCTIONS))
 def test_compiled_and_plain_have_the_same_bits(name):

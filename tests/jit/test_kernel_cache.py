@@ -196,6 +196,7 @@ def test_a_folder_that_others_may_write_to_is_refused_before_it_is_read(compiled
     assert compiled.run(**home)[2:4] == (0, 2)
 
 
+@pytest.mark.slow
 def test_a_variable_that_names_a_file_is_told_in_one_line(program):
     program.cache.write_text("not a folder")
     home = {"HOME": str(program.folder / "home"), "XDG_CACHE_HOME": ""}
@@ -252,6 +253,7 @@ def test_processes_that_compile_at_once_share_the_folder(program):
     assert program.run()[:4] == (9.0, 109.0, 0, 2)
 
 
+@pytest.mark.slow
 def test_the_first_wait_says_in_one_line_what_is_happening_and_later_ones_nothing(program):
     program.run()
     (line,) = program.stderr.splitlines()  # two kernels were compiled

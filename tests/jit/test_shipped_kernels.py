@@ -136,6 +136,7 @@ def test_joints_of_a_game_are_in_what_is_made_for_it(called, d):
     assert beyond(called, machines) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 def test_two_plugins_need_nothing_that_all_together_do_not(d):
     """So a world of all of them stands for those of any."""

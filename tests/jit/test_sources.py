@@ -111,6 +111,7 @@ def defined_in_systems() -> Iterator[tuple[str, str]]:
                 yield from ((name.id, str(path)) for name in names if isinstance(name.ctx, ast.Store))
 
 
+@pytest.mark.slow
 def test_a_constant_or_function_of_systems_has_one_meaning():
     places = defaultdict(list)
     for name, path in defined_in_systems():

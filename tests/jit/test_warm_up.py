@@ -78,6 +78,7 @@ def names_of_work(monkeypatch, *arguments):
     return done
 
 
+@pytest.mark.slow
 def test_what_is_to_be_compiled_can_be_chosen(monkeypatch):
     assert names_of_work(monkeypatch) == ["all that ships 2", "all that ships 3"]
     assert names_of_work(monkeypatch, "--dimensions", "3") == ["all that ships 3"]
@@ -103,6 +104,7 @@ def test_refusals_come_before_anything_compiles(monkeypatch, arguments, words):
     assert words in result.stderr.splitlines()[-1]
 
 
+@pytest.mark.slow
 def test_a_scene_that_fails_is_named(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bad.py").write_text("def build(settings=None, seed=0):\n    raise ValueError('no such level')\n")

@@ -49,6 +49,7 @@ def test_a_flipper_that_a_motor_starts_throws_the_ball_over_it(above, e, mode):
             assert fastest > 0.95 * SPEED * where
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
 @pytest.mark.parametrize("parts", [False, True])
 def test_a_motor_strikes_in_the_step_in_which_it_starts_in_a_loaded_world_too(tmp_path, parts, mode):

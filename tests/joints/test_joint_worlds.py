@@ -83,6 +83,7 @@ def test_an_impact_of_the_step_before_moves_nothing_once_colliders_are_gone(mode
         np.testing.assert_allclose(at(world, one).position, place, rtol=0, atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("event", ["joint_broken", "joint_lost"])
 def test_step_whose_handler_raises_is_taken_again_with_the_same_events(event):
     """As if nothing had happened; the world is no longer in the step."""

@@ -30,6 +30,7 @@ def spin_of(world: World, body: int) -> np.ndarray:
     return np.array(world.component_for_entity(body, Spin).angular_velocity)
 
 
+@pytest.mark.slow
 def test_door_swings_about_its_axis_with_its_period():
     world, joints = space()
     body = block(world, (0.5, 0, 0))
@@ -200,6 +201,7 @@ def test_slider_in_space_stops_at_its_limit():
     assert abs(np.dot(at(world, body).rotation, TURN)) == pytest.approx(1.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_cone_bounds_swing_and_twist():
     world, joints = space()
     body = block(world, (0, 0, 0.5), half=(0.1, 0.2, 0.5))

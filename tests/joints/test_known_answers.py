@@ -221,6 +221,7 @@ def test_springs_of_any_stiffness_gain_no_energy_in_a_chain(frequency, damping_r
         assert joints.state(last).value == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [1.0, 20.0])
 @pytest.mark.parametrize("most", [None, 50.0])
 def test_no_motor_is_stronger_than_limits(speed, most):

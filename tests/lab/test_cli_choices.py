@@ -29,6 +29,7 @@ def test_settings_come_from_the_scene_then_the_preset_then_set(carom):
     assert settings("--set", "slop=0.1", "--set", "slop=None")["slop"] is None
 
 
+@pytest.mark.slow
 def test_seconds_and_steps(carom, ball):
     def steps(*arguments):
         return report_of(carom("run", "ball.py", "--json", "--no-pictures", *arguments))["steps"]
@@ -64,6 +65,7 @@ def test_scenes_lists_all_with_their_descriptions(carom):
         assert name in result.stdout
 
 
+@pytest.mark.slow
 def test_version_and_python_dash_m():
     result = subprocess.run(
         [sys.executable, "-m", "carom", "--version"], capture_output=True, text=True, check=True

@@ -265,6 +265,7 @@ def final_picture(world, steps, lower, upper):
     return colours_of(final_sheet(world, steps, lower, upper)[0])
 
 
+@pytest.mark.slow
 def test_the_mark_of_a_ball_turns_with_it():
     """Two balls side by side: one has turned by 2.5 rad and has a line there; one has no Spin and is plain."""
     with World(Physics(dimensions=2, gravity=(0.0, 0.0)), Rotation()) as world:
@@ -281,6 +282,7 @@ def test_the_mark_of_a_ball_turns_with_it():
     assert sum(marked) <= 3  # the line alone, with its neighbours
 
 
+@pytest.mark.slow
 def test_what_turns_is_drawn_as_it_is_turned():
     """A box, a capsule and a square of 4 by 1 or so, turned by 60 degrees: inside and outside, along and across."""
     plugins = capsule.plugin, convex_polygon.plugin
@@ -328,6 +330,7 @@ def test_tile_maps_half_spaces_and_one_way_platforms_are_drawn():
     assert any(len(outline) >= 2 and set(map(tuple, outline)) == {(1, 4), (3, 4)} for outline in outlines)
 
 
+@pytest.mark.slow
 def test_the_repeated_shapes_of_a_path_are_turned_as_they_were():
     """A disc that rolls: the point of its rim that was in front is on a cycloid."""
     with World(Physics(dimensions=2, gravity=(0.0, 0.0)), Rotation()) as world:

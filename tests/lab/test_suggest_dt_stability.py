@@ -92,6 +92,7 @@ def test_the_limits_are_those_of_the_table(method):
             world.close()
 
 
+@pytest.mark.slow
 @all_methods
 def test_limits_are_those_of_the_textbooks_step(method):
     """For damping ratios between those of the table, and Yoshida's method, which is not in it."""
@@ -108,6 +109,7 @@ def test_a_limit_beyond_which_a_longer_step_is_stable_again():
     assert 0.4 < limit < 5 / 4.444 * (1 + 1e-9)
 
 
+@pytest.mark.slow
 def test_event_driven_worlds_have_the_limits_of_their_flight():
     """Second order, like velocity Verlet, for any integrator: 2 and 1.91 (B6)."""
     for (stiffness, drag), limit in zip(COLUMNS, TABLE["velocity_verlet"], strict=True):
@@ -115,6 +117,7 @@ def test_event_driven_worlds_have_the_limits_of_their_flight():
         assert (found.stability, found.integrator) == (pytest.approx(limit, abs=DIGITS), "flight")
 
 
+@pytest.mark.slow
 def test_an_integrator_of_a_plugin():
     """Midpoint (B6): 0, 2, 0.80, 2.0, 2.0."""
     plugin = Plugin("midpoint")
@@ -228,6 +231,7 @@ def test_forces_that_turn_the_velocity(method, limit):
     assert found == pytest.approx(limit / 5, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_damping_alone_has_no_limit():
     """It is an integrating factor; beside a spring it gives explicit Euler the limit c / k (derived: det = 1)."""
     for method in METHODS:

@@ -51,6 +51,7 @@ def game(d=2, seed=3):
     return world
 
 
+@pytest.mark.slow
 @both_dimensions
 def test_energy_is_followed_while_bodies_come_and_go(d):
     """Also what the test itself creates and deletes between two steps."""

@@ -157,6 +157,7 @@ def test_a_cost_that_nothing_meets(carom):
     assert "nothing that was tried costs 1e-09 ms a frame or less: the cheapest, Settings(" in result.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("arguments", "words"), [
     (("sprin",), "no scene named 'sprin'; did you mean 'spring'"),
     (("gone.py",), "no file 'gone.py'"),

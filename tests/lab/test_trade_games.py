@@ -91,6 +91,7 @@ def test_a_game_that_spawns_is_compared_by_means_over_its_seeds():
     assert "fired: 15 on average instead of 15" in text
 
 
+@pytest.mark.slow
 def test_without_a_name_for_it_bodies_are_matched_in_the_order_of_their_creation():
     def plain(settings, seed=0):
         return shots(settings, 0)

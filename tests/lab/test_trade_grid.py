@@ -18,6 +18,7 @@ from carom.lab.trading.grid import grid, tasks_of
 from carom.plugins import Physics
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "seconds", "chaotic", "rests"), [
     ("jump", 1.0, False, False), ("oblique", 3.0, False, False), ("stack", 1.0, False, True),
     pytest.param("thermal_gas", 8.0, True, False, marks=pytest.mark.slow),
@@ -50,6 +51,7 @@ def test_steps_end_where_inputs_change():
     assert step_lengths(1.0, 0.25, 1.0) == step_lengths(1.0, 0.25, 1.0, inputs=(0.25, 0.75)) == [0.25] * 4
 
 
+@pytest.mark.slow
 def test_a_ball_that_rolls_off_a_platform_has_not_escaped():
     def build(settings, seed=0):
         world = world_of(settings)
@@ -103,6 +105,7 @@ def spoilt(settings, seed=0):
     return world
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("build", "reason"),
     [
@@ -137,6 +140,7 @@ def test_wrong_arguments_are_named(options, words):
         case_of("spring", **options)
 
 
+@pytest.mark.slow
 def test_functions_are_measured_here_and_their_options_reach_them():
     def falling(settings, seed=0, height=5.0):
         world = World(Physics(dimensions=2, gravity=(0.0, -10.0)), settings=settings)

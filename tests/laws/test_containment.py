@@ -114,6 +114,7 @@ def test_what_is_swept_stays_inside_under_any_pull(seed, mode):
             assert beyond(world, half + wall) == 0, (world.step_count, world.faults[-1:])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", SWEPT)
 @both_dimensions
 @pytest.mark.parametrize("seed", seeds(2, 100))

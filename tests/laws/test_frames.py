@@ -84,6 +84,7 @@ def test_girders_stand(d):
             assert worst_gap(joints) < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 def test_scissors_stand(d):
     """Scissors of 1 to 5 levels whose feet are held: their bars of 5 m cannot move."""

@@ -63,6 +63,7 @@ def check_fall(scene, gravity, mode, method, d):
 STRONG = [gravity for gravity in GRAVITIES if gravity >= 0.01]  # else all that falls takes a thousand steps and more
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scene", "gravity", "mode", "method", "substeps"), pairwise(list(STANDING), GRAVITIES, MODES, METHODS, SUBSTEPS)
 )

@@ -113,6 +113,7 @@ def struck(seed, d, mode, kind, e, strikes, mu=0.0):
         return told, world.kinetic_energy() / energy, np.linalg.norm(world.momentum() - momentum) / SPEED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", seeds(1, 60))
 @pytest.mark.parametrize(("d", "mode", "kind", "e"), pairwise((2, 3), MODES, KINDS, (0.0, 0.5, 1.0)))
 def test_what_joints_hold_is_struck_as_what_they_leave(seed, d, mode, kind, e):
@@ -127,6 +128,7 @@ def test_what_joints_hold_is_struck_as_what_they_leave(seed, d, mode, kind, e):
         assert momentum < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", seeds(1, 60))
 @pytest.mark.parametrize(("d", "mode", "kind", "e"), pairwise((2, 3), MODES, KINDS, (0.3, 1.0)))
 def test_rough_impacts_on_what_joints_hold_take_energy(seed, d, mode, kind, e):

@@ -85,6 +85,7 @@ def test_ten_boxes_hardly_sink(mode):
     assert found.overlap < 0.005
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize("mode", MODES)
 def test_a_tower_of_forty_is_at_rest(mode, d):

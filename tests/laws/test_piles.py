@@ -128,6 +128,7 @@ def test_a_pile_of_a_thousand(e):
         assert ((x >= 0) & (x <= pile.width(1000, 2)) & (y >= 0)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("dt", "published"), [(1e-2, 0.0161), pytest.param(1e-3, 1.55e-4, marks=pytest.mark.long)])
 @pytest.mark.parametrize(("shape", "pitch"), [((7, 7, 1), 2.0), ((6, 6, 6), 0.201), ((6, 6, 6), 2.0)])
 def test_published_lattice_666(shape, pitch, dt, published):

@@ -120,6 +120,7 @@ def point(seed, mode, d):
         return most
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, pytest.param(3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("seed", seeds(1, 4))

@@ -101,6 +101,7 @@ def fall(seed, mode, d):
         return fastest
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 def test_what_falls_flat_does_not_turn_by_a_bit(mode):
     assert [fall(seed, mode, 2) for seed in range(8)] == [0.0] * 8
@@ -158,6 +159,7 @@ def lopsided(seed, mode, d):
     return kept / (whole - least), seen / period
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
 def test_what_has_its_mass_off_the_middle_keeps_energy_and_period_as_it_rolls(d, mode):

@@ -36,6 +36,7 @@ def test_ten_thousand_walks():
     check(range(10_000))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize(("x", "y"), [(0.0, 0.0), (36.0, 2.0), (0.1, 0.3), (1e3, 17.0)])
 @pytest.mark.parametrize("speed", [3.0, 6.0, 8.0])

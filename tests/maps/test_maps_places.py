@@ -55,6 +55,7 @@ def solid_pixels(world, left, top, size, high, metres=1.0):
 L_SHAPE = ((0, 0), (16, 0), (16, 5), (6, 5), (6, 16), (0, 16))  # in no way symmetric
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flips", range(8))
 def test_tiles_and_tile_objects_are_flipped_in_all_eight_ways(flips, tmp_path):
     """A slope, and an L of two rectangles, as a tile in a layer and as an object of that tile."""
@@ -183,6 +184,7 @@ def test_a_turned_rectangle_is_a_box_and_a_straight_one_is_none(tmp_path):
     world.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_random_tile_maps_are_solid_where_their_cells_are(seed, tmp_path):
     """Several materials, shapes, flips and layers with offsets, CSV, base64 and XML, against cell by cell drawing."""

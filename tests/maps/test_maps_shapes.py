@@ -190,6 +190,7 @@ def test_the_same_as_pytiled_parser_reads(tmp_path):
                 np.testing.assert_allclose(mine.points, other.points)
 
 
+@pytest.mark.slow
 def test_a_level_of_10000_cells_loads_at_once(tmp_path):
     """The goal is .1 s, and .05 s for the first step; measured 10 and 4 ms. Ten times that is a fault of the method."""
     import time

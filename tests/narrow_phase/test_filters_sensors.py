@@ -11,6 +11,7 @@ from carom.components import AABBCollider
 from carom.framework import Phase, System
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize("shape", [ball, box])
 def test_a_sensor_between_bouncing_bodies_changes_nothing(d, shape):

@@ -145,6 +145,7 @@ def test_rotation_is_read_again_in_every_step():
         assert world.contacts.entity_b.tolist() == [expected_partner]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("maker", [ball, box])
 @pytest.mark.parametrize(
     ("one", "two", "meet"),

@@ -222,6 +222,7 @@ def test_fast_pieces_do_not_pass_walls(mode, restitution):
         energy = max(now, 1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 def test_pieces_of_the_scene_start_apart_and_stay_in_their_bin(mode):
     scene = scenes.get("pieces")
@@ -272,6 +273,7 @@ def test_spheres_of_a_dumbbell_push_each_other_by_their_body_alone():
     assert parts.of(body) == ends
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("place", [(0.1, 2.3), (0.3, 1.2)])

@@ -16,6 +16,7 @@ pytestmark = pytest.mark.plain
 ANGLE = ((0, 0), (2, 0), (2, 1), (1, 1), (1, 3), (0, 3))
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 def test_pieces_of_random_outlines_are_convex_and_have_its_area():
     random = np.random.default_rng(2)

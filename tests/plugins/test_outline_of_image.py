@@ -31,6 +31,7 @@ def along(loop, count=400):
     return loop[k] + (t - k)[:, None] * (np.roll(loop, -1, axis=0)[k] - loop[k])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("soft", [True, False])
 @pytest.mark.parametrize("tolerance", [0.0, 0.3, 2.0])
 def test_discs_and_rings_are_within_the_tolerance(soft, tolerance):
@@ -58,6 +59,7 @@ def test_discs_and_rings_are_within_the_tolerance(soft, tolerance):
             assert len(loops[0]) <= 2 * np.pi / np.sqrt(8 * tolerance / radius) * 6 + 8
 
 
+@pytest.mark.slow
 def test_any_image_has_loops_that_do_not_cross_and_hold_its_area():
     """Noise, with corners that touch: at tolerance 0 the area is that of marching squares, which cuts half of a quarter
     of a pixel from each convex corner and adds it to each hollow one; coarser ones stay simple."""

@@ -173,6 +173,7 @@ def test_fields_may_change_on_the_way():
     assert tuple(at(world, entity)) == (1.5, 5.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 def test_snapshots_files_and_failed_steps_go_on_to_the_bit(d, tmp_path):
     class FailsOnce(System):

@@ -44,6 +44,7 @@ def world_of(*plugins, d=2, **settings):
     return World(Physics(dimensions=d, gravity=(0.0,) * d), *plugins, settings=Settings(**settings))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 def test_rows_that_come_go_and_move_keep_their_values(d):
     """The same by entity in Python, over bodies made one by one and in bulk, deleted, and of changing kinds."""

@@ -273,6 +273,7 @@ def sleepers():
     return world, ground, balls
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["set", "assigned", "in a system", "snapshot", "file", "fails first"])
 def test_what_rests_on_a_tile_that_goes_falls_and_others_sleep_on(how, tmp_path):
     world, ground, balls = sleepers()

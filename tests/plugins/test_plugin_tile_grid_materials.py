@@ -93,6 +93,7 @@ def test_belts_run_as_their_cells_say(mode):
     assert place(world, still) == pytest.approx((25.5, 1.3), abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["box 2D", "capsule 2D"])
 def test_a_character_rides_the_belt_of_its_cell(name):
     """Where it stands in the middle of a cell, and where its middle is beyond the last one."""

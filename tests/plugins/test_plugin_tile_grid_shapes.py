@@ -195,6 +195,7 @@ HILL = r"""
 GROUND = ((0, 1), (1, 1), (3, 2), (4, 2), (6, 3), (7, 3), (8, 2), (10, 1), (15, 1))  # its outline
 
 
+@pytest.mark.slow
 @each_mode
 @pytest.mark.parametrize("name", BODIES)
 def test_a_hill_is_as_its_outline(mode, name):

@@ -51,6 +51,7 @@ def run(world, steps):
         world.step()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 10, 1 / 1000, 0.01])
 def test_a_timer_fires_once_in_the_step_that_ends_with_its_seconds(kind, dt):

@@ -85,6 +85,7 @@ def test_what_is_below_a_plane_in_a_turned_box():
         np.testing.assert_allclose(box_below(tuple(n), tuple(h), float(s)), found, rtol=0, atol=1e-5 * scale)
 
 
+@pytest.mark.slow
 @mostly_2d
 @pytest.mark.parametrize("mode", MODES)
 def test_what_is_lighter_floats_as_deep_as_its_density_says(d, mode):

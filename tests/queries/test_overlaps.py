@@ -116,6 +116,7 @@ def test_casts_meet_what_a_body_would_meet(d):
     assert 5 < hits.found.sum() < m
 
 
+@pytest.mark.slow
 @both_dimensions
 def test_only_what_opposes_the_motion(d):
     """Of all hits those with a normal against the way; and what a shape has stopped at does not stop it from sliding
@@ -190,6 +191,7 @@ WRONG = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("message", WRONG)
 @pytest.mark.parametrize("empty", [True, False])
 def test_wrong_arguments(message, empty):

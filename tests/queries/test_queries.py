@@ -394,6 +394,7 @@ QUERIES = {
 PAIR = "pair sphere_fragile of SphereCollider and FragileCollider of a query, entity 2"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "name", "error", "message"),
     [

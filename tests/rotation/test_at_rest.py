@@ -39,6 +39,7 @@ def test_a_box_tips_where_its_centre_stands_over_its_edge(mode):
             assert (y, angle) == pytest.approx((0.25, -math.pi / 2), abs=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 def test_a_box_slides_where_friction_ends_and_does_not_turn(mode):
     """At tan a = mu, 1 % to either side; with g (sin a - mu cos a), but for the first steps, in which it settles
@@ -68,6 +69,7 @@ def test_ten_boxes_stand(d, mode):
         assert d == 2 or world.kinetic_energy() < 1e-8
 
 
+@pytest.mark.slow
 def test_dominoes_fall_at_a_speed_that_does_not_depend_on_the_step():
     """Within 2 % from 1/60 s on."""
     speeds = []
@@ -179,6 +181,7 @@ def test_mixed_shapes_between_walls_come_to_rest_and_nobody_leaves(seed, lightes
         assert world.contacts.depth.max() < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
 def test_what_falls_askew_comes_to_lie_on_a_side(d, mode):

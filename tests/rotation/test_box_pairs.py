@@ -31,6 +31,7 @@ def same(one, other, size):
     assert np.allclose(one[1], other[1], atol=1e-12 + 1e-14 * size / max(abs(one[0]), 1e-300))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_boxes_in_a_plane_meet_as_polygons_do(seed):
     """A polygon has no pair of its own: it meets by its farthest points alone. Parallel boxes too, and of any size."""

@@ -68,6 +68,7 @@ def top_at(moments, w0, t):
 MOMENTS, START = (1.0, 2.0, 3.0), (0.4, 1.1, 1.3)
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize("aside", [0.0, 1e-300, 1e-17, 1e-13, 1e-9])
 @pytest.mark.parametrize("axis", range(3))
@@ -102,6 +103,7 @@ def spin_top(dt, seconds, systems=(), **settings):
     return w, q, np.multiply(MOMENTS, START), turned(q, np.multiply(MOMENTS, w))
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize("method", METHODS)
 def test_the_free_top_is_that_of_jacobis_functions(method):

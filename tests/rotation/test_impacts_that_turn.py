@@ -225,6 +225,7 @@ def room(world, far, thick, wide, **collider):
         wall(world, place, half, **collider)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("e", [0.0, 0.3, 0.5])
 def test_boxes_that_bounce_come_to_rest(e, mode):

@@ -17,6 +17,7 @@ from carom.scenes.impacts.billiards import RADIUS
 from carom.scenes.turning import billiards_spin
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("e", [0.5, 1.0])
 @pytest.mark.parametrize("mu", [0.0, 1e9])
@@ -42,6 +43,7 @@ def test_a_rough_rod_sticks_with_its_end_and_rebounds_by_stronges_law(mu, e, mod
     assert w == pytest.approx((x * along - y * across) / inertia, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cut", [0.1, 0.3, 0.6, 1.0])
 @pytest.mark.parametrize("english", [0.0, 3.0, -3.0])
 def test_friction_throws_the_struck_ball_off_the_line_of_centres(cut, english):

@@ -105,6 +105,7 @@ def test_a_ball_that_slides_comes_to_roll_with_the_momentum_about_the_ground(d, 
     assert v[0] + 0.5 * w[2] == pytest.approx(0, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("seed", range(4))
@@ -132,6 +133,7 @@ def test_a_bounce_with_spin_is_that_of_coulomb(seed, d, mode):
     assert np.allclose(w, w0 + np.cross(-r * n, -push) / (SHARE[d] * r * r), rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 def test_a_wheel_that_turns_drives_what_lies_on_it(mode):
     """A ball between two kinematic wheels that turn alike comes to turn the other way, as fast at its surface; on two
@@ -148,6 +150,7 @@ def test_a_wheel_that_turns_drives_what_lies_on_it(mode):
             assert np.abs(v).max() < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
 def test_a_bar_that_turns_throws_with_the_speed_of_its_points(d, mode):

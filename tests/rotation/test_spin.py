@@ -100,6 +100,7 @@ def test_inertia_of_uniform_shapes_is_the_sum_over_a_lattice(seed, d):
             assert world.kinetic_energy() == pytest.approx(0.5 * np.dot(w, np.dot(expected, w)), rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("seed", range(4))
@@ -211,6 +212,7 @@ def test_a_world_with_the_plugin_but_without_a_spin_runs_the_same_stages_and_bit
     assert found[0] == found[1]
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("seed", range(2))

@@ -111,6 +111,7 @@ def test_queries_meet_the_boxes_as_they_are_turned(d, mode):
     assert found > 60
 
 
+@pytest.mark.slow
 def test_impacts_are_told_at_the_surfaces_as_turned_then(d, mode):
     """Pairs that meet off their centres; cubes in space, whose free turn has a closed form. To 1e-6, in space to 3e-3,
     where an edge lies nearly on a face."""

@@ -93,6 +93,7 @@ def test_the_hero_lands_six_tiles_further_on_the_ground():
     assert x == pytest.approx(jump.RUN_SPEED * world.time, rel=1e-9)  # nothing on the way, no friction
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "steps"),
     [("asteroids", 300), ("gas2d", 120), ("gas3d", 30), ("mixed2d", 120), ("maze", 120), ("static_world", 120)],

@@ -43,6 +43,7 @@ def test_the_boxes_are_the_walls_and_nothing_else(side, seed):
     assert len(centres) < (right.sum() + above.sum() + 2 * side) or side == 1  # runs of wall are one box
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 37, 1 / 200])
 def test_the_belt_never_tears_and_the_chute_keeps_its_time(dt):
     """Slats keep their spacing and cover the belt; crate k drops in the step that contains k EVERY."""
@@ -83,6 +84,7 @@ def test_crates_come_to_rest_on_the_platforms():
             assert ((x > start) & (x < end) & (y > height) & (y < height + 2)).any()
 
 
+@pytest.mark.slow
 def test_the_lift_and_the_ferry_keep_their_schedule_and_take_their_crates_along():
     """The schedule to rounding: no drift from summed velocities. Each crate keeps its place on its carrier to a
     twentieth of its size, under 0.75 to 1.25 of its weight."""

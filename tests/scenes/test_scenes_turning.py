@@ -93,6 +93,7 @@ def test_what_bears_the_others_in_a_tumbler_keeps_its_shape():
     assert np.mean(medians) < 0.07
 
 
+@pytest.mark.slow
 def test_rubble_comes_to_rest():
     with rubble.build(n=60) as world:
         steps(world, 20.0)

@@ -82,6 +82,7 @@ def test_number_of_steps(rate):
         assert world.alpha == pytest.approx(float(Fraction(n * 60, rate) % 1), abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", FRAME_RATES)
 def test_what_is_drawn_moves_evenly(rate):
     """Constant velocity: interpolated x = v (t - dt), one step behind the frame's own time t = n / rate."""

@@ -124,6 +124,7 @@ def planned(plan, always=False):
     return found | {("", k.kernel) for k in plan.around if not (always and k.when)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_the_kernels_that_run_are_those_of_the_plan(name):
     build, there, absent = SCENES[name]
@@ -255,6 +256,7 @@ def test_forces_are_not_summed_where_none_acts():
     np.testing.assert_allclose(body.linear_velocity, [2.0, 1.0], rtol=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4"])
 @pytest.mark.parametrize("damping", [0.0, 0.7])
 def test_drifting_gives_the_bits_of_the_integrator(integrator, damping):

@@ -196,6 +196,7 @@ def carom(tmp_path, monkeypatch):
     return lambda *arguments: CliRunner().invoke(cli, ["run", "billiards", "--no-pictures", *arguments])
 
 
+@pytest.mark.slow
 @pytest.mark.compiled
 def test_the_command_s_json_adds_up(carom):
     carom("--steps", "40")  # whatever has to be compiled

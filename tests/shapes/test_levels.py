@@ -116,6 +116,7 @@ class Found(System):
         self.steps.append({name: getattr(contacts, name).copy() for name in names})
 
 
+@pytest.mark.slow
 @both_dimensions
 def test_levels_change_the_cost_and_not_what_is_found(d):
     """From the same state every step finds the same bits with spheres around the boxes."""
@@ -249,6 +250,7 @@ def test_the_example_runs(capsys):
     assert rows["2D, boxes 1:2 in spheres, bounds"][4] == rows["2D, boxes 1:2 in spheres"][2]
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize("scale", [1.0, 1e-9, 1e9])
 def test_a_sphere_must_hold_the_corners_of_the_box(d, scale):

@@ -109,6 +109,7 @@ def test_small_shapes_are_seen_and_no_larger_than_they_are(world):
             )
 
 
+@pytest.mark.slow
 def test_pictures_of_discs_are_kept_within_a_bound(world, monkeypatch):
     monkeypatch.setattr("carom.view.plane.painter.MOST_BYTES", 100_000)
     camera, surface, painter = Camera((300, 100), (7, 0.2), 5.0), pygame.Surface((300, 100)), Painter()

@@ -57,6 +57,7 @@ def enter(player, of, name, text, key=pygame.K_RETURN):
     player.frame()
 
 
+@pytest.mark.slow
 def test_settings_are_typed_and_chosen(player):
     world = player.world
     enter(player, "settings", "dt", "1/120")
@@ -80,6 +81,7 @@ def test_settings_are_typed_and_chosen(player):
     assert not player.view._panel.error
 
 
+@pytest.mark.slow
 def test_fields_of_the_picked_body_are_typed(player):
     world, ball = player.world, player.ball
     enter(player, "Transform", "position", "1, 2.5")

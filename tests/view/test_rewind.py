@@ -46,6 +46,7 @@ def test_back_and_forth_are_what_was_there(world):
     assert world.step_count <= after + 10
 
 
+@pytest.mark.slow
 def test_the_ring_keeps_to_its_bytes_and_takes_fewer_where_they_are_large(world):
     rewind = Rewind(world)
     played(world, rewind, 1)

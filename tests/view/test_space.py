@@ -49,6 +49,7 @@ def painted(painter, world, camera):
 # -- the camera ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_pixels_and_places_belong_together(camera):
     points = camera.middle + camera.distance * random.uniform(-0.4, 0.4, (20, 3))

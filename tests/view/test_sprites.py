@@ -98,6 +98,7 @@ def test_sprites_of_many_bodies_that_come_and_go_are_forgotten(world, monkeypatc
     assert len(sprites) <= 120
 
 
+@pytest.mark.slow
 def test_surfaces_that_no_sprite_has_any_more_are_forgotten(world, monkeypatch):
     monkeypatch.setattr("carom.view.sprites.MOST_LOOKS", 20)
     camera, sprites = Camera((200, 200), scale=40.0), Sprites(world)

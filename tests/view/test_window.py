@@ -148,6 +148,7 @@ def test_zoom_pan_follow_and_all_in_the_picture(player):
 # -- the hand ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joints", [True, False])
 def test_a_body_is_picked_dragged_and_let_go(joints):
     world, ball = floor_and_ball(*([Joints()] if joints else []))
@@ -171,6 +172,7 @@ def test_a_body_is_picked_dragged_and_let_go(joints):
     world.close()
 
 
+@pytest.mark.slow
 def test_the_part_of_a_body_takes_the_body_along():
     for joints in ((), (Joints(),)):
         world = World(Physics(2, gravity=(0.0, -10.0)), Rotation(), Parts(), *joints)
@@ -251,6 +253,7 @@ def test_a_pull_is_not_brought_back_by_going_back_in_time():
 # -- what is shown -------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_each_key_shows_something_and_takes_it_away():
     world = World(
         Physics(2, gravity=(0.0, -10.0)), Rotation(), Joints(), settings=Settings(sleeping=True, on_fault="ignore")

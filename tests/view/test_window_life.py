@@ -171,6 +171,7 @@ class Compiles:
         log.left = 0
 
 
+@pytest.mark.slow
 def test_while_kernels_compile_the_window_says_so(monkeypatch):
     world, _ = floor_and_ball()
     work, texts = Compiles(), []

@@ -20,6 +20,7 @@ DT = 1 / 60
 makers = pytest.mark.parametrize("maker", [ball, box])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [1e15, 1e-15])
 @pytest.mark.parametrize("e", [0.5, 1.0])
 def test_c8_mass_ratios_between_walls(ratio, e):
@@ -114,6 +115,7 @@ def test_sizes_whose_squares_overflow_are_refused_with_their_field(d, size):
         world.component_for_entity(large, SphereCollider).radius = size
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize(("maker", "size"), [(ball, {"radius": 0.0}), (box, {"half": 0.0})])
 def test_c13_points_bounce(d, maker, size):
@@ -135,6 +137,7 @@ def test_c13_points_bounce(d, maker, size):
     assert velocity(world, a)[0] == -0.5
 
 
+@pytest.mark.slow
 @both_dimensions
 @makers
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
@@ -152,6 +155,7 @@ def test_c1_coincident_at_rest(d, maker, e):
     kept.check()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("d", "w", "e"),
     pairwise((2, 3), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (3.0, -4.0, 0.0), (-1e-3, 2e-3, 0.0)), (0.0, 0.5, 1.0)),
