@@ -248,3 +248,15 @@ def length(a):
         return largest
     part = divided(a, largest)
     return largest * math.sqrt(dot(part, part))
+
+
+@inlined
+def components(v):
+    """(x, y, z) of a vector in space. In a plane code for that is compiled, but never runs."""
+    return item(v, 0), item(v, 1), item(v, len(v) - 1)
+
+
+@inlined
+def triple(like, v):
+    """The vector in space, as ``like``, that has these three components."""
+    return replace(replace(replace(like, 0, v[0]), 1, v[1]), len(like) - 1, v[2])

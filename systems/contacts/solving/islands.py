@@ -340,11 +340,10 @@ def build_chunks(state):
 @part
 def place_ends(state):
     """The places of the two bodies of each row."""
-    solver, pairs, inverse_mass = state.solver, state.pairs, state.bodies.inverse_mass
+    solver, pairs = state.solver, state.pairs
     for r in range(solver.contacts):
         a, b, k = pairs.a[solver.pair[r]], pairs.b[solver.pair[r]], solver.slot[r]
         solver.first[k], solver.second[k] = place_of(state, a), place_of(state, b)
-        solver.fixed[k] = solver.tips and (inverse_mass[a] == 0.0 or inverse_mass[b] == 0.0)
 
 
 @part

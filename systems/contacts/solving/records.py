@@ -42,11 +42,11 @@ SOLVER = Schema(
     total=floats(unit="N s"),  # in the step
     previous=floats(unit="N s"),  # impulse before a pass or a substep
     target_speed=floats(unit="m/s"),  # at which it may close,
-    pushing=floats(unit="m/s"),  # and the same in the pass that pushes: below 0 where overlap is to open
-    loaded=floats(unit="m"),  # of sag under the impulse of the last step
-    had_impulse=flags(),  # it has pushed in this step
-    soft=floats(unit="1"),  # share of its impulse that it gives back in the pass that pushes
-    fixed=flags(),  # it has several points, and one of its bodies cannot be moved
+    pushing=floats(unit="m/s"),  # and the same in the pass that pushes: where it is closed
+    push_rate=floats(unit="1/s"),  # its overlap, or what is open, times this,
+    most_push=floats(unit="m/s"),  # and no less than this
+    soft=floats(unit="1"),  # share of its impulse that it gives back in that pass; below 0 where it is open: none
+    peak=floats(unit="N s"),  # largest impulse of a substep in this step
     hard=flags(),
     has_friction=flag(),
     tips=flag(),  # some pair has several points

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from ....framework.compilation import inlined, part
-from ....framework.vectors import add, add_scaled, divided, dot, item, replace, scale, sub
+from ....framework.vectors import absolute, add, add_scaled, components, divided, dot, item, replace, scale, sub
 from ...integration.turning import (
     SERIES,
     change_of_spin,
@@ -24,7 +24,7 @@ from ...integration.turning import (
     shares_of_turn,
     twist,
 )  # fmt: skip
-from ..constants import FULL_PUSH_OVERLAP, NEGLIGIBLE, STRUCK_EXCESS, UNREACHED
+from ..constants import NEGLIGIBLE, STRUCK_EXCESS, UNREACHED
 
 NO_ARMS, ARMS = (), (True,)
 
@@ -66,13 +66,10 @@ def turned(solver, q, arm):
 
 
 @inlined
-def separation(solver, k, arms):
-    """The gap of row k where its bodies are now."""
-    a, b = solver.first[k], solver.second[k]
-    way = sub(solver.shift[b], solver.shift[a])
-    if len(arms) > 0:
-        way = sub(add(way, turned(solver, b, solver.core_b[k])), turned(solver, a, solver.core_a[k]))
-    return solver.gap[k] + dot(way, solver.normal[k])
+def turned_apart(a, b, normal):
+    """How much farther apart along the normal turning brings the ends of two arms: (turn, shares of it, arm) of each.
+    """
+    return dot(sub(end_of_turn(*b), end_of_turn(*a)), normal)
 
 
 @inlined
@@ -80,8 +77,16 @@ def separation_from_rotation(solver, k, arms):
     """How much farther apart row k is along its normal because its bodies are not turned as where the step ends."""
     if len(arms) == 0:
         return 0.0
-    a, b = solver.first[k], solver.second[k]
-    return dot(sub(turned(solver, b, solver.core_b[k]), turned(solver, a, solver.core_a[k])), solver.normal[k])
+    a, b, turn, sine, versine = solver.first[k], solver.second[k], solver.turn, solver.sine, solver.versine
+    one = turn[a], (sine[a], versine[a]), solver.core_a[k]
+    return turned_apart(one, (turn[b], (sine[b], versine[b]), solver.core_b[k]), solver.normal[k])
+
+
+@inlined
+def separation(solver, k, arms):
+    """The gap of row k where its bodies are now."""
+    way = sub(solver.shift[solver.second[k]], solver.shift[solver.first[k]])
+    return solver.gap[k] + dot(way, solver.normal[k]) + separation_from_rotation(solver, k, arms)
 
 
 @inlined
@@ -170,27 +175,17 @@ def excess_speed(solver, k, arms):
 
 
 @inlined
-def update_targets(solver, k, arms, asks):
-    """What row k asks, see ``measure``, without a branch; returns whether its speed is far from that.
-
-    asks: (s in which it may close, of a substep, of a step, springs, stiff).
-    """
-    ahead, h, dt, springs, stiff = asks
-    room, closing, impulse = separation(solver, k, arms), closing_speed(solver, k, arms), solver.impulse[k]
-    extent, hard = solver.extent[k], solver.hard[k]
-    softness = springs[1][0] if solver.fixed[k] else springs[0][0]
-    bias_rate = springs[1][1] if solver.fixed[k] else springs[0][1]
+def update_targets(solver, k, room, closing, ahead, dt):
+    """What row k asks, which has so much ``room`` and closes so fast, see ``measure``; returns whether its speed is far
+    from that. ahead: s in which it may close. Without a branch or a flag, so that several are updated at once."""
+    impulse, extent, least, peak = solver.impulse[k], solver.extent[k], solver.most_push[k], solver.peak[k]
     opening = (room if room > 0.0 else 0.0) / ahead
-    deep = -(FULL_PUSH_OVERLAP * extent + solver.loaded[k])
-    at_once = room / (h * bias_rate)
-    at_once = at_once if at_once > deep else deep
-    once = hard and (len(arms) == 0 or len(solver.normal[k]) == 2)  # what stands on three points would rock for ever
-    near = at_once if once else room
-    push = deep if room < deep else near
-    soft = (room <= NEGLIGIBLE * extent) & (not solver.parting[k])  # just closed, give or take rounding
-    solver.target_speed[k], solver.pushing[k] = opening, bias_rate * push if soft else opening
-    solver.soft[k] = 0.0 if stiff or hard or not soft else softness
-    solver.had_impulse[k] |= impulse > 0.0
+    push = solver.push_rate[k] * room
+    push = push if push > least else least
+    solver.target_speed[k] = opening
+    solver.soft[k] = math.copysign(solver.soft[k], NEGLIGIBLE * extent - room)
+    solver.pushing[k] = opening if room > NEGLIGIBLE * extent else push
+    solver.peak[k] = impulse if impulse > peak else peak
     return excess_of(closing, opening, impulse) * dt > STRUCK_EXCESS * extent
 
 
@@ -200,7 +195,7 @@ def leave_open_rows(solver, h, span, arms):
     what slides may have passed that corner."""
     for k in range(span[0], span[1]):
         least = 0.0 if solver.hard[k] and solver.apart[k] else STRUCK_EXCESS
-        was_open = not solver.had_impulse[k] and solver.gap[k] > least * solver.extent[k]
+        was_open = solver.peak[k] == 0.0 and solver.gap[k] > least * solver.extent[k]
         if was_open and separation(solver, k, arms) > -NEGLIGIBLE * solver.extent[k]:
             solver.target_speed[k] = UNREACHED * solver.extent[k] / h
 
@@ -227,7 +222,7 @@ def solve_normal_of(solver, k, bias, pushes, arms):
     old = solver.impulse[k]
     excess = solver.mass[k] * (closing_speed(solver, k, arms) - bias[k])
     if pushes:
-        excess -= solver.soft[k] * (excess + old)
+        excess -= max(0.0, solver.soft[k]) * (excess + old)
     new = max(0.0, old + excess)
     apply_impulse(solver, k, scale(solver.normal[k], new - old), arms)
     solver.impulse[k] = new
@@ -285,11 +280,11 @@ def solve_friction(solver, over, span, arms):
 @inlined
 def most_turned(solver, q):
     """An inverse inertia no less than that of body q about any axis; the same in a plane and of what is round."""
-    d, p = solver.inverse_inertia[q], solver.inverse_products[q]
+    d = solver.inverse_inertia[q]
     if len(d) == 2:
         return item(d, 0)
-    xy, xz, yz = abs(item(p, 0)), abs(item(p, 1)), abs(item(p, len(p) - 1))
-    return max(item(d, 0) + xy + xz, item(d, 1) + xy + yz, item(d, len(d) - 1) + xz + yz)
+    (xx, yy, zz), (xy, xz, yz) = components(d), components(absolute(solver.inverse_products[q]))
+    return max(xx + xy + xz, yy + xy + yz, zz + xz + yz)
 
 
 @part

@@ -21,6 +21,7 @@ from ...linking.parts import JOINED_RANGE, call_joined_range
 from ..constants import (
     DAMPING_RATIO,
     FREQUENCY,
+    FULL_PUSH_OVERLAP,
     LAST_RELAX_PASSES,
     NEGLIGIBLE,
     REFINED_PASSES,
@@ -30,7 +31,7 @@ from ..constants import (
     TURNING_FREQUENCY,
     TURNING_RELAX_PASSES,
 )  # fmt: skip
-from .chunks import find_chunks, load_masses
+from .chunks import find_chunks, load_masses, measure_chunks
 from .faults import RESTRAINED, note_fault
 from .guard import finish_substep, island_of, islands_of, open_all
 from .hard import select_rigid
@@ -41,32 +42,35 @@ from .rows import (
     ARMS,
     NO_ARMS,
     apply_impulse,
+    closing_speed,
     compute_effective_mass,
     excess_speed,
     integrate_rotation,
     leave_open_rows,
     rotate_body,
+    separation,
     turn_arms,
     update_targets,
 )
 
 
 @part
-def measure(solver, h, springs, dt, stiff, ends, span, arms):
+def measure(solver, h, dt, ends, span, arms):
     """What each row asks of the speed along its normal, from where the bodies are now.
 
     opening: at most closing what is open within a substep, or, in the one that ``ends`` the step, within a usual one;
-    pushing: in the pass that pushes, overlap is to open as well, softly where ``soft`` says so. Islands are ``struck``
-    where the speed of some row is far from what the relaxing passes are to make of it; returns whether any is.
+    pushing: in the pass that pushes, overlap is to open as well. Islands are ``struck`` where the speed of some row is
+    far from what the relaxing passes are to make of it; returns whether any is.
     """
-    asks = dt / solver.usual if ends else h, h, dt, springs, stiff
-    if len(arms) > 0:
-        turn_arms(solver, 1.0, span, arms)
-    any_struck, islands = False, islands_of(solver, span)
+    ahead, any_struck, islands = dt / solver.usual if ends else h, False, islands_of(solver, span)
     for t in range(islands[0], islands[1]):
         solver.struck[t] = False
-    for k in range(span[0], span[1]):
-        any_struck |= update_targets(solver, k, arms, asks)
+    if len(arms) > 0:
+        turn_arms(solver, 1.0, span, arms)
+        any_struck = measure_chunks(solver, ahead, dt, span)
+    for k in range(span[0], span[1] if len(arms) == 0 else span[0]):
+        room, closing = separation(solver, k, arms), closing_speed(solver, k, arms)
+        any_struck |= update_targets(solver, k, room, closing, ahead, dt)
     if ends:
         leave_open_rows(solver, h, span, arms)
     for k in range(span[0], span[1] if any_struck else span[0]):
@@ -149,7 +153,7 @@ def solve_substep(solver, springs, times, rule, ends, span, arms):
     integrate_positions(solver, h, span, arms)
     if capped:
         restore_mass(solver, h, span, arms)
-    any_struck = measure(solver, h, springs, dt, stiff, ends, span, arms)
+    any_struck = measure(solver, h, dt, ends, span, arms)
     for_joints(solver, calls.RELAX, times, span, arms)
     solve_passes(solver, False, last if ends else passes, stiff, h, span, arms)
     for_joints(solver, calls.RELAX_AGAIN, times, span, arms)
@@ -158,7 +162,7 @@ def solve_substep(solver, springs, times, rule, ends, span, arms):
         restore_mass(solver, 0.0, span, arms)
     for k in range(start, stop):
         solver.total[k] += solver.impulse[k]
-        solver.had_impulse[k] |= solver.impulse[k] > 0.0
+        solver.peak[k] = max(solver.peak[k], solver.impulse[k])
     for_joints(solver, calls.ADD, times, span, arms)
 
 
@@ -218,6 +222,21 @@ def contact_spring(solver, stiffer, substeps, h):
     return 1.0 / (1.0 + h * omega * damping), omega / damping
 
 
+@inlined
+def set_spring(solver, k, springs, h, stiff, arms):
+    """How row k pushes overlap out, see ``contact_spring``: stiffer where it has several points and one of its bodies
+    cannot be moved, at once where it is hard, not at all where it parts. It sags under the impulse of the last step."""
+    hard, parting = solver.hard[k], solver.parting[k]
+    held = solver.inverse_mass[solver.first[k]] == 0.0 or solver.inverse_mass[solver.second[k]] == 0.0
+    soft, bias_rate = springs[1] if solver.tips and held else springs[0]
+    turn = 2.0 * math.pi * spring_frequency(solver)
+    sag = 0.0 if stiff else solver.impulse[k] * h / (turn * turn * solver.mass[k])
+    at_once = parting or (hard and (len(arms) == 0 or len(solver.normal[k]) == 2))  # on three points it would rock on
+    solver.push_rate[k] = 1.0 / h if at_once else bias_rate
+    solver.most_push[k] = 0.0 if parting else -bias_rate * (FULL_PUSH_OVERLAP * solver.extent[k] + sag)
+    solver.soft[k] = 0.0 if stiff or hard or parting else soft
+
+
 @part
 def solve_range(solver, s, dt, span, arms):
     """The substeps of a range."""
@@ -232,11 +251,10 @@ def solve_range(solver, s, dt, span, arms):
         find_chunks(solver, span)
         load_masses(solver, span)
     scale_impulses(solver, 1.0 / substeps, span)
-    turn = 2.0 * math.pi * spring_frequency(solver)
     for k in range(span[0], span[1]):
-        solver.loaded[k] = 0.0 if stiff else solver.impulse[k] * h / (turn * turn * solver.mass[k])
+        set_spring(solver, k, springs, h, stiff, arms)
     for_joints(solver, calls.START, (h, dt), span, arms)
-    measure(solver, h, springs, dt, stiff, False, span, arms)
+    measure(solver, h, dt, False, span, arms)
     for step in range(substeps):
         left = substeps - 1 - step
         if special:
@@ -275,7 +293,7 @@ def solve_substeps(state, dt, arms):
     solver = state.solver
     for k in range(solver.contacts):
         compute_effective_mass(solver, k, arms)
-        solver.total[k], solver.had_impulse[k] = 0.0, False
+        solver.total[k] = solver.peak[k] = 0.0
     solver.visits, solver.usual = 0, state.substeps
     select_rigid(state, dt, zero_of(state), arms)
     start = begin = 0

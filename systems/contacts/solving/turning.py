@@ -11,20 +11,15 @@ import math
 
 from ....framework.compilation import part
 from ....framework.elementary import atan2, cos, sin
-from ....framework.vectors import add_scaled, dot, item, length, scale
+from ....framework.vectors import add_scaled, components, dot, length, scale, triple
 from ...integration.turning import SERIES, change_of_spin
 from ...shapes.free_rotation import diagonalised, energy_of, turn_freely, turn_to_energy
-from ...shapes.poses import NO_INERTIA, has_unequal_moments, momentum_along, triple
+from ...shapes.poses import NO_INERTIA, has_unequal_moments, momentum_along
 from ...shapes.quaternions import product, rotate, rotation_in_space, turned_tensor
 from .rows import rotate_body
 
 NOT_TUMBLING = 2.0  # in place of the first number of a unit quaternion
 DIAGONAL_ROUNDING = 1e-14  # of the trace: what is off the diagonal by less is rounding
-
-
-@part
-def components_of(v):
-    return item(v, 0), item(v, 1), item(v, len(v) - 1)
 
 
 @part
@@ -36,7 +31,7 @@ def note_frame(state, q):
         return
     frame, v, u = rotation_in_space(state, i), state.bodies.inverse_inertia[i], state.bodies.inverse_products[i]
     back = frame[0], -frame[1], -frame[2], -frame[3]
-    xx, yy, zz, xy, xz, yz = turned_tensor(back, (*components_of(v), *components_of(u)))
+    xx, yy, zz, xy, xz, yz = turned_tensor(back, (*components(v), *components(u)))
     least = DIAGONAL_ROUNDING * (xx + yy + zz)
     if abs(xy) > least or abs(xz) > least or abs(yz) > least:
         (xx, yy, zz), own = diagonalised(xx, yy, zz, xy, xz, yz)
@@ -78,7 +73,7 @@ def quaternion_of(turn):
     """The unit quaternion of a vector by which something turns."""
     size = length(turn)
     sine = sin(0.5 * size) / size if size > 0.0 else 0.5
-    x, y, z = components_of(turn)
+    x, y, z = components(turn)
     return cos(0.5 * size), sine * x, sine * y, sine * z
 
 
@@ -88,7 +83,7 @@ def integrate_free_rotation(solver, q, h):
     less of them may act in the end, see guard; but that has no more energy than it had, and what it has less is no
     gain of theirs."""
     frames = solver.frame
-    spin, before, inverse = solver.spin[q], solver.spin_before[q], components_of(solver.inverse_moments[q])
+    spin, before, inverse = solver.spin[q], solver.spin_before[q], components(solver.inverse_moments[q])
     frame = frames[q, 0], frames[q, 1], frames[q, 2], frames[q, 3]
     m = momentum_along(frame, inverse, spin)
     momentum = triple(spin, rotate(frame, momentum_along(frame, inverse, before), False))
