@@ -79,10 +79,15 @@ class Library:
 _short_hashes: weakref.WeakKeyDictionary[Any, str] = weakref.WeakKeyDictionary()
 
 
+def has_avx2() -> bool:
+    """Whether this processor works on four numbers at once."""
+    return __cpu_features__.get("AVX2", False)
+
+
 def _for_this_processor(addresses: dict[str, int]) -> dict[str, int]:
     """Those of the kernels that it is best at; all have the same bits."""
     wide = {name.removesuffix(AVX2): address for name, address in addresses.items() if name.endswith(AVX2)}
-    return addresses | wide if wide and __cpu_features__["AVX2"] else addresses
+    return addresses | wide if wide and has_avx2() else addresses
 
 
 def short_hash(function: Any) -> str:
@@ -103,6 +108,8 @@ def _own() -> list[Library]:
     module = _opened(found.origin)
     made_for = module.facts.get("layout"), module.facts.get("python")
     if module.facts.get("hashes") != "{}" and made_for != (LAYOUT, PYTHON):  # in a checkout, which has moved on
+        return []
+    if module.facts.get("features") and not has_avx2():  # or to another machine
         return []
     return [Library(module)]
 

@@ -39,13 +39,12 @@ def build_library(
     ]  # fmt: skip
     addresses = {kernel.symbol: kernel.symbol for kernel in kernels if kernel.arguments is None}
     symbols = {kernel.symbol: kernel.symbol + AVX2 for kernel in wide}
-    with_avx2 = dataclasses.replace(platform, features="+avx2")  # no more than that: what has it is asked for it alone
-    objects += _objects(wide, with_avx2, symbols)
+    objects += _objects(wide, platform.with_avx2, symbols)
     addresses |= {symbol: symbol for symbol in symbols.values()}
     hashes = {kernel.symbol: kernel.hash for kernel in kernels} if compared else {}
     facts = {
         "layout": LAYOUT, "carom": __version__, "python": PYTHON, "writing": writing_digest(),
-        "hashes": json.dumps(hashes),
+        "hashes": json.dumps(hashes), "features": platform.features,
     }  # fmt: skip
     link([*objects, assemble(glue(NAME, entries, addresses, facts, platform), platform)], output, platform)
 

@@ -11,12 +11,12 @@ import click
 
 import carom
 
-from ...framework.jit.libraries import NAME, file_name, platform_name
+from ...framework.jit.libraries import NAME, file_name, has_avx2, platform_name
 from ..cli.options import traceback_option
 from ..cli.usage_errors import Problem
 from .build_library import build_library
 from .errors import BuildError
-from .kernels import collect
+from .kernels import WIDE_PROCESSOR, collect
 from .linker import linker_for
 from .page import PLATFORM as WEB
 from .page import build_page, files_added, files_of
@@ -48,8 +48,8 @@ def build_command(
 ) -> None:  # fmt: skip
     """Compile all kernels that worlds of these files may call and carom's own library lacks.
 
-    Without files: all that ships with carom, into carom's own folder. In a checkout, what is not edited then compiles
-    no more.
+    Without files: all that ships with carom, for this machine, into carom's own folder. In a checkout, what is not
+    edited then compiles no more.
     """
     if not games and (out or names):
         raise Problem("--out and --platform are for a game: name its file")
@@ -69,13 +69,14 @@ def build_command(
     with _told():
         for platform in platforms:
             linker_for(platform)  # before anything compiles
-        kernels = collect(games, "generic", everything=not games)
+        wide = not games and platforms[0].is_x86 and has_avx2()
+        kernels = collect(games, WIDE_PROCESSOR if wide else "generic", everything=not games)
         for platform in platforms:
             if games:
                 path = (out or Path(games[0]).parent / "kernels") / file_name(platform.name)
             else:
                 path = Path(carom.__file__).parent / f"{NAME}{platform.suffix}"
-            build_library(kernels, path, platform, compared=True)
+            build_library(kernels, path, platform.with_avx2 if wide else platform, compared=True)
             click.echo(f"{path}: {len(kernels)} kernels, {path.stat().st_size / 1e6:.2f} MB")
 
 

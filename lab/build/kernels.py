@@ -88,6 +88,7 @@ def called_kernels() -> list[BuiltKernel]:
     return [found[symbol] for symbol in sorted(found)]
 
 
+WIDE_PROCESSOR = "x86-64-v3"  # LLVM's name for those with AVX2
 RESULTS = {"none": NONE, "int64": INT}
 
 

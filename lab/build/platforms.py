@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -55,6 +55,11 @@ class Platform:
     @property
     def is_arm(self) -> bool:
         return self.triple.startswith(("aarch64", "arm64"))
+
+    @property
+    def with_avx2(self) -> Platform:
+        """The same for processors that have AVX2, and of what others lack no more: they are asked for it alone."""
+        return replace(self, features="+avx2")
 
     @cached_property
     def target_machine(self) -> Any:

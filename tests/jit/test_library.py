@@ -15,6 +15,7 @@ import pytest
 from helpers_folders import game_of_the_page
 from helpers_processes import NO_COMPILER, run_carom, with_variables
 
+from carom.framework.jit import libraries as library_module
 from carom.framework.jit.hash import PYTHON, writing_digest
 from carom.framework.jit.kinds import FLOAT
 from carom.framework.jit.lazy import JIT
@@ -304,3 +305,16 @@ def test_a_library_of_another_version_of_carom_is_refused(game):
     code = "import carom\ncarom.__version__ = '0.0.9'\ncarom.use_kernels('kernels')"
     last = python(game, code).stderr.splitlines()[-1]
     assert re.search(r"was built by carom \S+, this is 0\.0\.9: build it again", last)
+
+
+@pytest.mark.parametrize("has", [True, False])
+def test_a_library_of_a_checkout_is_for_processors_that_can_run_it(monkeypatch, has):
+    """It may have been built on another machine; where AVX2 is missing its code would end the process."""
+    facts = {"layout": LAYOUT, "python": PYTHON, "writing": writing_digest(), "hashes": '{"of": "all"}'}
+    module = types.SimpleNamespace(
+        facts=facts | {"features": "+avx2"}, addresses={}, set_error_handler=lambda handler: None, __file__="own"
+    )
+    monkeypatch.setattr(library_module.importlib.util, "find_spec", lambda name: types.SimpleNamespace(origin="own"))
+    monkeypatch.setattr(library_module, "_opened", lambda path: module)
+    monkeypatch.setitem(library_module.__cpu_features__, "AVX2", has)
+    assert [library.path for library in library_module._own.__wrapped__()] == ["own"] * has
