@@ -22,11 +22,14 @@ def island_of_joint(solver, j):
 
 @part
 def list_open_joints(solver):
-    """Further passes go over the joints of islands with rows in ``listed``."""
-    joints, opened = solver.joints, 0
-    for e in range(joints.begin, joints.end):
-        joints.open_row[opened] = joints.order[e]
-        opened += solver.listed_of[island_of_joint(solver, joints.order[e])] > 0
+    """Further passes go over the joints of islands with rows in ``listed``: in order they stand island by island."""
+    joints, opened, e = solver.joints, 0, solver.joints.begin
+    while e < joints.end:
+        t = island_of_joint(solver, joints.order[e])
+        for k in range(solver.links[t] if solver.listed_of[t] > 0 else 0):
+            joints.open_row[opened + k] = joints.order[e + k]
+        opened += solver.links[t] if solver.listed_of[t] > 0 else 0
+        e += solver.links[t]
     joints.opened = opened
 
 

@@ -57,12 +57,13 @@ def list_open(solver, span, arms):
 
 
 @part
-def open_all(solver, span, arms):
-    """All islands of a range are open."""
+def open_all(solver, listed, span, arms):
+    """All islands of a range are open. listed: what is in them is so already."""
     islands = islands_of(solver, span)
     for t in range(islands[0], islands[1]):
         solver.listed_of[t] = 1
-    list_open(solver, span, arms)
+    if not listed:
+        list_open(solver, span, arms)
 
 
 @part
@@ -178,7 +179,8 @@ def find_unsolved_rows(solver, turn, any_struck, dt, span, arms, islands):
                 solver.listed[count] = k
                 solver.listed_of[t] += 1
                 count += 1
-    list_open(solver, span, arms)
+    if count > 0:
+        list_open(solver, span, arms)
     return count
 
 
@@ -263,4 +265,4 @@ def finish_substep(solver, bias_rate, any_struck, h, dt, span, arms):
         count = find_unsolved_rows(solver, turn, any_struck, dt, span, arms, islands)
     limit_energy(solver, span, arms, islands)
     carry_budget(solver, islands)
-    open_all(solver, span, arms)
+    open_all(solver, turn == 0, span, arms)

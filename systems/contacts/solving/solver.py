@@ -246,7 +246,7 @@ def solve_range(solver, s, dt, span, arms):
     if capped:
         cap_mass_ratio(solver, solver.island[span[2]], dt, span, arms)
     springs = contact_spring(solver, 1.0, substeps, h), contact_spring(solver, STATIC_STIFFNESS, substeps, h)
-    open_all(solver, span, arms)
+    open_all(solver, False, span, arms)
     if len(arms) > 0:
         find_chunks(solver, span)
         load_masses(solver, span)
