@@ -30,6 +30,8 @@ from .joint_answers import (
 from .turning import add_spin, arms_of, impulses_of, slip_direction
 from .worklist import list_pairs_of
 
+ONE_MOTION = 1e-5  # of the product: answers are as exact as that; two impulses that differ by less do one thing
+
 
 def respond_joined(state, sides, met, motion, e, mu):
     """What ``respond_at_arms`` tells, where joints hold one of the two."""
@@ -51,7 +53,7 @@ def respond_joined(state, sides, met, motion, e, mu):
         if length(tangent) > 0.0:
             answer(state, rows, touch, 0.0, tangent, TAKE_NOTHING)
             nt, tt = dot(parted, tangent), dot(parted_by(state, touch), tangent)
-            if tt > HELD * light and nn * tt > nt * nt:  # else the answers are no more than rounding
+            if tt > HELD * light and nn * tt - nt * nt > ONE_MOTION * nn * tt:  # else the answers are rounding
                 pushed, pulled = impulses_of((nn, nt, tt), (speed, dot(slip, tangent)), e, mu)
                 smooth, pull = pushed * light, scale(tangent, pulled * light)
     state.impacts.now = now

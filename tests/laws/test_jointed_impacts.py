@@ -245,3 +245,30 @@ def test_rings_of_welds_under_stones_gain_no_energy(seed, mode):
             assert energy_of(world) < last + 5e-4 * start
             last = energy_of(world)
             assert np.linalg.norm(np.subtract(*plugins[2].anchors()), axis=1).max() < 0.05
+
+
+@pytest.mark.parametrize("seed", seeds(4, 60))
+@pytest.mark.parametrize("mode", MODES[1:])
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_pin_through_the_middle_leaves_one_motion_for_both_impulses(d, mode, seed):
+    """A kinematic ball at v strikes a box that can only turn, x beside its pin, with friction: the first impact gives
+    it I (1 + e) v / x^2, and none is rounding over rounding."""
+    random = np.random.default_rng(seed)
+    e, x = random.uniform(0, 1), random.choice((-1, 1)) * random.uniform(0.1, 0.4)
+    inertia = 2.0 / 3 * (HALF[0] ** 2 + HALF[1] ** 2)
+    with World(Physics(d), Rotation(), Joints(), settings=Settings(collision=mode)) as world:
+        shape = BoxCollider(HALF[:d], friction=1.0, restitution=e)
+        box = world.create_entity(Transform((0,) * d), RigidBody(2.0), shape, Spin())
+        world.create_entity(Hinge(None, box, anchor=(0,) * d, **({} if d == 2 else {"axis": (0, 0, 1)})))
+        along = random.uniform(-2, 2)
+        body = RigidBody(linear_velocity=(along, -SPEED, 0)[:d], kind="kinematic")
+        way = 0.9 - HALF[1] - RADIUS
+        place = (x - along * way / SPEED, 0.9, 0)[:d]
+        world.create_entity(Transform(place), body, SphereCollider(RADIUS, friction=1.0, restitution=e))
+        told = []
+        for _ in range(6):
+            world.step()
+            told += world.contacts.impacts.normal_impulse.tolist()
+        assert told[0] == pytest.approx(inertia * (1 + e) * SPEED / x**2, rel=1e-6)
+        assert max(told) < 1e13 * told[0]
+        assert np.isfinite(world.kinetic_energy())
