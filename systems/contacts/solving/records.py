@@ -42,11 +42,11 @@ SOLVER = Schema(
     total=floats(unit="N s"),  # in the step
     previous=floats(unit="N s"),  # impulse before a pass or a substep
     target_speed=floats(unit="m/s"),  # at which it may close,
-    pushing=floats(unit="m/s"),  # and the same in the pass that pushes: where it is closed
-    push_rate=floats(unit="1/s"),  # its overlap, or what is open, times this,
-    most_push=floats(unit="m/s"),  # and no less than this
+    pushing=floats(unit="m/s"),  # the same in the pass that pushes: where it is closed what its gap asks,
+    push_rate=floats(unit="1/s"),  # which is the gap, below 0 of overlap, times this,
+    most_push=floats(unit="m/s"),  # but not below this
     soft=floats(unit="1"),  # share of its impulse that it gives back in that pass; below 0 where it is open: none
-    peak=floats(unit="N s"),  # largest impulse of a substep in this step
+    peak=floats(unit="N s"),  # largest impulse in this step, that it starts with counts
     hard=flags(),
     has_friction=flag(),
     tips=flag(),  # some pair has several points
