@@ -215,9 +215,8 @@ def look_around(grid, start, count):
     field = CODE_BITS // (2 * d)
     half = np.int64(field * d)
     lower_half = (np.int64(1) << half) - 1
-    guards, full = guard_bits(d), np.int64(0)
-    for _ in range(2 * d):
-        full = (full << field) | ((1 << (field - 1)) - 1)
+    guards = guard_bits(d)
+    full = guards - (guards >> (field - 1))  # the largest integer of each coordinate
     one, held, room, i = np.int64(1), np.int64(0), len(notes) - LONGEST, start
     while i < count and held < room:
         key, code, here, after = cells[i], codes[i], order[i], i + 1
@@ -303,9 +302,9 @@ def look_near(state, grid, start, stop, found):
     """
     order, directory, codes = grid.order, grid.directory, grid.codes
     lower, upper, first = state.bodies.lower, state.bodies.upper, state.candidates.first
-    second, row, layer, inverse, scale = state.candidates.second, grid.row, grid.layer, grid.inverse_cell, grid.scale[0]
+    second, row, layer, inverse = state.candidates.second, grid.row, grid.layer, grid.inverse_cell
     origin, end, d, one = zero_of(grid), zero_of(grid), len(zero_of(grid)), np.int64(1)
-    (field, largest), guards = code_bits(d), guard_bits(d)
+    guards = guard_bits(d)
     for q in range(d):
         origin, end = replace(origin, q, grid.frame[LOWEST + q]), replace(end, q, grid.frame[HIGHEST + q])
     width = 8 if d == 2 else 7  # boxes of a line that bits stand for
@@ -317,13 +316,10 @@ def look_near(state, grid, start, stop, found):
             fits &= (edge <= LARGEST_EDGE) & (edge >= 0.0)
         bits, longest, key, code = np.int64(0), 64, 0, guards
         if fits:
-            longest = 0
+            longest, (code, _) = 0, outline(grid, low, high)
             for q in range(d):
-                before, behind = item(low, q) - item(origin, q), item(high, q) - item(origin, q)
-                at = np.int64(0.5 * (before + behind) * inverse) + 1
+                at = np.int64((0.5 * (item(low, q) + item(high, q)) - item(origin, q)) * inverse) + 1
                 key += at if q == 0 else at * (row if q == 1 else layer)
-                code |= np.int64(behind * item(scale, q)) << (q * field)
-                code |= (largest - np.int64(before * item(scale, q))) << ((d + q) * field)
             for k in range(3 if d == 2 else 9):
                 at = line_around(grid, key, k, d)
                 begin = directory[at - 1]

@@ -95,6 +95,13 @@ def deepest(state, dt, c, d, turns):
     return depth, normal, False
 
 
+@inlined
+def support_along(bodies, a, b, normal):
+    """Speed along the normal, not below 0, that what held the bodies in the last step gives them in this one."""
+    speed = dot(bodies.warm_start_velocity[b], normal) if bodies.warm_started[b] else 0.0
+    return max(0.0, speed - dot(bodies.warm_start_velocity[a], normal) if bodies.warm_started[a] else speed)
+
+
 @part
 def still_bounces(state, dt, c, depth, normal):
     """Whether a pair that bounces is no contact at rest: it meets in the next step only, or is on its way out.
@@ -119,8 +126,10 @@ def still_bounces(state, dt, c, depth, normal):
         if (known or (e == 1.0 and depth <= FAST * extent)) and abs(speed) > threshold and is_turning(state, dt, a, b):
             return True  # its next impact is searched with the shapes as they are turned then
     touches = depth > (SAME_PLACE * extent if pairs.impulse[c] == 0.0 else 0.0)
-    driven = driven_travel(state, a) + driven_travel(state, b)  # a motor may bring them together in this step
-    if not touches and speed < -threshold and not (driven > 0.0 and depth >= -driven):
+    held = support_along(bodies, a, b, normal)  # without which they are nearer, and close faster
+    near = driven_travel(state, a) + driven_travel(state, b)  # as a motor may bring them together in this step
+    near += held * state.force_travels * dt if speed >= -held else 0.0
+    if not touches and speed < -threshold and not (near > 0.0 and depth >= -near):
         return True  # the next step's impact
     if speed > 0.0:
         pairs.parting[c] = SEPARATES if speed > threshold and speed * dt > slop else SEPARATES_SLOWLY

@@ -70,6 +70,23 @@ def test_b11_zeno_without_a_threshold_ends(mode, integrator):
         assert (np.abs(world.bodies.linear_velocity[rows, 1][late]) < G * DT).all()
 
 
+@pytest.mark.parametrize("e", [0.1, 0.5, 0.9])
+@exact
+def test_what_only_just_closes_does_not_sink(mode, integrator, e):
+    """Threshold 0: bodies that lie on the floor, or above it by rounding, and close by next to nothing. What holds them
+    in a step is no reason to be let fall in the next one: no deeper than the slop."""
+    world = mode_world(mode, gravity=G, integrator=integrator, restitution_threshold=0.0, max_impacts_per_step=8)
+    floor(world)
+    starts = [(gap, speed) for gap in (0.0, 3e-17, 8e-17, 1e-15, 1e-12) for speed in (1e-16, 2e-14, 1e-12, 1e-9, 1e-7)]
+    balls = [
+        ball(world, (float(k), 0.1 + gap), (0.0, -speed), radius=0.1, restitution=e)
+        for k, (gap, speed) in enumerate(starts)
+    ]
+    for _ in range(10):
+        world.step()
+        assert positions(world, balls)[:, 1].min() > 0.1 - 0.005 * 0.2
+
+
 # -- other parabolas -----------------------------------------------------------------------------------
 
 
