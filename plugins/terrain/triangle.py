@@ -127,6 +127,13 @@ def part_above(b, at, normal, edge, nearest, known, support):
 
 
 @part
+def all_inside(one, two, three, spot, near):
+    """Whether a point is on the inner side of three edges."""
+    out = max(dot(one.outward, sub(spot, one.at)), dot(two.outward, sub(spot, two.at)))
+    return max(out, dot(three.outward, sub(spot, three.at))) <= near
+
+
+@part
 def is_between(normal, spot, edge, near):
     """Whether a normal at a spot of the triangle is none of the neighbour's at an edge that the spot is on."""
     if dot(edge.outward, sub(spot, edge.at)) < -near or dot(normal, edge.outward) <= NEAR:
@@ -144,6 +151,16 @@ def beyond_edge(normal, direction, edge):
 
 
 @part
+def is_behind(b, normal, at, most, support):
+    """Whether a shape at ``at`` from a face is behind that by more than that: both its centre and its middle, as the
+    centre of a hull may be anywhere."""
+    centre = dot(normal, at)
+    if centre >= -most:
+        return False
+    return centre + 0.5 * dot(normal, add(support(b, normal), support(b, negative(normal)))) < -most
+
+
+@part
 def contact_of_triangle(a, b, d, support, rounding):
     """(whether the shape is over the triangle's own part; depth, normal, point)."""
     normal, round_b = cross3(sub(a.b, a.a), sub(a.c, a.a)), rounding(b)
@@ -153,7 +170,7 @@ def contact_of_triangle(a, b, d, support, rounding):
     nearest = support(b, negative(normal))
     level = dot(normal, add(sub(d, a.a), nearest))
     point = add(d, nearest)
-    gap, centre = level - round_b, dot(normal, sub(d, a.a))
+    gap = level - round_b
     if gap > size:  # the plane parts them
         return False, zone - gap, normal, point
     one = edge_of(a.a, a.b, a.beyond_ab, normal, 5.0 * zone)
@@ -172,13 +189,15 @@ def contact_of_triangle(a, b, d, support, rounding):
         outer = outer if leaning == normal else leaning
         if beyond > far:
             far, side = beyond, edge.outward
-    # The plane may have what is not above the triangle itself.
+    # The plane may have what is not above the triangle itself; where that itself is over what is lowest it tells, as the
+    # way out to a side is to where a neighbour is.
     wrong = -depth - (height - round_b) > (0.1 * zone if depth < 0.0 else zone)
+    over = all_inside(one, two, three, add(d, nearest), near)
     if between and (kind != WHOLE or wrong):
-        if dot(straight, sub(d, place)) < -BEHIND * size - a.thickness:
+        if is_behind(b, straight, sub(d, place), BEHIND * size + a.thickness, support):
             return False, -math.inf, normal, point
         return True, depth, straight, place
-    if kind == NONE or wrong:
+    if kind == NONE or (wrong and not over):
         if depth > 0.0 and outer != normal and dot(outer, sub(d, place)) > 0.0:
             return True, depth, outer, place
         if gap > 2.0 * zone:
@@ -186,7 +205,7 @@ def contact_of_triangle(a, b, d, support, rounding):
         if -depth > zone or (depth <= 0.0 and far < zone):
             return False, min(depth, -0.1 * zone), straight, point
         return False, -max(far, zone), side if far > 0.0 else straight, point
-    if centre < -BEHIND * size - a.thickness:
+    if is_behind(b, normal, sub(d, a.a), BEHIND * size + a.thickness, support):
         return False, -math.inf, normal, point
     depth, point = round_b - height, add(d, lowest)
     return True, depth, normal, add_scaled(point, normal, -dot(normal, sub(point, a.a)) - 0.5 * depth)

@@ -10,8 +10,9 @@ from worlds import position, velocity
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
-from carom.plugins import Physics, capsule, terrain
+from carom.plugins import Physics, capsule, convex_hull, terrain
 from carom.plugins.capsule import CapsuleCollider
+from carom.plugins.convex_hull import ConvexHullCollider
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 from carom.plugins.terrain import create_height_field, create_triangle_mesh
 
@@ -24,7 +25,7 @@ SIDE = 25  # points of the hills along each axis
 
 
 def make_world(gravity=(0.0, -G, 0.0), **settings):
-    plugins = Rotation(), terrain.plugin, capsule.plugin
+    plugins = Rotation(), terrain.plugin, capsule.plugin, convex_hull.plugin
     return World(Physics(dimensions=3, gravity=gravity), *plugins, settings=Settings(**settings))
 
 
@@ -49,6 +50,41 @@ def height_at(heights, places):
     far = heights[i + 1, j + 1]
     two = far + (1 - u) * (heights[i, j + 1] - far) + (1 - v) * (heights[i + 1, j] - far)
     return np.where(u + v <= 1, one, two)
+
+
+def rock(rng):
+    """A random hull about its centre of mass; corners of a box, turned at random, one time in three."""
+    if rng.random() < 1 / 3:
+        turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        return ConvexHullCollider(np.array([(a, b, c) for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)]) * 0.4 @ turned)
+    hull = ConvexHullCollider(rng.normal(size=(10, 3)) * 0.3)
+    hull.offset = -hull.centre_of_mass
+    return hull
+
+
+def test_what_reaches_into_a_floor_of_triangles_touches_it():
+    """Wherever it is over inner edges, and however deep, while its middle is in front."""
+    rng, world = np.random.default_rng(14), make_world(gravity=(0.0, 0.0, 0.0), on_fault="ignore")
+    create_height_field(world, np.zeros((60, 60)), 1.0)
+    bodies = []
+    for k in range(180):
+        shape, share = rock(rng), (0.05, 0.3, 0.6, 0.95)[k % 4]
+        heights = (shape.corners + shape.offset)[:, 1]
+        low, middle = heights.min(), 0.5 * (heights.min() + heights.max())
+        x, z = 3.0 + 4.0 * (k % 14) + rng.uniform(-1, 1), 3.0 + 4.0 * (k // 14) + rng.uniform(-1, 1)
+        bodies.append(throw(world, (x, -low - share * (middle - low), z), (0.0, 0.0, 0.0), shape))
+    world.step()
+    assert [body for body in bodies if not len(world.contacts.of(body))] == []
+
+
+def test_rocks_stay_on_a_floor_of_triangles():
+    rng, world = np.random.default_rng(3), make_world()
+    create_height_field(world, np.zeros((45, 45)), 1.0, friction=0.5)
+    places = [(3.0 + 4.0 * (k % 10), 1.5, 3.0 + 4.0 * (k // 10)) + rng.uniform(-0.5, 0.5, 3) for k in range(100)]
+    rocks = [throw(world, place, (0.0, -4.0, 0.0), rock(rng), (0.0, 0.0, 0.0)) for place in places]
+    for _ in range(90):
+        world.step()
+    assert min(position(world, body)[1] for body in rocks) > 0.0
 
 
 @each_mode
