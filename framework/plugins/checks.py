@@ -174,8 +174,10 @@ def _shape_function(where: str, component: Any, name: str, dimensions: int) -> P
     moments = 1 + dimensions + dimensions * (dimensions + 1) // 2
     form = {"rounding": float, "second_moments": moments}.get(name, dimensions)
     several = {"material": (float, float, dimensions), "edge": (dimensions, dimensions)}
-    forms = several.get(name, (form,))
-    return None if function is None else PlainFunction(f"{where}: {name}", function, *SHAPE_FUNCTIONS[name], *forms)
+    forms, (names, returns) = several.get(name, (form,)), SHAPE_FUNCTIONS[name]
+    if name == "edge" and shape_function(component, "support") is None:
+        names = *names, "point"
+    return None if function is None else PlainFunction(f"{where}: {name}", function, names, returns, *forms)
 
 
 def _extents(where: str, component: Any, samples: list[Any], dimensions: int) -> tuple[np.ndarray, Support | None]:

@@ -103,6 +103,8 @@ class Plugin:
         it meets every other convex shape; and ``rounding(shape)``, how far it reaches beyond the core that support is
         about; and in 2D ``edge(shape, direction)``, both ends, counter-clockwise, of the core's edge that looks most in
         a direction: without it the two points in which what spins touches it come from its support, in twice the time;
+        without a support ``edge(shape, direction, point)``, of the straight part of its surface at a point from its
+        centre, twice that point if there is none: what spins touches it in one point else;
         and ``second_moments(shape, dimensions)``, from which bodies that spin get their inertia: its area or
         volume, its centre, then the means over it of xx, xy, yy, in 3D of xx, yy, zz, xy, xz, yz, of a body that is not
         rotated; and ``outline(shape, dimensions)``, what it looks like along its body's axes: ``(corners, faces)`` of a

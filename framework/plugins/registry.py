@@ -38,7 +38,8 @@ class Shape:
         compiled, or None; (shape, direction) -> the core's farthest point that way; (shape) -> how far the shape
         reaches beyond its core
     edge
-        compiled, or None; (shape, direction) -> in a plane both ends of the core's edge that looks most that way
+        compiled, or None; (shape, direction) -> in a plane both ends of the core's edge that looks most that way;
+        without a support (shape, direction, point) -> of the straight part of its surface there
     second_moments
         compiled, or None; (shape, dimensions) -> measure, centre, means of products of coordinates
     outline

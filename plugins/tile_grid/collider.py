@@ -32,6 +32,7 @@ from .cells import (
 )
 from .faces import FACES, Faces, plugin
 from .materials import MOST, TileMaterial, TileShape, materials_of, table_of
+from .straight import face_touched
 from .surface import material_touched
 
 ONE_WAY_STRIP = (0.0, 0.875), (1.0, 0.875), (1.0, 1.0), (0.0, 1.0)  # how pictures show a one-way cell, in tiles
@@ -278,6 +279,10 @@ class TileGridCollider(Collider):
     @staticmethod
     def material(shape, point, normal):
         return material_touched(shape, point, normal)
+
+    @staticmethod
+    def edge(shape, direction, point):
+        return face_touched(shape, direction, point)
 
     @staticmethod
     def bounds(shape, dimensions):

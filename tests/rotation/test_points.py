@@ -202,12 +202,12 @@ def test_a_box_on_the_floor_stands_on_all_its_corners(floor, d):
 
 @pytest.mark.parametrize("d", [2, 3])
 def test_what_has_no_face_there_touches_in_the_point_of_the_pair(d):
-    """Balls, boxes on a corner, edges that cross, and what has neither a support nor the form of a plane."""
+    """Balls, boxes on a corner, on a tile too, and edges that cross."""
     box, ball, up = BoxCollider(np.full(d, 0.5)), SphereCollider(0.4), np.eye(d)[1]
     corner, other = (0.6, 0.25) if d == 2 else (rotation(0.5, 0.2, 0.6), rotation(0.1, 0.9, 0.4))
     pairs = [(box, ball, None, None), (ball, ball, None, None), (box, box, None, corner), (box, box, corner, other)]
     if d == 2:
-        pairs.append((TileGridCollider([[1]], 1.0), box, None, None))
+        pairs.append((TileGridCollider([[1]], 1.0), box, None, corner))
     else:
         capsules = CapsuleCollider(0.2, 1.0), CapsuleCollider(0.3, 1.0)
         edge = rotation(0, 0, math.pi / 4)

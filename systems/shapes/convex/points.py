@@ -16,7 +16,7 @@ from ....framework.compilation import inlined, part
 from ....framework.elementary import cos, sin
 from ....framework.jit.stack_arrays import stack_array
 from ....framework.vectors import add, add_scaled, dot, item, negative, replace, row, scale, store, sub
-from ..linking.convex_by_address import convex_at, edge_by_address, rounding_by_address, support_by_address
+from ..linking.convex_by_address import convex_at, edge_by_address, rounding_by_address, support_by_address, tells_edge
 from .edges import FACE_LOOKS, FINER, FLAT_FACE, SAME_POINT
 from .gjk import cross
 
@@ -41,8 +41,8 @@ def contact_points(state, rows, d, met, within, places, gaps):
     the centre of a's shape, in the middle between the surfaces. gaps: along the normal, negative where the shapes
     overlap.
 
-    A shape without a support and without an end is a plane through the pair's point. Where there are no two faces that
-    share something, the point is that of the pair.
+    A shape without a support and without an end is a plane through the pair's point; another one may tell its edge
+    there in a plane. Where there are no two faces that share something, the point is that of the pair.
     """
     depth, _, point = met
     parameters, shape, count = state.shapes.parameters, state.bodies.shape, 0
@@ -62,9 +62,9 @@ def contact_points(state, rows, d, met, within, places, gaps):
 @inlined
 def may_have_face(state, shape, like):
     """Not balls, whose core is a point, nor what has neither a support nor the form of a plane: convex without end."""
+    if len(like) == 2 and tells_edge(shape):  # its ends tell
+        return True
     if shape[0] != 0:
-        if len(like) == 2:  # the ends of an edge tell
-            return True
         way = like
         for k in range(len(like)):
             way = replace(way, k, PREFERRED[k])
@@ -104,15 +104,15 @@ def keep_near(places, gaps, count, margin, like):
 
 
 @inlined
-def profile(shape, centre, normal, face):
+def profile(shape, centre, normal, point, face):
     """(low, high, at, height, slope) of a face over the tangent: its ends, and its height at one place; both ends are
     one of what looks another way. face: (side: 1 if it looks along the normal, -1 against it, tilt, height if it is a
     plane)."""
     side, tilt, level = face
-    if shape[0] == 0:
+    if not tells_edge(shape):
         return -math.inf, math.inf, 0.0, level, 0.0
     along = (-normal[1], normal[0])
-    one, two = edge_by_address(shape, scale(normal, side), tilt)
+    one, two = edge_by_address(shape, scale(normal, side), sub(point, centre), tilt)
     one, way = add(centre, one), sub(two, one)
     at, reach, rise = dot(along, one), dot(along, way), dot(normal, way)
     if not abs(rise) < tilt * abs(reach):
@@ -127,8 +127,9 @@ def points_2d(pair, d, met, within, places, gaps):
     depth, normal, point = met
     margin, tilt = within
     level, along = dot(normal, point), (-normal[1], normal[0])
-    low_a, high_a, at_a, height_a, slope_a = profile(pair[0], scale(d, 0.0), normal, (1.0, tilt, level + 0.5 * depth))
-    low_b, high_b, at_b, height_b, slope_b = profile(pair[1], d, normal, (-1.0, tilt, level - 0.5 * depth))
+    of_a, of_b = (1.0, tilt, level + 0.5 * depth), (-1.0, tilt, level - 0.5 * depth)
+    low_a, high_a, at_a, height_a, slope_a = profile(pair[0], scale(d, 0.0), normal, point, of_a)
+    low_b, high_b, at_b, height_b, slope_b = profile(pair[1], d, normal, point, of_b)
     low, high = max(low_a, low_b), min(high_a, high_b)
     if not high - low > FLAT_FACE * min(high_a - low_a, high_b - low_b):
         return 0

@@ -32,10 +32,16 @@ def rounding_by_address(shape):
 
 
 @inlined
-def edge_by_address(shape, normal, tilt):
+def tells_edge(shape):
+    """Whether the record has the address of its edges."""
+    return _header_at(shape[2]).edge != 0
+
+
+@inlined
+def edge_by_address(shape, normal, point, tilt):
     """In a plane both ends, counter-clockwise, of the core's edge in the direction of a normal: the one that looks most
-    that way, if the shape tells it, else as in :func:`~..convex.edges.edge_towards`."""
-    x0, y0, x1, y1 = call_edge(_header_at(shape[2]).edge, shape[2], shape[3], normal, tilt)
+    that way, if the shape tells it, else as in :func:`~..convex.edges.edge_towards`; without a support at a point."""
+    x0, y0, x1, y1 = call_edge(_header_at(shape[2]).edge, shape[2], shape[3], normal, point, tilt)
     return (x0, y0), (x1, y1)
 
 

@@ -104,13 +104,16 @@ class LinkedShape:
 
     @cached_property
     def edge(self) -> Linked | None:
-        """In a plane both ends of an edge, by the support if the shape does not tell them; None in space."""
-        if self.dimensions == 3:
+        """In a plane both ends of an edge, by the support if the shape does not tell them; None in space, and of what
+        has neither."""
+        told, parameters = self.shape.edge or self.shape.support, self._parameters("p")
+        if self.dimensions == 3 or told is None:
             return None
-        told, parameters = self.shape.edge, self._parameters("p")
-        call = f"function({parameters}, normal)" if told else f"edge_towards({parameters}, function, normal, tilt)"
+        call = f"function({parameters}, normal{'' if self.shape.support else ', point'})"
+        if not self.shape.edge:
+            call = f"edge_towards({parameters}, function, normal, tilt)"
         lines = f"one, two = {call}", "return one[0], one[1], two[0], two[1]"
-        made = self._function("def edge(p, i, normal, tilt):", *lines, function=told or self.shape.support)
+        made = self._function("def edge(p, i, normal, point, tilt):", *lines, function=told)
         return self._linked(made.edge, edge_signature(2))
 
     @cached_property
@@ -135,7 +138,7 @@ class LinkedShape:
         """by_address: whether some pair takes the shape by the addresses of support and rounding; touched: whether what
         spins touches it in several points, found by that of its edge too."""
         found = [self.bounds, self.rotated, self.material]
-        if by_address or touched:
+        if self.shape.support is not None and (by_address or touched):
             found += [self.support, self.rounding]
         if touched:
             found.append(self.edge)

@@ -101,9 +101,9 @@ class LinkedShapes:
                 yield from pair.functions(sweeps)
 
     def touched(self, moments: bool) -> set[int]:
-        """Shapes whose records have the addresses of support, rounding and edge: all that have a support where moments
-        are asked for, because what spins touches in several points."""
-        return {number for number, shape in enumerate(self.shapes) if moments and shape.support is not None}
+        """Shapes whose records have the addresses of support, rounding and edge: all that have one of these where
+        moments are asked for, because what spins touches in several points."""
+        return {number for number, shape in enumerate(self.shapes) if moments and (shape.support or shape.edge)}
 
     def _table(self, name: str) -> np.ndarray:
         """Addresses of a function, by shape, or for pairs at first * count + second; 0 where there is none."""
@@ -179,7 +179,7 @@ class ParameterRecords:
 
     def need_support(self, number: int) -> None:
         """Some pair takes this shape by the addresses of its support and rounding: put them into its records."""
-        if not self.own[number].support:
+        if not self.own[number].support and self._linked.shapes[number].support is not None:
             set_support(self.own[number], self._linked.functions[number])
             set_support(self.world[number], self._linked.functions[number])
 

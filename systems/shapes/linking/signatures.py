@@ -83,8 +83,8 @@ def support_signature(dimensions: int) -> Signature:
 
 @cache
 def edge_signature(dimensions: int) -> Signature:
-    """(parameters, row, normal, tilt) -> both ends of an edge, one after the other."""
-    return floats(2 * dimensions)(INT, INT, floats(dimensions), FLOAT)
+    """(parameters, row, normal, point, tilt) -> both ends of an edge, one after the other."""
+    return floats(2 * dimensions)(INT, INT, floats(dimensions), floats(dimensions), FLOAT)
 
 
 def rounding_signature() -> Signature:
