@@ -189,7 +189,7 @@ def contact_of_triangle(a, b, d, support, rounding):
         outer = outer if leaning == normal else leaning
         if beyond > far:
             far, side = beyond, edge.outward
-    # The plane may have what is not above the triangle itself; but it tells where what is lowest is over that, as the way
+    # The plane may have what is not above the triangle itself; but it tells where what is lowest is over that: the way
     # out to a side leads into a neighbour.
     wrong = -depth - (height - round_b) > (0.1 * zone if depth < 0.0 else zone)
     over = all_inside(one, two, three, add(d, nearest), near)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -56,7 +57,7 @@ def rock(rng):
     """A random hull about its centre of mass; corners of a box, turned at random, one time in three."""
     if rng.random() < 1 / 3:
         turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-        return ConvexHullCollider(np.array([(a, b, c) for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)]) * 0.4 @ turned)
+        return ConvexHullCollider(0.4 * np.array(list(itertools.product((-1, 1), repeat=3))) @ turned)
     hull = ConvexHullCollider(rng.normal(size=(10, 3)) * 0.3)
     hull.offset = -hull.centre_of_mass
     return hull
@@ -80,7 +81,8 @@ def test_what_reaches_into_a_floor_of_triangles_touches_it():
 def test_rocks_stay_on_a_floor_of_triangles():
     rng, world = np.random.default_rng(3), make_world()
     create_height_field(world, np.zeros((45, 45)), 1.0, friction=0.5)
-    places = [(3.0 + 4.0 * (k % 10), 1.5, 3.0 + 4.0 * (k // 10)) + rng.uniform(-0.5, 0.5, 3) for k in range(100)]
+    grid = np.array([(3.0 + 4.0 * (k % 10), 1.5, 3.0 + 4.0 * (k // 10)) for k in range(100)])
+    places = grid + rng.uniform(-0.5, 0.5, grid.shape)
     rocks = [throw(world, place, (0.0, -4.0, 0.0), rock(rng), (0.0, 0.0, 0.0)) for place in places]
     for _ in range(90):
         world.step()
