@@ -192,7 +192,7 @@ def solve_one(solver, one, motion, bias, softly):
 
 @inlined
 def rub_rows(solver, chunk, impulses, start, first, pairs):
-    """The rows of one point of the pairs of a chunk along their surfaces."""
+    """The rows of one point of some pairs along their surfaces."""
     for q in range(pairs):
         impulse = impulses[q]
         solver.impulse[first + q] = impulse
@@ -200,14 +200,15 @@ def rub_rows(solver, chunk, impulses, start, first, pairs):
 
 
 @part
-def solve_rows(solver, chunk, bias, softly, start, pairs, points):
-    """The rows of the pairs of a chunk, without a branch for single ones; of four points those across first, as on
-    two of them what lies flat is in balance."""
+def solve_rows(solver, chunk, bias, softly, start, pairs, layout):
+    """The rows of some pairs of a chunk, without a branch for single ones; of four points those across first, as on
+    two of them what lies flat is in balance. layout: (points of each pair, rows from one of these to the next)."""
+    points, stride = layout
     if points == 1:
         for q in range(pairs):
             store_motion(chunk, q, solve_one(solver, start + q, chunk_motion(chunk, q), bias, softly))
     for e in range(points // 2):
-        first, second = start + e * pairs, start + (e + points // 2) * pairs
+        first, second = start + e * stride, start + (e + points // 2) * stride
         for q in range(pairs):  # it stores nothing where it reads: else no two pairs would be solved together
             motion = chunk_motion(chunk, q)
             motion, chunk.impulse[q], chunk.other[q] = solve_two(
@@ -259,6 +260,25 @@ def solve_chunks(solver, bias, pushes, span):
         points = solver.points[c]
         pairs = (solver.ends[c] - start) // points
         gather_motion(solver, chunk, start, pairs)
-        solve_rows(solver, chunk, bias, softly, start, pairs, points)
+        solve_rows(solver, chunk, bias, softly, start, pairs, (points, pairs))
         scatter_motion(solver, chunk, start, pairs)
         start, c = solver.ends[c], c + 1
+
+
+@part
+def relax_pairs(solver, count, span):
+    """One pass over the pairs of the first rows of ``listed``, which ascend; all points of a pair as in a chunk, so
+    that what lands flat stays so."""
+    start, c = span[0], solver.first_chunk
+    chunk = make_chunk(scale(solver.velocity[0], 0.0))
+    for e in range(count):
+        k = solver.listed[e]
+        while solver.ends[c] <= k:
+            start, c = solver.ends[c], c + 1
+        points = solver.points[c]
+        pairs = (solver.ends[c] - start) // points
+        one = start + (k - start) % pairs
+        gather_motion(solver, chunk, one, 1)
+        solve_rows(solver, chunk, solver.target_speed, 0.0, one, 1, (points, pairs))
+        scatter_motion(solver, chunk, one, 1)
+    solver.visits += count

@@ -24,6 +24,7 @@ from ..constants import (
     STRUCK_EXCESS,
     SWEEPS_PER_LOOK,
 )  # fmt: skip
+from .chunks import relax_pairs
 from .passes import most_repeats
 from .rows import excess_speed, relax_listed, velocity_at
 
@@ -258,7 +259,10 @@ def finish_substep(solver, bias_rate, any_struck, h, dt, span, arms):
     while count > 0:
         for _ in range(SWEEPS_PER_LOOK):
             for_joints(solver, calls.RELAX_OPEN, NO_NUMBERS, span, arms)
-            relax_listed(solver, count, arms)
+            if len(arms) > 0 and not solver.surfaces_run:
+                relax_pairs(solver, count, span)
+            else:
+                relax_listed(solver, count, arms)
         measure_energy(solver, span, arms, islands)
         turn += SWEEPS_PER_LOOK
         note_changed(solver, turn, count)
