@@ -128,7 +128,8 @@ def still_bounces(state, dt, c, depth, normal):
     touches = depth > (SAME_PLACE * extent if pairs.impulse[c] == 0.0 else 0.0)
     held = support_along(bodies, a, b, normal)  # without which they are nearer, and close faster
     near = driven_travel(state, a) + driven_travel(state, b)  # as a motor may bring them together in this step
-    near += held * state.force_travels * dt if speed >= -held else 0.0
+    if speed >= -held:
+        near += held * state.force_travels * dt
     if not touches and speed < -threshold and not (near > 0.0 and depth >= -near):
         return True  # the next step's impact
     if speed > 0.0:
@@ -185,7 +186,7 @@ def find_resting(state, dt):
         for c in range(pairs.count):
             pairs.rests[c] = pairs.is_solid[c] and is_resting(state, dt, c)
             if pairs.rests[c]:
-                pairs.resting[count] = c
+                pairs.resting[count], pairs.near_contact[c] = c, True
                 count, rows = count + 1, rows + (points_of(state, c) if state.spinning else 1)
     pairs.resting_count, state.solver.contacts, state.solver.tips = count, rows, rows > count
     state.resting_counted += count
@@ -318,8 +319,6 @@ def find_touching(state, dt):
     if state.response_idle:
         pairs.touching_count = 0
         return OK
-    for r in range(pairs.resting_count):
-        pairs.near_contact[pairs.resting[r]] = True
     for r in range(impacts.logged):
         pairs.near_contact[impacts.log_pair[r]] = True
     for c in range(pairs.count):

@@ -14,8 +14,8 @@ HASHES = {
     "pile2d": ({"n": 40}, "db9b1fa37750d253586190e5ecd27710ec7762a7ba553529d2497c98fd04f62e"),
     "pile3d": ({"n": 27}, "9ad266244af78d058c9aa2d952f57397bda578cb94a123711b905e59024ddbbe"),
     "tumbler": ({"n": 12}, "0c1980139e89fde1c589cce28d44e01f52c316eeab435314c4e599fccb103c62"),
-    "bridge": ({"n": 8, "crates": 2}, "cbd8cedd6d05902137a98779a0d8fb9b7eff7f405828bfd0ba9c392d76198fa3"),
-    "ragdoll": ({"n": 1}, "e8f2824a874b03f39c969a6c039cb55c9821799768cbd4f8165d59cb1e70776a"),
+    "bridge": ({"n": 8, "crates": 2}, "7b974753b6372f34ce8be2475462266e7713eb3a797772518304388d06facc04"),
+    "ragdoll": ({"n": 1}, "a9e9c205ab054056285aac4404ad19f7c768d7097e3e4ea4eb5933623dfbbcda"),
 }
 STEPS = 60
 

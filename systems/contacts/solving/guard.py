@@ -164,14 +164,12 @@ def excess_scale(solver, t):
 def find_unsolved_rows(solver, turn, any_struck, dt, span, arms, islands):
     """The rows of struck islands that are not solved, and all of islands that gain, come first in ``listed``; returns
     how many. An island has as many passes as its own size allows: what is solved elsewhere changes none of its bits."""
-    struck, extent, used, any_gain, finest, count = solver.struck, solver.extent, solver.used, False, 0.0, 0
+    struck, extent, any_gain, finest, count = solver.struck, solver.extent, False, 0.0, 0
     for t in range(islands[0], islands[1]):
         solver.listed_of[t] = 0
         any_gain |= gains_by_contacts(solver, t)
         finest = max(finest, excess_scale(solver, t) if struck[t] else 0.0)
     for k in range(span[0], span[1] if any_gain or any_struck else span[0]):
-        if turn > 0 and not any_gain and used[solver.first[k]] != turn and used[solver.second[k]] != turn:
-            continue  # no pass since the last look has changed what it asks
         excess, least = excess_speed(solver, k, arms) * dt, STRUCK_EXCESS * extent[k]
         if excess * finest > least or any_gain:  # seldom
             t = island_of(solver, k)
@@ -183,18 +181,6 @@ def find_unsolved_rows(solver, turn, any_struck, dt, span, arms, islands):
     if count > 0:
         list_open(solver, span, arms)
     return count
-
-
-@part
-def note_changed(solver, turn, count):
-    """``used`` of the bodies that further passes have changed becomes the number of these passes."""
-    for e in range(count):
-        k = solver.listed[e]
-        for q in (solver.first[k], solver.second[k]):
-            if solver.island[q] >= 0:
-                solver.used[q] = turn
-    for e in range(solver.opened if solver.joints.begin < solver.joints.end else 0):
-        solver.used[solver.open_body[e]] = turn
 
 
 @part
@@ -265,7 +251,6 @@ def finish_substep(solver, bias_rate, any_struck, h, dt, span, arms):
                 relax_listed(solver, count, arms)
         measure_energy(solver, span, arms, islands)
         turn += SWEEPS_PER_LOOK
-        note_changed(solver, turn, count)
         count = find_unsolved_rows(solver, turn, any_struck, dt, span, arms, islands)
     limit_energy(solver, span, arms, islands)
     carry_budget(solver, islands)

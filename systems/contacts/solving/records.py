@@ -80,7 +80,7 @@ SOLVER = Schema(
     # bodies, in the order of their ranges
     bodies=integer(),
     body_row=ints("int32"),
-    used=ints(),  # colours of its rows; later a row, or after how many further passes it was changed
+    used=ints(),  # colours of its rows; later a row
     island=ints("int32"),  # -1: cannot be moved
     group=ints("int32"),  # of what joints join
     velocity=vectors(unit="m/s"),
