@@ -313,7 +313,8 @@ class ContactEvents(StagedSystem):
             self.world.report_fault(
                 f"{impacts.capped} impacts beyond {self._world.settings.max_impacts_per_step} "
                 f"of a body in one step, the first of entity {entity[impacts.capped_row]}: raise "
-                f"Settings.max_impacts_per_step or use smaller steps; the rest was solved as contact at rest",
+                f"Settings.max_impacts_per_step or restitution_threshold, or use smaller steps; the rest was solved as "
+                f"contact at rest",
                 kind="impacts",
             )
 

@@ -65,7 +65,7 @@ def test_a_limit_reached_in_every_step_is_told_once_and_says_what_to_do():
     assert len(told) == 1
     assert len(world.faults) == 1
     assert world.faults[0].endswith(" (3 times, steps 0 to 2)")
-    assert "raise Settings.max_impacts_per_step or use smaller steps; the rest was solved as contact at rest" in str(
+    assert "raise Settings.max_impacts_per_step or restitution_threshold, or use smaller steps; the rest was solved as" in str(
         told[0].message
     )
 
