@@ -246,10 +246,9 @@ def test_few(state, dt):
         return OK
     found, stop = 0, state.count if all_static else moving
     for i in range(first, moving):
-        if found != FULL:
-            found = test_blocks(state, i, i + 1, stop, found)
-        if found != FULL:
-            found = test_blocks(state, i, 0, first if all_static else 0, found)
+        found = test_blocks(state, i, i + 1, moving, found)
+        found = test_blocks(state, i, moving, stop, found)  # apart from these, as most lie on a static body
+        found = test_blocks(state, i, 0, first if all_static else 0, found)
     for k in range(0 if all_static else grid.outside_count):
         if found != FULL:
             found = test_row(state, grid.outside[k], first, moving, found)
@@ -261,7 +260,8 @@ def test_few(state, dt):
 
 @part
 def test_blocks(state, i, start, stop, found):
-    """The same for many rows, of which few overlap: a block in which none does is ruled out without writing a pair."""
+    """The same for many rows, of which few overlap: a block in which none does is ruled out without writing a pair.
+    ``found`` may be FULL, and stays so."""
     lower, upper = state.bodies.lower, state.bodies.upper
     low, high = lower[i], upper[i]
     for begin in range(start, stop, SEARCH_BLOCK):
