@@ -65,9 +65,7 @@ def test_a_limit_reached_in_every_step_is_told_once_and_says_what_to_do():
     assert len(told) == 1
     assert len(world.faults) == 1
     assert world.faults[0].endswith(" (3 times, steps 0 to 2)")
-    assert "raise Settings.max_impacts_per_step or restitution_threshold, or use smaller steps; the rest was solved as" in str(
-        told[0].message
-    )
+    assert "raise Settings.max_impacts_per_step or restitution_threshold, or use smaller steps;" in str(told[0].message)
 
 
 def test_a_world_that_breaks_as_a_whole_does_not_fill_the_screen():
