@@ -7,14 +7,14 @@ import math
 from ...framework.compilation import part
 from ...framework.vectors import dot, length
 from .faces import ONE_WAYS
-from .outline import next_run
+from .outline import EDGES, TOP, edge_of, is_one_way_cell, joined
 from .rectangles import SLANT, cell_at, grid_of, is_tile
 from .surface import first_code
 
 FOLLOWED = 32  # tiles: how far to both sides the face of full tiles is followed,
-AROUND = 2  # and a run of the outline of others
-APART = 0.5  # half tiles: how far from a run a point may be that is on it
-PARALLEL = 1.0 - 1e-9  # cosine: so nearly a run has the normal of the contact
+AROUND = 3  # edges, likewise, of the outline of others
+APART = 0.5  # half tiles: how far from an edge a point may be that is on it
+PARALLEL = 1.0 - 1e-9  # cosine: so nearly an edge has the normal of the contact
 
 
 @part
@@ -57,21 +57,50 @@ def face_of_tiles(grid, normal, at):
 
 
 @part
-def run_at(grid, one_way, normal, at):
-    """The same of the nearest run of the outline, whatever its normal."""
+def goes_on(grid, one_way, at, way, forward):
+    """(whether the outline goes straight on at the end of an edge, or before its start, the way of what is there)."""
+    x, y = at
+    if one_way:
+        return is_one_way_cell(grid, (x >> 1) - (0 if forward else 1), (y >> 1) - 1), 2, 0
+    turn, ux, uy, _ = joined(grid, x, y, way[0], way[1], forward)
+    return turn == 0.0, ux, uy
+
+
+@part
+def straight_through(grid, one_way, start, end):
+    """Both ends, the other way round, of what is straight of the outline through an edge, at most AROUND edges more at
+    either of them; places in tiles."""
+    (x0, y0), (x1, y1) = start, end
+    way = x1 - x0, y1 - y0
+    for _ in range(AROUND):
+        on, ux, uy = goes_on(grid, one_way, (x1, y1), way, True)
+        x1, y1 = x1 + (ux if on else 0), y1 + (uy if on else 0)
+        before, ux, uy = goes_on(grid, one_way, (x0, y0), way, False)
+        x0, y0 = x0 - (ux if before else 0), y0 - (uy if before else 0)
+    return (0.5 * x1, 0.5 * y1), (0.5 * x0, 0.5 * y0)
+
+
+@part
+def edge_at(grid, one_way, normal, at):
+    """The same of the nearest edge of the outline, whatever its normal."""
     x, y = cell_at(at[0], grid[1]), cell_at(at[1], grid[2])
-    cells = max(x - AROUND, 0), max(y - AROUND, 0), min(x + AROUND + 1, grid[1]), min(y + AROUND + 1, grid[2])
-    one, two, least, edge, there = at, at, APART, 0, True
-    while there:
-        edge, there, run = next_run(grid, cells, one_way, edge)
-        way, back = (1.0 * (run.x1 - run.x0), 1.0 * (run.y1 - run.y0)), (2.0 * at[0] - run.x0, 2.0 * at[1] - run.y0)
-        size, outward = length(way), (-way[1], way[0])
-        along, away = dot(way, back), abs(dot(outward, back))
-        if not there or dot(outward, normal) <= PARALLEL * size or not away < least * size:
-            continue
-        if -APART * size <= along <= (size + APART) * size:
-            least, one, two = away / size, (0.5 * run.x1, 0.5 * run.y1), (0.5 * run.x0, 0.5 * run.y0)
-    return one, two
+    found, least, start, end = False, APART, (0, 0), (0, 0)
+    for cell_x in range(x - 1, x + 2):
+        for cell_y in range(y - 1, y + 2):
+            for k in range(EDGES):
+                there, x0, y0, x1, y1 = edge_of(grid, cell_x, cell_y, k)
+                if one_way:
+                    there, x0, y0 = k == TOP and is_one_way_cell(grid, cell_x, cell_y), 2 * cell_x, 2 * cell_y + 2
+                    x1, y1 = x0 + 2, y0
+                if not there:
+                    continue
+                way, back = (1.0 * (x1 - x0), 1.0 * (y1 - y0)), (2.0 * at[0] - x0, 2.0 * at[1] - y0)
+                size, outward, along = length(way), (-way[1], way[0]), dot(way, back)
+                away = abs(dot(outward, back)) / size
+                beside = abs(along - 0.5 * size * size) > (0.5 * size + APART) * size
+                if dot(outward, normal) > PARALLEL * size and away < least and not beside:
+                    found, least, start, end = True, away, (x0, y0), (x1, y1)
+    return straight_through(grid, one_way, start, end) if found else (at, at)
 
 
 @part
@@ -84,5 +113,5 @@ def face_touched(a, normal, point):
     if first_code(grid) == grid[4]:
         one, two = face_of_tiles(grid, normal, at)
     else:
-        one, two = run_at(grid, a.faces == ONE_WAYS, normal, at)
+        one, two = edge_at(grid, a.faces == ONE_WAYS, normal, at)
     return (tile * (one[0] - half_x), tile * (one[1] - half_y)), (tile * (two[0] - half_x), tile * (two[1] - half_y))
