@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...framework.compilation import inlined
 from ...framework.vectors import item
 
-BRUTE_FORCE_MAX = 80  # boxes; testing their 3,200 pairs takes 7 us, a grid of them 2; but its kernels are more to load
+BRUTE_FORCE_MAX = 80  # boxes; testing their 3,200 pairs takes 4 us, a grid of them 2; but its kernels are more to load
 
 
 @inlined
