@@ -337,6 +337,7 @@ STATE = Schema(
     checked=ints(),  # addresses of records of CHECKED
     sleeping=flag(),  # the settings say so
     all_still=flag(),  # in this step nothing moves that could meet another
+    moving_meet=flag(),  # layers and masks let some bodies meet that move
     asleep=integer(),  # bodies that sleep, or are about to
     due=integer(),  # bodies that do from the next step on
     sleep_stages=integer(),  # those of sleeping that have run in this step, as bits

@@ -118,6 +118,18 @@ def measure_frame(state):
 
 
 @part
+def any_meet(state):
+    """Whether layers and masks let any two bodies meet that move. Debris that meets walls alone need not be searched
+    for others of it, however crowded."""
+    bodies, layer, mask = state.bodies, state.colliders.layer, state.colliders.mask
+    slot, layers, masks = bodies.collider_slot, 0, 0
+    for i in range(state.first, state.moving if len(mask) > 0 else state.first):
+        if bodies.shape[i] >= 0:
+            layers, masks = layers | layer[slot[i], i], masks | mask[slot[i], i]
+    return len(mask) == 0 or layers & masks != 0
+
+
+@part
 def follow_static_places(state):
     """Static bodies have changed if one stands elsewhere than its box: code of the game has written its place."""
     bodies, moving, moved = state.bodies, state.moving, False
@@ -214,6 +226,7 @@ def box_motions(state, dt):
     if state.all_still:
         return OK
     state.grid.suits = False  # until it is made of these boxes
+    state.moving_meet = any_meet(state)
     box_rows(state, state.first, state.moving, MOVING)
     if state.sweeping and state.moved:
         for i in range(state.first, state.moving):

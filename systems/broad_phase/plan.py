@@ -9,13 +9,17 @@ from .brute_force import BRUTE_FORCE_MAX
 from .stages import SPATIAL_TREE, UNIFORM_GRID, has_many_static
 
 
-def reason_of(search: int, moving: int, static: int, dimensions: int) -> str:
-    """How the candidates of so many bodies are found; search: a value of ``state.pair_search``."""
+def reason_of(search: int, moving: int, static: int, dimensions: int, meet: bool) -> str:
+    """How the candidates of so many bodies are found; search: a value of ``state.pair_search``; meet: whether layers
+    let any two that move meet."""
     tree = "quadtree" if dimensions == 2 else "octree"
     if search == SPATIAL_TREE:
         beside = f" and against that of {static} static ones" if static else ""
         return f"{tree} of {moving} moving bodies against itself{beside}"
-    if has_many_static(moving, static):
+    if not meet:
+        among = "a uniform grid of" if has_many_static(moving, static, meet) else "all"
+        return f"layers let no two of {moving} moving bodies meet; they look into {among} {static} static ones"
+    if has_many_static(moving, static, meet):
         among = "uniform grid" if search == UNIFORM_GRID else "every pair"
         return f"{among} of {moving} moving bodies, which look into a uniform grid of {static} static ones"
     if search == UNIFORM_GRID:

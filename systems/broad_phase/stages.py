@@ -5,6 +5,7 @@ are made before:
 
     moving                       pairs of what moves
     less than UNIFORM_GRID_MIN   brute force
+    none that layers let meet    none
     more                         uniform grid, into which the kinematic ones look if they are few
 
     static                       pairs with what does not move
@@ -52,15 +53,15 @@ NO_SEARCH, BRUTE_FORCE, UNIFORM_GRID, SPATIAL_TREE, PLUGIN = range(5)
 
 
 @part
-def has_many_static(moving, static):
-    """Whether so many static bodies are in a grid of their own, if that suits them."""
-    return static > max(moving, BRUTE_FORCE_MAX)
+def has_many_static(moving, static, meet):
+    """Whether so many static bodies are in a grid of their own, if that suits them. meet: bodies that move may meet."""
+    return static > max(moving if meet else 0, BRUTE_FORCE_MAX)
 
 
 @part
 def has_static_grid(state):
     """The same of the bodies that there are."""
-    return has_many_static(state.moving - state.first, fixed_count(state))
+    return has_many_static(state.moving - state.first, fixed_count(state), state.moving_meet)
 
 
 @part
@@ -175,14 +176,10 @@ def choose_search(state, dt):
     if state.uses_plugin_broad_phase:
         state.pair_search = PLUGIN
         return FIND_IN_PYTHON
-    if has_static_grid(state) and not state.static_grid.suits:
+    few = state.moving - state.first < UNIFORM_GRID_MIN or not state.moving_meet
+    if not (few or state.grid.suits) or (has_static_grid(state) and not state.static_grid.suits):
         return leave_to_trees(state)
-    if state.moving - state.first < UNIFORM_GRID_MIN:
-        state.pair_search = BRUTE_FORCE
-    elif state.grid.suits:
-        state.pair_search = UNIFORM_GRID
-    else:
-        return leave_to_trees(state)
+    state.pair_search = BRUTE_FORCE if few else UNIFORM_GRID
     return OK
 
 
@@ -239,14 +236,14 @@ def search_uniform_grid(state, dt):
 
 
 def test_few(state, dt):
-    """Few bodies move: every pair of them, and they with all static bodies that are in no grid."""
+    """Few bodies move, or none that meet: every pair of them, and they with all static bodies that are in no grid."""
     first, moving, candidates, grid = state.first, state.moving, state.candidates, state.static_grid
     all_static = not looks_into_statics(state)
     if state.pair_search != BRUTE_FORCE:
         return OK
     found, stop = 0, state.count if all_static else moving
     for i in range(first, moving):
-        found = test_blocks(state, i, i + 1, moving, found)
+        found = test_blocks(state, i, i + 1, moving if state.moving_meet else i, found)
         found = test_blocks(state, i, moving, stop, found)  # apart from these, as most lie on a static body
         found = test_blocks(state, i, 0, first if all_static else 0, found)
     for k in range(0 if all_static else grid.outside_count):

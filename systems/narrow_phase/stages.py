@@ -124,17 +124,6 @@ def sort_few(state):
         run *= 2
 
 
-@part
-def all_layers_meet(state):
-    """Whether no layer, mask or group keeps any two bodies apart (usual, and then no pair need be asked)."""
-    layer, mask, group = state.colliders.layer, state.colliders.mask, state.colliders.group
-    apart = False
-    for slot in range(state.slot_count if len(layer) > 0 or len(mask) > 0 or len(group) > 0 else 0):
-        for i in range(state.count):
-            apart |= mask[slot, i] != -1 or layer[slot, i] == 0 or group[slot, i] != 0
-    return not apart
-
-
 @inlined
 def layers_meet(state, a, b):
     """Whether each one's layer is in the other's mask, and they are not of one group."""
@@ -199,10 +188,10 @@ def select_pairs(state, dt):
     shape, kind, starts = bodies.shape, candidates.kind, candidates.bucket_starts
     for k in range(shapes.count * shapes.count + 2):
         starts[k] = 0
-    all_meet, several, kept = all_layers_meet(state), shapes.count > 1, 0
+    several, kept = shapes.count > 1, 0
     for c in range(candidates.count):
         a, b = candidates.sorted_a[c], candidates.sorted_b[c]
-        if all_meet or layers_meet(state, a, b):
+        if layers_meet(state, a, b):
             pairs.a[kept], pairs.b[kept] = a, b
             pairs.is_solid[kept], pairs.early[kept], pairs.disabled[kept] = is_solid_pair(state, a, b), False, False
             if several:
