@@ -303,8 +303,9 @@ class Column:
         value = self.checked(value, handle._entity)
         store = handle._store
         if store is None:
+            if handle._version < -1:  # it is given to a world
+                self.check_dimensions(value, -handle._version, handle._entity)
             handle._values[self.name] = value
-            handle._version = -1
             return
         self.check_dimensions(value, store.dimensions, handle._entity)
         if type(value) is Unresolved:

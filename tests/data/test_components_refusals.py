@@ -253,3 +253,20 @@ def test_a_hundred_thousand_entities_at_once():
         assert world.component_for_entity(n, SphereCollider).radius == radius[-1]
         world.close()
     assert calls[2] == calls[1]
+
+
+@pytest.mark.parametrize("stepped", [False, True])
+def test_a_value_of_other_dimensions_is_refused_where_it_is_set(stepped):
+    """Before the first step too, when the world has no row of it yet; what was there stays."""
+    with make_world(2) as world:
+        transform, body = Transform((1, 2)), RigidBody()
+        world.create_entity(transform, body)
+        if stepped:
+            world.step()
+        for component, field, value in ((transform, "position", (1, 2, 3)), (body, "linear_velocity", np.zeros(3))):
+            with pytest.raises(ValueError, match=rf"{type(component).__name__}\.{field} must have 2 components"):
+                setattr(component, field, value)
+        with pytest.raises(ValueError, match=r"Transform\.rotation must be an angle in this 2D world"):
+            transform.rotation = (1, 0, 0, 0)
+        world.step()
+        assert transform.position.tolist() == [1.0, 2.0]
