@@ -27,6 +27,7 @@ NEAR = 1e-9  # of the segment's length: so near its end is on it
 BESIDE = 0.01  # of the length: what is nearer to the segment's own part is looked at as if it were there, as a search
 # for the time of a touch takes smaller gaps for one
 TILT = 0.02  # radians: a face that is tilted by less lies on the segment with its whole length
+FLAT = 1.0 - 0.5 * TILT * TILT  # cosine of that
 LEVEL = 1e-6  # slope of a face that lies on the segment, so that they touch in the middle of what they share
 BEHIND = 0.01  # of the length, and the thickness: a body whose centre is farther behind the line has no contact
 FOLDED = 0.05  # of the length: how far a segment reaches at least into what follows an inner corner
@@ -147,12 +148,12 @@ def above(face, first, last):
     low, nearest, high = face.low, face.nearest, face.high
     if low[0] > last or high[0] < first:
         return NONE, 0.0, 0.0
+    if abs(high[1] - low[1]) <= LEVEL * (high[0] - low[0]):
+        return WHOLE, nearest[1], 0.5 * (max(low[0], first) + min(high[0], last))
     if nearest[0] > last:
         return PART, height_between(low, nearest, last) if low[0] < nearest[0] else nearest[1], last
     if nearest[0] < first:
         return PART, height_between(nearest, high, first) if nearest[0] < high[0] else nearest[1], first
-    if abs(high[1] - low[1]) <= LEVEL * (high[0] - low[0]):
-        return WHOLE, nearest[1], 0.5 * (max(low[0], first) + min(high[0], last))
     return WHOLE, nearest[1], nearest[0]
 
 
@@ -233,8 +234,8 @@ def with_corner(b, at, corner, face, known, support):
     """What is known of a contact, after a look at an outer corner: (kind, height, normal, whether it is the corner).
 
     corner: (outer normal, normal, whether it is the segment's own, whether it is at the end); the contact is at the
-    corner if the shape is farther along a normal in between than along that of the segment; and none of this segment
-    if that is the outer one, or if the corner belongs to the next segment.
+    corner if the shape is farther along a normal in between than along that of the segment, unless a FLAT face lies on
+    it; and none of this segment if that is the outer one, or if the corner belongs to the next segment.
     """
     outer, normal, owned, at_end = corner
     kind, height, _, _ = known
@@ -248,9 +249,11 @@ def with_corner(b, at, corner, face, known, support):
         lies, clipped, _ = above(beside, 0.0, 0.0)
         if lies != NONE and owned and (kind != PART or clipped < height):  # the shape's face lies on the corner
             return PART, clipped, outer, True
+    if rounds and kind == PART and dot(between, normal) > FLAT:
+        return known
     if rounds and owned:
-        return known if kind == PART and height <= gap else (PART, gap, between, True)
-    if kind == NONE or (kind == WHOLE and gap > height + STRAIGHT * (abs(at[0]) + abs(at[1]))):
+        return PART, gap, between, True
+    if kind == NONE or gap > height + STRAIGHT * (abs(at[0]) + abs(at[1])):
         return NONE, gap, between, False
     return known
 

@@ -237,6 +237,21 @@ def test_one_side_is_solid():
     assert position(world, inside)[1] > 0.39
 
 
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("lean", [0.0, 0.012, -0.012])
+def test_a_box_that_overhangs_a_sharp_peak_stands_on_it(mode, lean):
+    """Its own face decides at the corner, also one that is almost parallel to the wall there."""
+    for x in (0.1, 0.25):
+        world = make_world(collision=mode)
+        create_chain(world, ((0, 0), (-1, -1), (0, -1))[::-1], loop=True)
+        box = ConvexPolygonCollider.box((0.4, 0.4))
+        body = world.create_entity(Transform((x, 0.6), lean), RigidBody(), box)
+        for _ in range(60):
+            world.step()
+        assert position(world, body)[1] == pytest.approx(0.4, abs=0.015)
+        world.close()
+
+
 def test_loops_are_solid_on_the_right():
     """Clockwise an island, counter-clockwise a cave, with corners of 90 degrees."""
     world = make_world()
