@@ -15,13 +15,14 @@ from ..terrain.segment import BEHIND as SEGMENT_BEHIND
 from ..terrain.segment import FOLDED, contact_of_segment, cross
 from .contact import box_on_map, cells_under, deepest_contact
 from .faces import ALL, FLOORS, ONE_WAYS, plugin
-from .outline import BEFORE, BEYOND, any_shaped, is_inside, next_run
-from .rectangles import grid_of
+from .outline import BEFORE, BEYOND, FULL, any_shaped, is_inside, next_run, shape_at
+from .rectangles import cell_at, grid_of
 from .shapes import core_of
-from .surface import first_code
+from .singly import deepest_tile
+from .surface import INSIDE, first_code
 from .sweep import LOOKS, ROUNDING, first_touch
 
-LOOKED = 0.25  # of a tile: how far around a shape faces are looked for
+LOOKED = 0.05  # of a tile: how far around a shape faces are looked for; farther off there are no seams to see
 BEHIND, ON = 0.1, 1e-6  # of a tile: how far the centre of a body in a tile, or of another, may be behind a face that
 # pushes it out
 REACH = 0.1  # of a tile: how far a face reaches into what follows an inner corner, if nothing is there
@@ -90,12 +91,12 @@ def reach_of_shape(b, at, more, tile, size, support, rounding):
 @part
 def outline_contact(a, b, d, cells, support, rounding):
     """The contact with the runs within a rectangle of cells: with the deepest face, or the nearest, that the shape is
-    over; what it is not over counts as LOOKED away, so that nothing is held by what is beside its way."""
+    over."""
     grid, tile = grid_of(a.packed), a.tile_size
     middle = (0.5 * grid[1] * tile, 0.5 * grid[2] * tile)
     touched, count = stack_array(TOUCHED, (0.0, 0.0, 0.0, 0.0, 0.0)), 0
-    depth, normal, point, first = -LOOKED * tile, (0.0, 1.0), d, -1  # of the best of the faces that it is over
     one_way, at = a.faces == ONE_WAYS, 0
+    depth, normal, point, first = -math.inf, (0.0, 1.0), d, -1  # of the best of the faces that it is over
     behind = (BEHIND if one_way or is_inside(grid, tile, add(d, middle)) else ON) * tile
     while True:
         at, there, run = next_run(grid, cells, one_way, at)
@@ -142,22 +143,41 @@ def both_ways(touched, count, first):
 
 
 @part
+def is_with_full(a, contact):
+    """Whether what a map with shapes is nearest with, if all its tiles count as full, is a full one; or nothing."""
+    _, depth, normal, point = contact
+    if depth == -math.inf:
+        return True
+    grid, tile = grid_of(a.packed), a.tile_size
+    x, y = add_scaled(point, normal, 0.5 * depth - INSIDE * tile)
+    shape = shape_at(grid, cell_at(x / tile + 0.5 * grid[1], grid[1]), cell_at(y / tile + 0.5 * grid[2], grid[2]))
+    return shape == FULL
+
+
+@part
 def shaped_contact(a, b, d, support, rounding):
     """The contact of a shape with a map that has tiles that are not full."""
     grid, tile = grid_of(a.packed), a.tile_size
-    size = (grid[1], grid[2])
+    size, one_way = (grid[1], grid[2]), a.faces == ONE_WAYS
+    if one_way and not is_shaped(a.packed):
+        return False, -math.inf, d, d
     place = add(d, (0.5 * size[0] * tile, 0.5 * size[1] * tile))
     cells = reach_of_shape(b, place, LOOKED * tile, tile, size, support, rounding)
-    if a.faces == ONE_WAYS:
-        if not is_shaped(a.packed):
-            return False, -math.inf, d, d
-        return outline_contact(a, b, d, cells, support, rounding)
-    if not any_shaped(grid, cells):
-        return deepest_contact(a, b, d, support, rounding)
-    hit, depth, normal, point = outline_contact(a, b, d, cells, support, rounding)
-    if not hit and is_inside(grid, tile, place):
-        return deepest_contact(a, b, d, support, rounding)
-    return hit, depth, normal, point
+    outlined, found, reach = one_way or any_shaped(grid, cells), (False, -math.inf, d, d), LOOKED * tile
+    if outlined:
+        found = outline_contact(a, b, d, cells, support, rounding)
+        if found[0]:
+            return found
+    if not outlined or (not one_way and is_inside(grid, tile, place)):
+        full = deepest_contact(a, b, d, support, rounding)
+        if outlined or full[0] or a.faces != ALL or is_with_full(a, full):
+            return full
+        reach -= full[1]
+    elif found[1] > -math.inf:
+        reach = -found[1]
+    single = deepest_tile(a, b, d, -math.inf if one_way else found[1], reach, support, rounding)
+    better = single[1] < 0.0 if one_way else single[1] > found[1]
+    return single if better else found
 
 
 @part
