@@ -166,9 +166,10 @@ class Spin(Component):
             add_push(self, torque, ("applied_torque", "step_torque"))
 
     def _in_world(self) -> Any:
-        if self._store is None:
+        if self._store is None or self._entity is None:
             raise CaromError(
-                "this Spin belongs to no body yet: a look at world.bodies, or a step, takes it into the world"
+                "this Spin belongs to no body: a new one does after a look at world.bodies, or a step; that of a "
+                "deleted entity does no more"
             )
         return self._store
 
@@ -185,8 +186,8 @@ class Spin(Component):
 
     def _checked(self, argument: Column, value: Any) -> Any:
         found = argument.checked(value, self._entity)
-        if self._store is not None:
-            d = self._store.dimensions
+        d = -self._version if self._store is None else self._store.dimensions  # below 2 no world knows it yet
+        if d > 1:
             argument.check_dimensions(found, d, self._entity)
             found = argument.whole(found, d) if argument.item_shape(d) else found
         return found

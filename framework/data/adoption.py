@@ -7,7 +7,7 @@ log.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import compress
 from typing import Any
@@ -80,6 +80,13 @@ class Changes:
         self.detached: list[Component] = []
         self.arrivals: list[tuple[Arrival, np.ndarray]] = []
 
+    def types(self) -> Iterator[type[Component]]:
+        """All that a body may have for the first time."""
+        for archetype, _ in self.archetypes:
+            yield from archetype.columns
+        for arrival, _ in self.arrivals:
+            yield from arrival.stores
+
 
 class Adoption:
     """Adopts the components of entities that form a body: those with ``anchor`` and any that ``makes_body``.
@@ -120,8 +127,7 @@ class Adoption:
     def register(self, components: Iterable[type[Component]]) -> None:
         """Columns of these types exist from now on, whether a body has them or not; ValueError for taken names."""
         components = tuple(components)
-        for component in components:
-            self.table.check_component_type(component)
+        self.table.check_component_types(components)
         for component in components:
             self.table.add_component_type(component)
 
@@ -259,9 +265,8 @@ class Adoption:
 
     def _check(self, changes: Changes) -> None:
         table, dimensions, fits, given = self.table, self.table.dimensions, -self.table.dimensions, changes.given
+        table.check_component_types(changes.types())
         for archetype, entity in changes.archetypes:
-            for component in archetype.columns:
-                table.check_component_type(component)
             self._check_together.check_types(archetype.columns, entity)
         if len(given) > 1 and len({id(handle) for _, _, handle in given}) < len(given):
             self._refuse_second_use(given)
@@ -277,8 +282,6 @@ class Adoption:
         if changes.several:
             self._check_together(changes.several)
         for arrival, ids in changes.arrivals:
-            for component in arrival.stores:
-                table.check_component_type(component)
             self._check_together.batch(arrival.stores, ids, ids - arrival.first)
 
     def _refuse_second_use(self, given: list[tuple[type[Component], int, Any]]) -> None:
@@ -308,13 +311,10 @@ class Adoption:
         table, log, fresh = self.table, self._log, changes.fresh
         lost, deleted, cleared = log.lost, log.deleted, log.cleared
         log.clear()
+        for component in changes.types():
+            self.know(component)
         for archetype, _ in changes.archetypes:
-            for component in archetype.columns:
-                self.know(component)
             archetype.known = True
-        for arrival, _ in changes.arrivals:
-            for component in arrival.stores:
-                self.know(component)
         if lost or changes.detached:
             self._let_go([*changes.detached, *(handle for handle in lost if cleared or not self._has(handle))])
         for component, losing in changes.missing.items():

@@ -86,18 +86,22 @@ class TableColumns:
         self.add_array(self.mask_name(component), dtype=bool, fill=False)
         self.component_types.append(component)
 
-    def check_component_type(self, component: type[Component]) -> None:
-        """ValueError if its columns would go by the name of others."""
-        if component in self.mask_names:
-            return
-        for other in self.component_types:
-            if self.mask_name(other) == self.mask_name(component):
-                raise ValueError(f"two component types are named {component.__name__}: {other!r} and {component!r}")
-        taken = self.column_keys() & {column.key for column in component.columns.values()}
-        name = component.prefix.rstrip(".")
-        if taken or self.has_column(name) or name in RESERVED:
-            clash = ", ".join(sorted(taken)) or name
-            raise ValueError(f"component {component.__name__}: bodies have {clash} already; give it another name")
+    def check_component_types(self, components: Iterable[type[Component]]) -> None:
+        """ValueError if columns of one would go by the name of others, in the table or among these."""
+        known, keys = [*self.component_types], set[str]()
+        for component in dict.fromkeys(components):
+            if component in self.mask_names:
+                continue
+            for other in known:
+                if self.mask_name(other) == self.mask_name(component):
+                    raise ValueError(f"two component types are named {component.__name__}: {other!r} and {component!r}")
+            keys = keys or self.column_keys()
+            own, name = {column.key for column in component.columns.values()}, component.prefix.rstrip(".")
+            if keys & own or self.has_column(name) or name in RESERVED:
+                clash = ", ".join(sorted(keys & own)) or name
+                raise ValueError(f"component {component.__name__}: bodies have {clash} already; give it another name")
+            known.append(component)
+            keys |= own
 
     @staticmethod
     def mask_name(component: type[Component]) -> str:

@@ -124,7 +124,7 @@ def _check(snapshot: Snapshot, world: Any, physics: PhysicsServices) -> None:
     if missing:
         raise CaromError(f"this snapshot needs plugins that world {world.name!r} does not have: {', '.join(missing)}")
     for component in (*snapshot.table.types, *snapshot.population.types):
-        physics.table.check_component_type(component)
+        physics.table.check_component_types((component,))
 
 
 def state_hash(physics: PhysicsServices) -> str:

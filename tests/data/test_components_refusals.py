@@ -11,6 +11,7 @@ from data.helpers_calls import calls_of
 from data.helpers_components import INF, NAN, Charge, Everything
 from worlds import ball, make_world
 
+from carom import Component, column
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 
 pytestmark = pytest.mark.plain
@@ -270,3 +271,35 @@ def test_a_value_of_other_dimensions_is_refused_where_it_is_set(stepped):
             transform.rotation = (1, 0, 0, 0)
         world.step()
         assert transform.position.tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize("bulk", [False, True])
+def test_two_classes_of_one_name_are_refused_with_a_step_between_and_without(bulk):
+    """Their columns would be one: each body would read what the other has."""
+    one, other = (type("Health", (Component,), {"points": column(1.0), "__module__": of}) for of in ("player", "foe"))
+    for step_between in (False, True):
+        world = make_world(2)
+        for kind in (one, other):
+            if bulk:
+                world.create_entities(2, Transform.many([(0, 0), (3, 0)]), RigidBody.many(), kind.many(points=[2, 3]))
+            else:
+                world.create_entity(Transform((0, 0)), RigidBody(), kind(2.0))
+            if step_between and kind is one:
+                world.step()
+        with pytest.raises(ValueError, match=r"two component types are named Health: .*player.*foe"):
+            world.step()
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_new_body_knows_its_dimensions_after_a_field_is_set(d):
+    """Spawn, set a field, kick, before the first step: vectors are whole, and what is set in place holds."""
+    world = make_world(d)
+    transform, body = Transform(np.ones(d)), RigidBody()
+    world.create_entity(transform, body)
+    body.mass = 3.0
+    body.linear_velocity += 2.0
+    body.linear_velocity[0] = 5.0
+    transform.position = np.zeros(d)
+    assert np.shape(transform.rotation) == (() if d == 2 else (4,))
+    world.step()
+    assert body.linear_velocity.tolist() == [5.0, *[2.0] * (d - 1)]

@@ -359,7 +359,7 @@ def test_wrong_values_of_spin_are_refused_where_they_are_given():
         for value in values:
             with pytest.raises(ValueError, match=rf"Spin\.{name}"):
                 Spin(**{name: value})
-    with pytest.raises(CaromError, match="belongs to no body yet"):
+    with pytest.raises(CaromError, match="belongs to no body"):
         Spin(1.0).velocity_at((0, 0))
     with space(on_fault="ignore") as world:
         entity = world.create_entity(Transform((0, 0)), RigidBody(), Spin(1), SphereCollider(1))
@@ -416,3 +416,18 @@ def test_an_impulse_does_not_turn_a_rod_about_its_own_axis():
         spin = part(world, entity, Spin)
         spin.apply_impulse((0, 2, 1), at=(1, 1, 0))  # twist (1, -1, 2), inertia (0, 1, 1)
         assert spin.angular_velocity == pytest.approx((0, -1, 2))
+
+
+def test_the_spin_of_a_deleted_body_says_so():
+    world = space()
+    entity = world.create_entity(Transform((0, 0)), RigidBody(), SphereCollider(0.5), Spin())
+    world.step()
+    spin = world.component_for_entity(entity, Spin)
+    world.delete_entity(entity)
+    world.step()
+    for use in (
+        lambda: spin.apply_torque(1.0), lambda: spin.apply_force((1, 0), at=(0, 0)), lambda: spin.moments,
+        lambda: spin.apply_impulse((1, 0), at=(0, 0)), lambda: spin.velocity_at((0, 0)),
+    ):  # fmt: skip
+        with pytest.raises(CaromError, match="that of a deleted entity does no more"):
+            use()
