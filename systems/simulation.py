@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
@@ -221,7 +222,9 @@ class Simulation:
         if self._structure() != scene.structure and self.plugin_stages.follow(self.program):
             self.links.forget()
             self.parts_version += 1
-        if scene.refresh():
+        with self._named_errors():
+            changed = scene.refresh()
+        if changed:
             table.frames_applied = True
             if not state.collides:
                 state.warm_start.counts[:] = 0
@@ -272,8 +275,14 @@ class Simulation:
 
     def link(self) -> None:
         """Compile or load what the step needs."""
-        try:
+        with self._named_errors():
             self.parts_version += self.links.link(self.forces.kind())
+
+    @contextmanager
+    def _named_errors(self) -> Iterator[None]:
+        """Errors of what cannot be compiled say of which plugin that is."""
+        try:
+            yield
         except Exception as error:
             self.attribute_errors.describe(error)
             raise

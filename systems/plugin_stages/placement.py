@@ -119,7 +119,7 @@ def _fault_of_columns(stage: PluginStage) -> str:
 def _names_in(function: Any, seen: set[Any]) -> set[str]:
     """The attributes that a function names, and the functions that it calls, but for carom's own."""
     function = getattr(function, "py_func", function)
-    if function in seen or not isinstance(function, types.FunctionType) or function.__module__.startswith("carom."):
+    if not isinstance(function, types.FunctionType) or function in seen or function.__module__.startswith("carom."):
         return set()
     seen.add(function)
     found = set(function.__code__.co_names)

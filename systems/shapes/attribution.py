@@ -92,7 +92,7 @@ class ErrorAttribution:
         found = [what for what, function in functions.items() if function is not None and _mentions(text, function)]
         names = " or ".join(found)
         cure = "use numbers, tuples, math and carom.framework.vectors"
-        if "Untyped global name" in text:
+        if "Untyped global name" in text and "<class 'function'>" in text:
             cure = "functions that it calls need @plugin.kernel"
         return f"{names} cannot be compiled; {cure}" if names else ""
 

@@ -327,15 +327,32 @@ def test_names_are_taken_once():
         World(Physics(dimensions=2), *plugins)
 
 
+HEAVY = {0: 1.0}
+
+
+def scribble(state, dt):
+    state.bodies.mass[0] = "heavy"
+
+
+def scribble_long(state, dt):
+    state.bodies.force[0] = (0.0, 1.0, 0.0)
+
+
+def scribble_by_dictionary(state, dt):
+    state.bodies.mass[0] = HEAVY[0]
+
+
 @pytest.mark.compiled
-def test_what_cannot_be_compiled_is_named_before_a_step_begins():
+@pytest.mark.parametrize(
+    ("stage", "why"),
+    [(scribble, "float64"), (scribble_long, "takes 2 numbers here, got 3"), (scribble_by_dictionary, "name 'HEAVY'")],
+)
+def test_what_cannot_be_compiled_is_named_before_a_step_begins(stage, why):
     plugin = Plugin("wrong")
-
-    @plugin.stage(after="put_back", writes=("mass",))
-    def scribble(state, dt):
-        state.bodies.mass[0] = "heavy"
-
-    with thrown(plugin) as world, pytest.raises(StepError, match="plugin wrong: stage scribble cannot be compiled"):
+    plugin.stage(after="put_back", writes=("mass", "force"))(stage)
+    cure = "use numbers, tuples, math"
+    message = rf"(?s)plugin wrong: stage {stage.__name__} cannot be compiled; {cure}.*{why}"
+    with thrown(plugin) as world, pytest.raises(StepError, match=message):
         world.step()
 
 

@@ -19,6 +19,7 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.datamodel import models
+from numba.core.errors import TypingError
 from numba.core.extending import lower_builtin, lower_cast, register_model
 from numba.core.imputils import lower_getattr_generic, lower_setattr_generic
 from numba.core.typeconv.castgraph import Conversion
@@ -250,9 +251,12 @@ class _ItemOf(AbstractTemplate):
 class _StoreItem(AbstractTemplate):
     def generic(self, arguments: Any, keywords: Any) -> Any:
         if len(arguments) == 3 and isinstance(arguments[0], ColumnType):
-            found = _index_type(*arguments[:2])
+            found, (column, _, given) = _index_type(*arguments[:2]), arguments
             if found is not None:
-                return signature(types.none, arguments[0], found[0], found[1])
+                sizes = [len(kind) for kind in (found[1], given) if isinstance(kind, types.BaseTuple)]  # pyright: ignore[reportArgumentType]
+                if sizes[1:] not in ([], sizes[:1]):
+                    raise TypingError(f"{column.label or 'this column'} takes {sizes[0]} numbers here, got {sizes[1]}")
+                return signature(types.none, column, found[0], found[1])
         return None
 
 
