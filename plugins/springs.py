@@ -16,6 +16,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
+from ..components import Transform
 from ..framework import Bodies, CaromError, ForceSystem, Phase, Plugin, System, World
 from ..framework.vectors import length
 
@@ -132,15 +133,7 @@ class Springs(Plugin):
 
         ValueError if an entity is not a body, if both are the same, or if a number is out of range.
         """
-        bodies, places = self._bodies(), []
-        for name, entity in (("a", a), ("b", b)):
-            try:
-                places.append(bodies.position[bodies.row_of(entity)])
-            except (KeyError, TypeError):
-                raise ValueError(
-                    f"springs.connect: {name} must be the entity of a body (Transform and RigidBody or a collider) in "
-                    f"world {self.world.name!r}, got {entity!r}"  # type: ignore[union-attr]
-                ) from None
+        places = [self._place(name, entity) for name, entity in (("a", a), ("b", b))]
         if a == b:
             raise ValueError(f"springs.connect: a spring needs two bodies, got entity {a} twice")
         rest = length(tuple((places[1] - places[0]).tolist())) if rest_length is None else rest_length
@@ -199,6 +192,21 @@ class Springs(Plugin):
         if self.world is None:
             raise CaromError("these springs are in no world yet: World(Physics(...), springs)")
         return self.world.bodies
+
+    def _place(self, name: str, entity: int) -> np.ndarray:
+        """(d,) m: where a body is, also one that the world has taken in since the last step."""
+        self._bodies()
+        world: Any = self.world
+        try:
+            own = {type(component): component for component in world.components_for_entity(entity)}
+        except (KeyError, TypeError):
+            own = {}
+        if Transform not in own or not any(getattr(kind, "makes_body", False) for kind in own):
+            raise ValueError(
+                f"springs.connect: {name} must be the entity of a body (Transform and RigidBody or a collider) in "
+                f"world {world.name!r}, got {entity!r}"
+            )
+        return np.array(own[Transform].position)
 
     def _add(self, spring: Spring) -> Spring:
         self._by_number[spring._number], self._springs[spring], self._columns = spring, None, None

@@ -86,12 +86,22 @@ class Parts(Plugin):
             total += mass
         return moment / total
 
-    def balance(self, body: int) -> None:
-        """Move the position of a body to its centre of mass; its colliders and its parts stay where they are."""
+    def balance(self, body: int, *, moving: bool = False) -> None:
+        """Move the position of a body to its centre of mass; its colliders and its parts stay where they are.
+
+        moving
+            whether it moves already, and all its points keep their velocity: that of the position changes if it spins;
+            else the velocity that it was given is that of its centre
+        """
         centre, entities = self.centre(body), self._contents.entities
         own, d = entities[body], self._physics.dimensions
         transform = own[Transform]
-        transform.position = transform.position + Pose.of(0.0, transform.rotation, d).point(centre)
+        way = Pose.of(0.0, transform.rotation, d).point(centre)
+        transform.position = transform.position + way
+        if moving and Spin in own and RigidBody in own:
+            w = own[Spin].angular_velocity
+            turned = np.cross(w, way) if np.ndim(w) else w * np.array((-way[1], way[0]))
+            own[RigidBody].linear_velocity = own[RigidBody].linear_velocity + turned
         for component, handle in own.items():
             if issubclass(component, Collider):
                 handle.offset = handle.offset - centre

@@ -302,3 +302,33 @@ def test_pieces_of_one_group_fall_through_each_other_and_onto_all_else(mode):
     assert max(heights) < 1.3  # stacked one on the other they are 2.4 m high
 
 
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_what_breaks_off_a_spinning_body_takes_its_momentum_along(d):
+    """A dumbbell that spins freely loses one ball: each goes on with the velocity that its middle had, w x r, and the
+    momentum of both is that of before, to rounding."""
+    random = np.random.default_rng(d)
+    for _ in range(5):
+        world, parts = parts_world(dimensions=d)
+        spin = random.normal(0, 4) if d == 2 else random.normal(0, 4) * np.array((0.0, 0.0, 1.0))
+        velocity, masses = random.normal(0, 3, d), random.uniform(0.5, 4.0, 2)
+        body = world.create_entity(
+            Transform(random.normal(0, 1, d)), RigidBody(masses[0], velocity), Spin(spin), SphereCollider(0.3)
+        )
+        ball = world.create_entity(PartOf(body, np.eye(d)[0] * 2.0, mass=masses[1]), SphereCollider(0.3))
+        parts.balance(body)
+        for _ in range(7):
+            world.step()
+        turning, place = world.component_for_entity(body, Spin), world.component_for_entity(body, Transform)
+        angle = place.rotation if d == 2 else 2.0 * math.atan2(place.rotation[3], place.rotation[0])
+        way = 2.0 * masses[1] / masses.sum()  # from the ball that stays to the centre of both
+        middle = place.position - way * np.array((math.cos(angle), math.sin(angle), 0.0)[:d])
+        wanted = turning.velocity_at(middle).copy()
+        world.remove_component(ball, PartOf)
+        parts.balance(body, moving=True)
+        world.step()
+        moving = [body_of(world, each) for each in (body, ball)]
+        np.testing.assert_allclose(moving[0].linear_velocity, wanted, rtol=0, atol=1e-12)
+        momentum = sum(each.mass * each.linear_velocity for each in moving)
+        np.testing.assert_allclose(momentum, masses.sum() * velocity, rtol=0, atol=1e-12)

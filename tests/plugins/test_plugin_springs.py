@@ -273,6 +273,27 @@ def test_bad_bodies_are_refused():
             springs.connect(a, wrong, stiffness=1.0)
 
 
+def test_a_body_is_connected_in_the_step_in_which_it_is_made():
+    """As joints are: a hook that a handler makes where something lands. It acts from the next step on."""
+    world, springs = make(gravity=(0, -10))
+    world.create_entity(Transform((0, -1)), SphereCollider(1.0))
+    ball, made = world.create_entity(Transform((0, 0.3)), RigidBody(), SphereCollider(0.2)), []
+
+    def hook(contact):
+        made.append(world.create_entity(Transform((0, 2)), RigidBody(), SphereCollider(0.2)))
+        springs.connect(ball, made[0], stiffness=50.0)
+
+    world.on("contact_begin", hook)
+    while not made:
+        world.step()
+    (spring,) = springs
+    assert spring.rest_length == pytest.approx(2.0 - x(world, ball)[1])
+    world.step()
+    assert spring.connected
+    with pytest.raises(ValueError, match="b must be the entity of a body"):
+        springs.connect(ball, world.create_entity(Transform((0, 0))), stiffness=1.0)
+
+
 def test_springs_belong_to_one_world():
     with pytest.raises(CaromError, match="in no world yet"):
         Springs().connect(1, 2, stiffness=1.0)
