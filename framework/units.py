@@ -8,7 +8,8 @@ from collections.abc import Iterable
 from .errors import warn
 
 DEGREES = 30.0  # whole numbers from here on are seldom meant as radians: five turns and more
-RATES = 24, 480  # steps per second that somebody may give for the seconds of a step
+LONG = 16.0, 480.0  # s: between these, a whole number may be meant per second, and 1,000 over one as milliseconds
+WHOLE = 1e-3
 _told: set[str] = set()
 
 
@@ -22,9 +23,11 @@ def warn_of_degrees(name: str, angles: Iterable[float | None]) -> None:
 
 
 def warn_of_rate(name: str, seconds: float) -> None:
-    """A PhysicsWarning if the seconds of a step look like steps per second."""
-    if RATES[0] <= seconds <= RATES[1] and seconds == round(seconds):
-        _warn(name, f"{name} = {seconds:g} is in seconds: {seconds:g} steps a second are 1 / {seconds:g}")
+    """A PhysicsWarning if the seconds of a step look like steps per second, or like milliseconds."""
+    whole = seconds == round(seconds) or abs(1000.0 / seconds - round(1000.0 / seconds)) < WHOLE
+    if LONG[0] <= seconds <= LONG[1] and whole:
+        cures = f"{seconds:.6g} steps a second are 1 / {seconds:.6g}, {seconds:.6g} ms are {seconds / 1000:.6g}"
+        _warn(name, f"{name} = {seconds:g} is in seconds: {cures}")
 
 
 def _warn(name: str, text: str) -> None:

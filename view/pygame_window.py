@@ -59,7 +59,7 @@ class View(Window):
         what snapshots for going back in time may take; 0: none are taken
     below, above
         functions that are called with the view, to paint on ``view.screen`` what is behind the world, and what is
-        before it; with ``below`` the ground is theirs
+        before it, on an empty ground
     prepare
         whether to compile before the first frame what the world may need, while the window hears keys
     real_time
@@ -229,6 +229,7 @@ class View(Window):
     def _paint(self, shown: DrawingList) -> None:
         screen, texts = self.screen, self._texts
         if self.below is not None:
+            screen.fill(BACKGROUND)
             self.below(self)
         self._painter.show_sleepers(self.show["sleepers"])
         if self.show["outlines"]:

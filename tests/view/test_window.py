@@ -21,6 +21,7 @@ from carom import (
 )
 from carom.plugins.parts import PartOf, Parts
 from carom.view import Sprites, View
+from carom.view.colours import BACKGROUND
 
 
 @pytest.fixture
@@ -300,6 +301,9 @@ def test_sprites_and_painting_of_ones_own(player):
     assert tuple(pixels[500, 100]) == (0, 0, 200)
     x, y = view.camera.to_screen((3.0, 0.5)).astype(int)
     assert tuple(pixels[x, y]) == (255, 0, 0)
+    view.below = lambda view: None  # what was there is gone, also where nothing is painted
+    player.frame(2)
+    assert tuple(brightness(view)[500, 100]) == BACKGROUND
 
 
 def test_stacks_of_one_colour_have_edges(player):

@@ -83,7 +83,8 @@ REFUSED = [  # dimensions, what is done with a world, a body of it and its Spin,
      r"SphereCollider.mask must be one scalar: bits of layers, as in 1 << 1 \| 1 << 2, got \[1, 2\]"),
 ]  # fmt: skip
 UNITS = [  # what is made, and the cure
-    (lambda: Settings(dt=60), r"Settings.dt = 60 is in seconds: 60 steps a second are 1 / 60"),
+    (lambda: Settings(dt=60), r"Settings.dt = 60 is in seconds: 60 steps a second are 1 / 60, 60 ms are 0.06"),
+    (lambda: Settings(dt=1000 / 60), r"Settings.dt = 16.6667 is in seconds: .*, 16.6667 ms are 0.0166667"),
     (lambda: Transform((0, 0), rotation=45), r"Transform.rotation = 45 is in radians, 7.2 turns: .*math.radians\(45\)"),
     (lambda: Transform.many(np.zeros((2, 2)), 90.0).arrays(2, 2), r"Transform.rotation = 90 is in radians"),
     (lambda: PartOf(1, (0, 0), rotation=-90.0), r"PartOf.rotation = -90 is in radians"),
