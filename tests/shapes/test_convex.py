@@ -344,3 +344,17 @@ def test_ellipsoids_at_one_place_leave_each_other_on_the_shortest_way(seed):
     offsets = random.normal(size=(count, 3)) * 10 ** random.uniform(-6, -1, (count, 1))
     a, b = (shapes(np.zeros((count, 1, 3)), semi_axes=each) for each in axes)
     assert (meet(a, b, offsets).depth - least_depth(axes, offsets)).max() <= 2e-6
+
+
+@both_dimensions
+def test_a_smooth_ball_around_a_box_leaves_it_along_an_axis(d):
+    """Half an edge and the radius, less how far its middle is off along that axis: the depth has a kink there, and such
+    a minimum for each face."""
+    random, count = np.random.default_rng(d), 1000
+    half, radius = np.exp(random.uniform(np.log(0.01), 0.0, (2, count)))
+    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=d)))
+    offsets = random.normal(size=(count, d)) * half[:, None] * 10 ** random.uniform(-9, -1, (count, 1))
+    box = shapes(half[:, None, None] * corners)
+    ball = shapes(np.zeros((count, 1, d)), semi_axes=np.tile(radius[:, None], d))
+    wanted, scale_of = half + radius - np.abs(offsets).max(axis=1), half + radius
+    assert (np.abs(meet(box, ball, offsets).depth - wanted) / scale_of).max() <= 1e-8

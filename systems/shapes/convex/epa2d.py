@@ -9,7 +9,7 @@ from ....framework.jit.stack_arrays import stack_array
 from ....framework.vectors import dot, negative, row, store
 from .gjk import GJK_ROUNDING, corner, edge, norm, refine_direction, support_points
 
-POLYGON_CORNERS = 64
+POLYGON_CORNERS = 128
 
 
 @inlined

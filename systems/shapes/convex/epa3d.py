@@ -10,12 +10,14 @@ import math
 
 from ....framework.compilation import inlined, part
 from ....framework.jit.stack_arrays import stack_array
-from ....framework.vectors import add_scaled, divided, dot, negative, row, scale, store
-from .gjk import GJK_ROUNDING, corner, cross, edge, face_normal, norm, refine_direction, support_points
+from ....framework.vectors import add_scaled, divided, dot, negative, row, scale, store, sub
+from .gjk import GJK_ROUNDING, corner, corner_of, cross, edge, face_normal, norm, refine_direction, support_points
 
 POLYTOPE_CORNERS = 64
 POLYTOPE_FACES = 128  # a closed surface of triangles has twice as many faces as corners, less 4
 POLYTOPE_EDGES = 192
+WIDEST, NARROWER, NARROWEST = 0.1, -0.5, 1e-8  # rad; the other way round each time
+THIRDS = ((1.0, 0.0), (-0.5, 0.8660254037844386), (-0.5, -0.8660254037844386))  # of a circle
 SAME_WAY = 0.9  # cosine: from faces that look the same way a search ends in the same minimum
 
 
@@ -98,6 +100,35 @@ def witness_point(of_a, of_b, faces, heights, count, outward, depth, d):
     return witness
 
 
+@part
+def refine_kink(pair, d, best, depth, size):
+    """(outward, depth) at a minimum where the depth has a kink, as at a flat face of a round whole: the normal of the
+    face through the farthest points in three directions around the best one, nearer each time."""
+    spread = WIDEST
+    while abs(spread) > NARROWEST:
+        point_a, point_b = support_points(pair, negative(best))
+        found = corner_of(point_a, point_b, d)
+        slope = add_scaled(found, best, -dot(found, best))
+        if not norm(slope) > NARROWEST * size:
+            break
+        one = divided(slope, norm(slope))
+        other, corners = cross(best, one), (found, found, found)
+        for k in range(3):
+            way = add_scaled(scale(one, THIRDS[k][0]), other, THIRDS[k][1])
+            point_a, point_b = support_points(pair, negative(add_scaled(best, way, spread)))
+            corners = (corners[1], corners[2], corner_of(point_a, point_b, d))
+        normal = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]))
+        height = norm(normal)
+        if height > 0.0:
+            normal = divided(normal, height if dot(normal, best) > 0.0 else -height)
+            point_a, point_b = support_points(pair, negative(normal))
+            reach = dot(normal, corner_of(point_a, point_b, d))
+            if reach < depth:
+                best, depth = normal, reach
+        spread *= NARROWER
+    return best, depth
+
+
 @inlined
 def refine_smooth(pair, d, surface, count, best, depth, size):
     """(normal, depth) at the least of the minima of smooth shapes near the best direction so far and near the lowest
@@ -106,6 +137,7 @@ def refine_smooth(pair, d, surface, count, best, depth, size):
     start, lowest = best, 0.0
     while lowest < depth:
         found, least = refine_direction(pair, d, start, math.inf, size)
+        found, least = refine_kink(pair, d, found, least, size)
         if least < depth:
             best, depth = found, least
         lowest, other = math.inf, 0
