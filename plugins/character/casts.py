@@ -60,22 +60,21 @@ def comes_near(state, j, path, reach):
 
 @part
 def meet_character(walker, j, at, way):
-    """(touches, distance, out) of another character: each may come half the way to where the other stood at the start,
-    up to a plane between them, so that their order does not matter."""
+    """(touches, distance, out, point) of another character: each may come half the way to where the other stood at the
+    start, up to a plane between them, so that their order does not matter."""
     state = walker.state
-    depth, out, _ = overlap(state, walker.row, j, walker.start)
+    depth, out, point = overlap(state, walker.row, j, walker.start)
     along = 0.0 - dot(out, way)
     if along <= EXACT:
-        return False, 0.0, out
-    return True, (0.5 * (walker.skin - depth) + dot(sub(at, walker.start), out)) / along, out
+        return False, 0.0, out, point
+    return True, (0.5 * (walker.skin - depth) + dot(sub(at, walker.start), out)) / along, out, point
 
 
 @part
 def meet(walker, j, path, reach):
-    """(touches, distance, out, point) of row j on a path; of another character without a point."""
+    """(touches, distance, out, point) of row j on a path."""
     if walker.character.present[j]:
-        touches, distance, out = meet_character(walker, j, path.start, path.direction)
-        return touches, distance, out, path.start
+        return meet_character(walker, j, path.start, path.direction)
     if not comes_near(walker.state, j, path, reach):
         return False, 0.0, path.direction, path.start
     return cast(walker.state, walker.near, walker.row, j, path, reach, reach)
@@ -148,8 +147,9 @@ def ground_kind(walker, out, at, point):
 
 @part
 def floor_below(walker, at, reach):
-    """(row, gap, out, height) of the floor that it can walk on within reach, and how far it may go down; row -1: none.
-    height: of the touch along up, nan where something else keeps it from getting there.
+    """(row, gap, out, height, foot) of the floor that it can walk on within reach, and how far it may go down; row -1:
+    none. height: of the touch along up, nan where something else keeps it from getting there; foot: where that floor is
+    under its middle.
 
     What is too steep in between only limits the way: it stands on a floor although a steep wall is nearer.
     """
@@ -158,7 +158,7 @@ def floor_below(walker, at, reach):
     far = reach + REACH * skin
     down = negative(up)
     path = Path(at, down, inverse_of(down), walker.half_extents)
-    best, gap, normal, blocked, rim, height, rim_height = -1, far, up, far, far, math.nan, math.nan
+    best, gap, normal, blocked, rim, height, rim_height, foot = -1, far, up, far, far, math.nan, math.nan, at
     for k in range(walker.found):
         j = near.row[k]
         if is_sensor(state, j):
@@ -176,6 +176,7 @@ def floor_below(walker, at, reach):
             if here < gap:
                 best, gap, normal = j, here, out if kind == SLOPE else up
                 height = dot(add(at, point), up) - distance
+                foot = add_scaled(at, up, dot(point, normal) / dot(up, normal) - distance)
         elif kind == RIM:
             if here < rim:
                 rim, rim_height = here, dot(add(at, point), up) - distance
@@ -187,7 +188,7 @@ def floor_below(walker, at, reach):
         gap, height = max(rim, 0.0), rim_height
     if blocked < gap:
         gap, height = max(blocked, 0.0), math.nan
-    return best, gap, normal, height
+    return best, gap, normal, height, foot
 
 
 @part

@@ -166,7 +166,8 @@ class Character(Component):
     on_ceiling: bool = known(default=False, dtype=bool)
     crushed: int = known(-1, dtype=int)
     # Its memory: seconds since, whether the key was held, where it was left, what others have given it, with what force
-    # it pushes what, and what the floor was like when it was last seen.
+    # it pushes what, and the floor as it was last seen: its middle, from there to the point of it that is under the
+    # character's middle, and its axes.
     since_floor: float = known(NEVER, unit="s")
     since_press: float = known(NEVER, unit="s")
     since_wall: float = known(NEVER, unit="s")
@@ -181,6 +182,7 @@ class Character(Component):
     push_row: int = known(-1, dtype=int)
     floor_row: int = known(-1, dtype=int)
     floor_place: VectorField = known(item="vector", unit="m")
+    floor_arm: VectorField = known(item="vector", unit="m")
     floor_x: VectorField = known(item="vector", unit="1")
     floor_y: VectorField = known(item="vector", unit="1")
 

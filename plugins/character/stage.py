@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
-from ...framework.vectors import add, add_scaled, dot, item, scale, sub
+from ...framework.vectors import add, add_scaled, dot, item, scale
 from .casts import is_dynamic
 from .records import MOST_HITS, ROWS
 from .slides import cross
@@ -67,15 +67,10 @@ def press_bodies(state, dt, character):
 
 def tilt_bodies(state, dt, character, spin):
     """Bodies turn under the weight of characters"""
-    bodies = state.bodies
     for i in range(state.dynamic, state.moving):
         j = row_of_floor(state, character, i) if character.present[i] and character.weight[i] > 0.0 else -1
         if j >= 0 and is_dynamic(state, j) and spin.present[j]:
-            up, foot = up_of(state, character, i), 0.0
-            for k in range(len(up)):
-                foot += abs(item(up, k)) * item(bodies.half_extents[i], k)
-            at = add_scaled(add(bodies.position[i], bodies.offset[i]), up, 0.0 - foot)
-            arm, force = sub(at, bodies.position[j]), scale(up, 0.0 - character.weight[i])
+            arm, force = character.floor_arm[i], scale(up_of(state, character, i), 0.0 - character.weight[i])
             if len(arm) == 2:
                 spin.step_torque[j, 0] += item(arm, 0) * item(force, 1) - item(arm, 1) * item(force, 0)
             else:

@@ -20,6 +20,7 @@ from .records import (
     AIR,
     CLIMB,
     CRUSHED,
+    EXACT,
     FLOOR,
     HIT,
     LANDED,
@@ -125,31 +126,27 @@ def row_of_floor(state, character, i):
 
 @part
 def ride_of(state, character, i, at, floor, up, dt):
-    """How far what it stands on has carried it in this step."""
-    then, now = character.floor_place[i], state.bodies.position[floor]
-    ride = scale(at, 0.0)
-    x, y = axis_of(state, floor, 0), axis_of(state, floor, 1)
-    moved, turns = differs(then, now), differs(x, character.floor_x[i]) or differs(y, character.floor_y[i])
-    if moved or turns:
-        way = sub(now, then)
-        if length(way) <= FARTHEST_CARRIED:
-            ride = way
-            if turns:
-                arm = sub(at, then)
-                ride = add(ride, sub(turned(arm, character.floor_x[i], character.floor_y[i], x, y), arm))
-    foot, half, out = at, state.bodies.half_extents[i], character.floor_normal[i]
-    for k in range(len(up)):
-        foot = add_scaled(foot, up, 0.0 - abs(item(up, k)) * item(half, k))
-    run = surface_velocity_of(state, floor, add_scaled(foot, out, 0.0 - SOLE * least(half)), out)
-    return add_scaled(ride, across(run, out), dt)
+    """How far what it stands on has carried it in this step: as the point of the floor under its middle, or, if up has
+    turned since, as on a planet, as its middle itself."""
+    then, now, foot = character.floor_place[i], state.bodies.position[floor], character.floor_arm[i]
+    x, y, out = axis_of(state, floor, 0), axis_of(state, floor, 1), character.floor_normal[i]
+    ride, middle = sub(now, then), sub(at, then)
+    if differs(x, character.floor_x[i]) or differs(y, character.floor_y[i]):
+        arm = middle if length(across(sub(middle, foot), up)) > EXACT else foot
+        ride = add(ride, sub(turned(arm, character.floor_x[i], character.floor_y[i], x, y), arm))
+    if length(ride) > FARTHEST_CARRIED:
+        ride = scale(ride, 0.0)
+    sole = add_scaled(add(now, foot), out, 0.0 - SOLE * least(state.bodies.half_extents[i]))
+    return add_scaled(ride, across(surface_velocity_of(state, floor, sole, out), out), dt)
 
 
 @inlined
-def stands_on(state, character, i, floor, out):
+def stands_on(state, character, i, floor, out, foot):
     """It knows where it stands."""
     character.floor_entity[i], character.floor_row[i] = state.bodies.entity[floor], floor
     character.floor_place[i], character.floor_normal[i] = state.bodies.position[floor], out
     character.floor_x[i], character.floor_y[i] = axis_of(state, floor, 0), axis_of(state, floor, 1)
+    character.floor_arm[i] = sub(foot, state.bodies.position[floor])
 
 
 @inlined
@@ -400,7 +397,7 @@ def move_one(state, near, character, ladder, work, i, dt):
     # what it knows then
     if end.state == FLOOR:
         character.since_floor[i], character.jumping[i] = 0.0, False
-        stands_on(state, character, i, end.ground, end.out)
+        stands_on(state, character, i, end.ground, end.out, end.foot)
         if before != FLOOR and before != CLIMB:
             tell(work, LANDED, bodies.entity[i], bodies.entity[end.ground], end.out, max(0.0, 0.0 - end.fell))
     else:

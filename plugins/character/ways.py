@@ -14,8 +14,9 @@ from .slides import along_floor, slide
 SLOWER = 1e-6  # of its speed: less is rounding
 
 # What became of it. at: place; level: own velocity across up, rising: along it; tried: with which velocity it moved;
-# ground: row of what it stands on, out: its normal; fell: velocity along up before it landed.
-Outcome = collections.namedtuple("Outcome", "at level rising state ground out tried fell")
+# ground: row of what it stands on, out: its normal, foot: where it is under its middle; fell: velocity along up before
+# it landed.
+Outcome = collections.namedtuple("Outcome", "at level rising state ground out foot tried fell")
 
 
 @part
@@ -38,7 +39,7 @@ def climb(walker, at, level, dt):
     rising = character.climb[walker.row]
     velocity = add_scaled(level, walker.up, rising)
     to = slide(walker, at, scale(velocity, dt), False, False, -1)
-    return Outcome(to, level, rising, CLIMB, -1, walker.up, velocity, 0.0)
+    return Outcome(to, level, rising, CLIMB, -1, walker.up, to, velocity, 0.0)
 
 
 @part
@@ -52,7 +53,7 @@ def step_over(walker, at, wish, done, height):
     over = slide(walker, top, scale(ahead, size), False, False, -1)
     if dot(sub(over, top), ahead) <= dot(done, ahead) + EXACT:
         return False, at
-    j, gap, _, floor_height = floor_below(walker, over, raised + walker.character.snap[walker.row])
+    j, gap, _, floor_height, _ = floor_below(walker, over, raised + walker.character.snap[walker.row])
     foot = dot(at, up) - walker.skin
     for k in range(len(up)):
         foot -= abs(item(up, k)) * item(walker.half_extents, k)
@@ -79,13 +80,13 @@ def walk(walker, at, level, kept, lift, dt):
     if not taken and work.hits > first and length(gone) < (1.0 - SLOWER) * length(way):
         ahead = across(gone, up)  # as fast as it got along the floor
         level = scale(ahead, length(gone) / (dt * max(length(ahead), EXACT)))
-    j, gap, out, _ = floor_below(walker, to, character.snap[walker.row])
+    j, gap, out, _, foot = floor_below(walker, to, character.snap[walker.row])
     if j >= 0:
         to = lowered(walker, to, gap)
-        return Outcome(to, level, 0.0, FLOOR, j, out, tried, 0.0)
+        return Outcome(to, level, 0.0, FLOOR, j, out, foot, tried, 0.0)
     velocity = along_floor(level, normal, up)
     rising = dot(velocity, up) + max(lift, 0.0 - character.max_fall[walker.row])
-    return Outcome(to, add(across(velocity, up), kept), rising, AIR, -1, up, tried, 0.0)
+    return Outcome(to, add(across(velocity, up), kept), rising, AIR, -1, up, to, tried, 0.0)
 
 
 @part
@@ -107,17 +108,17 @@ def fall(walker, at, level, rising, jumped, ignored, dt):
         if rise < walker.limit or rising <= 0.0:
             velocity = add_scaled(velocity, hit, 0.0 - min(0.0, dot(velocity, hit)))
     level, rising = across(velocity, up), dot(velocity, up)
-    now, ground, normal = AIR, -1, up
+    now, ground, normal, foot = AIR, -1, up, to
     if not jumped and (rising <= EXACT or work.hits > first):
-        j, gap, out, _ = floor_below(walker, to, 2.0 * walker.skin)
+        j, gap, out, _, below = floor_below(walker, to, 2.0 * walker.skin)
         stayed = length(sub(to, at)) < 1e-3 * length(way) + 1e-6
         if j >= 0 and dot(velocity, out) <= walker.gravity * dt + EXACT:  # no more than falls back in a step
             to = lowered(walker, to, gap)
-            now, ground, normal = FLOOR, j, out
+            now, ground, normal, foot = FLOOR, j, out, below
         elif rising > EXACT:
             now = AIR
         elif stayed and work.hits > first + 1:  # wedged, as between two slopes that are both too steep
             now, ground, normal = FLOOR, work.hit_row[work.hits - 1], scale(up, 0.0)
         elif steep:
             now = STEEP
-    return Outcome(to, level, rising, now, ground, normal, tried, fell)
+    return Outcome(to, level, rising, now, ground, normal, foot, tried, fell)

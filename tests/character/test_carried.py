@@ -9,7 +9,7 @@ import pytest
 from helpers_character import FIGURES, JUMP, STEP, G, Stage, each_dimension, each_figure, is_walking, vector
 from helpers_pairwise import pairwise
 
-from carom import AABBCollider, PartOf, RigidBody, Spin, Transform
+from carom import AABBCollider, PartOf, RigidBody, SphereCollider, Spin, Transform
 from carom.plugins.rotation import BoxCollider
 
 pytestmark = pytest.mark.slow  # its kernels take long to compile
@@ -118,6 +118,42 @@ def test_a_turntable_takes_it_round():
         assert np.hypot(x, z) == pytest.approx(np.hypot(x[0], z[0]), abs=1e-9)
         assert np.diff(np.unwrap(np.arctan2(-z, x))) == pytest.approx(1.2 * STEP, abs=1e-9)
         assert np.ptp(track.y) < 1e-9
+
+
+@each_figure
+@pytest.mark.parametrize("turn", [0.004, -0.02, 1.2])
+def test_on_a_log_its_feet_go_as_the_log_does(figure, turn):
+    """In the step in which it is on top, by R sin(turn), however tall it is; not where that is more than a metre."""
+    stage, radius = Stage(figure, y=1.5), 1.5
+    spin = Spin(-turn / STEP if figure.d == 2 else (0, 0, -turn / STEP))
+    stage.world.create_entity(Transform(vector(figure.d)), RigidBody(kind="kinematic"), spin, SphereCollider(radius))
+    track = stage.run(2)
+    assert track.x[0] == 0.0
+    assert track.x[1] == pytest.approx(radius * math.sin(turn) if abs(turn) < 0.5 else 0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("speed", [0.0, 3.0, -3.0])
+@pytest.mark.parametrize("name", ["capsule 2D", "sphere 3D"])
+def test_on_a_planet_that_turns_it_walks_as_on_one_that_rests(name, speed):
+    """With an up that turns: seen from the planet at its speed, with the spin and against it."""
+    figure, rate = FIGURES[name], 0.4
+    stage = Stage(figure, y=5.0, gravity=0.0)
+    stage.me.gravity = G
+    spin = Spin(-rate if figure.d == 2 else (0, 0, -rate))
+    stage.world.create_entity(Transform(vector(figure.d)), RigidBody(kind="kinematic"), spin, SphereCollider(5.0))
+
+    def act(step):
+        up = stage.place.position / np.linalg.norm(stage.place.position)
+        stage.me.up = up
+        stage.me.move = speed if figure.d == 2 else speed * np.cross(up, (0.0, 0.0, 1.0))
+        if figure.d == 2:
+            stage.place.rotation = math.atan2(-up[0], up[1])
+
+    track = stage.run(200, act)
+    angles = np.unwrap(np.arctan2(track.x, track.y))[50:]
+    expected = rate + speed / (5.0 + stage.stands)
+    assert np.diff(angles) / STEP == pytest.approx(expected, rel=0.002)
+    assert is_walking(track[5:].state)
 
 
 @each_dimension
