@@ -18,7 +18,7 @@ from ...systems.queries.compiled import (
     overlap,
     to_collider,
 )
-from .records import EXACT
+from .records import CLIMB, EXACT
 
 REACH = 10.0  # skins that a cast looks beyond its way
 FOOT = 0.8  # of the half extent: what touches farther out is no floor
@@ -34,13 +34,20 @@ def is_dynamic(state, j):
     return j < state.dynamic
 
 
-@inlined
-def holds(walker, j, out, distance):
-    """Whether row j, met along that normal, is in the way: what is solid from one side is not from others."""
+@part
+def holds(walker, j, out, distance, path):
+    """Whether row j, met along that normal, is in the way: what is solid from one side is not from others. What stands
+    in it no deeper than its skin stands on it, unless it climbs."""
     state = walker.state
     if not is_one_way(state, j):
         return True
-    return not walker.dropping and is_from_front(front_of(state, j), out) and distance > 0.0
+    front = front_of(state, j)
+    if walker.dropping or not is_from_front(front, out):
+        return False
+    if distance > 0.0:
+        return True
+    comes = dot(front, path.direction) < 0.0 and walker.character.state[walker.row] != CLIMB
+    return comes and overlap(state, walker.row, j, path.start)[0] <= walker.skin
 
 
 @inlined
@@ -92,7 +99,7 @@ def cast_near(walker, at, way, reach, ignored):
             continue
         touches, distance, out, point = meet(walker, j, path, first)
         along = dot(out, way)
-        if not touches or distance >= first or along >= -EXACT or not holds(walker, j, out, distance):
+        if not touches or distance >= first or along >= -EXACT or not holds(walker, j, out, distance, path):
             continue
         if distance <= 0.0 and is_dynamic(state, j) and along > -0.5:
             continue
@@ -165,7 +172,7 @@ def floor_below(walker, at, reach):
             continue
         touches, distance, out, point = meet(walker, j, path, far)
         rise = dot(out, up)
-        if not touches or rise <= EXACT or not holds(walker, j, out, distance):
+        if not touches or rise <= EXACT or not holds(walker, j, out, distance, path):
             continue
         work.inside |= distance <= 0.0 and j >= state.moving
         here = distance - skin / max(rise, 0.1)

@@ -37,6 +37,7 @@ FARTHEST_CARRIED = 1.0  # m in a step; what goes farther was put elsewhere
 NEAR_BY = 0.25  # m: room around what it may reach in a step
 SOLE = 0.5  # of the least half extent: how far below its foot the floor is looked at, on which only an edge may stand
 DROPS_FOR = 0.1  # s in which it falls through what holds from above,
+DROPS_AT_MOST = 1.0  # where gravity is weak,
 DROPS_AGAIN = 0.2  # and until when it does not begin anew
 WALL = 0.9  # of a normal across up: is a wall
 CEILING = -0.5  # of a normal along up: is above
@@ -364,9 +365,10 @@ def move_one(state, near, character, ladder, work, i, dt):
         left = floor  # it jumps as the step begins, and what moves stays behind
     reach = (length(velocity) + length(wish) + abs(character.climb[i]) + speed + gravity * dt) * dt + length(ride)
     reach += character.step_height[i] + character.snap[i] + 20.0 * character.skin[i] + NEAR_BY
-    extents, dropping = half_extents_of_row(state, i), character.since_drop[i] < DROPS_FOR
+    extents, since, skin = half_extents_of_row(state, i), character.since_drop[i], character.skin[i]
+    dropping = since < DROPS_FOR or (since < DROPS_AT_MOST and gravity * since * since < 8.0 * skin)  # it is in it
     walker = Walker(
-        state, near, character, work, i, start, extents, least(extents), up, character.skin[i],
+        state, near, character, work, i, start, extents, least(extents), up, skin,
         cos(character.max_slope[i]), dropping, gravity, wish, look_around(state, near, i, start, extents, reach),
     )  # fmt: skip
     work.hits, work.inside = 0, False

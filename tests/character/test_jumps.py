@@ -167,6 +167,32 @@ def test_a_one_way_platform_is_jumped_through_stood_on_and_dropped_through(figur
     assert stage.events("character_hit") == []
 
 
+@each_figure
+def test_put_on_a_one_way_platform_it_stands_as_on_a_floor(figure):
+    """With its feet on it to rounding, or in it by less than its skin; deeper it falls."""
+    for above in (0.005, 0.0, -1e-6, -0.9 * SKIN, -3 * SKIN):
+        stage = Stage(figure, x=-3.0, y=1.3 - SKIN + above)
+        platform = stage.one_way(-5, 5, 1.3)
+        track = stage.run(10)
+        if above < -SKIN:
+            assert track.y[-1] < 1.3 + stage.stands - 0.1
+        else:
+            assert track.y[-1] == pytest.approx(1.3 + stage.stands, abs=1e-9)
+            assert stage.me.floor_entity == platform
+
+
+@each_figure
+@pytest.mark.parametrize("gravity", [0.3, 1.6, G])
+def test_however_weak_gravity_is_it_drops_through_a_one_way_platform(figure, gravity):
+    stage = Stage(figure, y=1.3, gravity=gravity)
+    stage.one_way(-5, 5, 1.3)
+    stage.run(5)
+    start = stage.place.y
+    track = stage.run(60, stage.hold(2, drop=True))
+    t = STEP * np.arange(1, 61)
+    assert track.y - start == pytest.approx(-gravity * t * t / 2, abs=1e-9)
+
+
 @each_dimension
 def test_it_climbs_a_ladder_hangs_on_it_and_jumps_off(figure):
     stage = Stage(figure)
