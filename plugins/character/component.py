@@ -115,7 +115,8 @@ class Character(Component):
     floor_entity, floor_normal, floor_velocity
         what it stands on, -1 for nothing; (d,) a unit vector, 0 in the air; (d,) m/s
     on_wall, wall_entity, wall_normal
-        whether it touches a wall, or walks into one; which, -1 for none; (d,) a unit vector away from the last one
+        whether it touches a wall, or walks into one, not over a step; which, -1 for none; (d,) a unit vector away from
+        the last one
     on_ceiling
         whether it has run against something above
     crushed

@@ -9,7 +9,7 @@ from ...framework.vectors import add, add_scaled, divided, dot, item, length, sc
 from ...systems.queries.compiled import overlap
 from .casts import across, floor_below, is_dynamic, lowered
 from .records import AIR, CLIMB, EXACT, FLOOR, STEEP
-from .slides import along_floor, slide
+from .slides import along_floor, note_hit, slide
 
 SLOWER = 1e-6  # of its speed: less is rounding
 
@@ -46,8 +46,9 @@ def climb(walker, at, level, dt):
 def step_over(walker, at, wish, done, height):
     """(taken, place) of going over an edge: up, forward and down, if that leads farther than it has done, to a floor
     that is at most so high and no lower than it snaps to."""
-    up, size = walker.up, length(wish)
+    up, size, hits = walker.up, length(wish), walker.work.hits
     top = slide(walker, at, scale(up, height), False, True, -1)
+    walker.work.hits = hits  # above it is nothing that it runs against
     level, raised = across(wish, up), dot(sub(top, at), up)
     ahead = divided(level, length(level))
     over = slide(walker, top, scale(ahead, size), False, False, -1)
@@ -73,9 +74,11 @@ def walk(walker, at, level, kept, lift, dt):
     if blocked >= 0 and high > 0.0 and not is_dynamic(state, blocked):
         hits = work.hits
         taken, over = step_over(walker, at, way, sub(to, at), high)
-        if taken:
-            to = over
-        work.hits = hits
+        met, work.hits = work.hits, hits
+        if taken:  # what it has met is on the way over, not the edge
+            to, work.hits = over, first
+            for k in range(hits, met):
+                note_hit(work, work.hit_row[k], work.hit_out[k])
     gone = sub(to, at)
     if not taken and work.hits > first and length(gone) < (1.0 - SLOWER) * length(way):
         ahead = across(gone, up)  # as fast as it got along the floor

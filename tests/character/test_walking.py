@@ -181,6 +181,25 @@ def test_stairs_up_and_down_cost_no_time(figure):
 
 
 @each_figure
+def test_what_it_steps_over_is_no_wall_but_what_stands_on_it_is(figure):
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        speed, high = rng.uniform(0.5, 6.0), rng.uniform(0.04, 0.25)
+        stage = Stage(figure, x=-0.7, dt=1 / rng.choice((60, 120)))
+        stage.box((0, -1), (9, high))
+        wall = stage.box((1.5, -1), (2, 5))
+        walls = []
+        for _ in range(round(4.0 / speed / stage.world.settings.dt)):
+            stage.move(speed)
+            stage.world.step()
+            walls.append((bool(stage.me.on_wall), stage.place.x > 1.05))
+        assert stage.place.x == pytest.approx(1.5 - 0.4 - SKIN, abs=1e-9)
+        assert all(at_it for on_wall, at_it in walls if on_wall)
+        assert walls[-1] == (True, True)
+        assert {other for _, _, other, _, _ in stage.events("character_hit")} == {wall}
+
+
+@each_figure
 def test_what_is_higher_than_step_height_is_a_wall(figure):
     for step_height, passes in ((0.3, False), (0.4, True)):
         stage = Stage(figure, x=-1.0, step_height=step_height)
