@@ -104,7 +104,7 @@ class Character(Component):
         (d,) a direction; None: against gravity, and the second axis without any
     leave
         of the velocity of what has carried it, what it keeps when it leaves: ``"all"``, ``"up"``, the part upwards, or
-        ``"none"``
+        ``"none"``; a jump loses nothing by a floor that sinks
 
     What it knows after the step:
 

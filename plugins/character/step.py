@@ -207,7 +207,7 @@ def jump(walker, standing, climbing, level, rising, kept, lift, speed):
     if character.since_press[i] <= character.buffer[i]:
         if climbing or character.since_floor[i] <= character.coyote[i]:
             level = add(level, kept) if standing else level
-            rising, jumps = speed + max(lift, 0.0), True
+            rising, jumps = speed + max(lift, 0.0), True  # from what sinks it is as high as from what rests
         elif character.wall_jump[i] > 0.0 and character.since_wall[i] <= character.coyote[i]:
             level, rising, jumps = scale(character.wall_normal[i], character.wall_jump[i]), speed, True
             if character.wall_jump_up[i] == character.wall_jump_up[i]:
@@ -379,6 +379,8 @@ def move_one(state, near, character, ladder, work, i, dt):
     kept, lift = scale(ride, 0.0), dot(ride, up) / dt if character.leave[i] != LEAVE_NOTHING else 0.0
     if character.leave[i] == LEAVE_ALL:
         kept = across(scale(ride, 1.0 / dt), up)
+    else:
+        lift = max(lift, 0.0)
     jumps, level, rising = jump(walker, standing, climbing, across(velocity, up), rising, kept, lift, speed)
     standing = standing and not jumps and dot(character.floor_normal[i], up) != 0.0  # wedged: it falls in each step
     climbing = climbing and not jumps

@@ -238,17 +238,32 @@ def test_a_one_way_lift_takes_up_only_what_was_above_it(figure):
 
 
 @each_dimension
+@pytest.mark.parametrize("rise", [3.0, -3.0])
 @pytest.mark.parametrize("leave", ["all", "up", "none"])
-def test_jumping_off_adds_the_velocity_of_the_platform(figure, leave):
+def test_jumping_off_adds_the_velocity_of_the_platform(figure, leave, rise):
+    """But nothing that goes down: from a lift that sinks a jump is as high as from still ground."""
     stage = Stage(figure, y=0.0, leave=leave, air_acceleration=0.0)
-    stage.mover(0.0, 0.0, linear_velocity=vector(figure.d, 2.0, 3.0))
-    stage.run(10)
+    stage.mover(0.0, 0.0, linear_velocity=vector(figure.d, 2.0, rise))
+    assert stage.run(30).state[-1] == "floor"
     start = stage.place.position.copy()
     track = stage.run(12, stage.hold(jump=True))
     t = STEP * np.arange(1, 13)
-    vx, vy = (2.0 if leave == "all" else 0.0), (JUMP if leave == "none" else JUMP + 3.0)
+    vx, vy = (2.0 if leave == "all" else 0.0), (JUMP if leave == "none" else JUMP + max(rise, 0.0))
     assert track.x - start[0] == pytest.approx(vx * t, abs=1e-9)
     assert track.y - start[1] == pytest.approx(vy * t - G * t * t / 2, abs=1e-9)
+
+
+@each_dimension
+@pytest.mark.parametrize("rise", [3.0, -3.0])
+def test_walking_off_it_keeps_of_the_platform_what_leave_says(figure, rise):
+    for leave, kept in (("all", (2.0, rise)), ("up", (0.0, max(rise, 0.0))), ("none", (0.0, 0.0))):
+        stage = Stage(figure, x=1.5, y=0.0, leave=leave, snap=0.0)
+        stage.mover(0.0, 0.0, linear_velocity=vector(figure.d, 2.0, rise))
+        stage.run(30)
+        track = stage.run(60, stage.walk(4.0))
+        first = track.state.index("air")
+        assert first > 5
+        assert track.velocity[first][:2] == pytest.approx((4.0 + kept[0], kept[1]), abs=1e-9)
 
 
 @each_dimension
