@@ -108,6 +108,36 @@ def cast_near(walker, at, way, reach, ignored):
     return best, first, normal, touch
 
 
+@inlined
+def is_near(walker, j, at, margin):
+    """Whether the box around its shape there comes so near to that around row j's."""
+    away, half, close = to_collider(walker.state, at, j), walker.state.bodies.half_extents[j], True
+    for m in range(len(away)):
+        close &= abs(item(away, m)) <= item(half, m) + item(walker.half_extents, m) + margin
+    return close
+
+
+@part
+def grazed(walker, at, way, ignored):
+    """(row, back, out, point) of what it has come nearer to than its skin at the end of a way, and how far back that
+    began, m, below 0; row -1: nothing. For casts that lies too far ahead, or behind what the way ends at. What it can
+    stand on is left to :func:`floor_below`."""
+    state, near, skin = walker.state, walker.near, walker.skin
+    path = Path(at, way, inverse_of(way), walker.half_extents)
+    best, first, normal, touch = -1, 0.0, way, at
+    for k in range(walker.found):
+        j = near.row[k]
+        if j == ignored or is_sensor(state, j) or walker.character.present[j] or not is_near(walker, j, at, skin):
+            continue
+        depth, out, point = overlap(state, walker.row, j, at)
+        slope, late = 0.0 - dot(out, way), depth + skin
+        if late <= EXACT or slope <= EXACT or dot(out, walker.up) >= walker.limit:
+            continue
+        if 0.0 - late / slope < first and holds(walker, j, out, 0.0 - depth, path):
+            best, first, normal, touch = j, 0.0 - late / slope, out, point
+    return best, first, normal, touch
+
+
 @part
 def nearest_normal(walker, at, margin):
     """The normal of what is nearest to it there, of all within the margin; pieces of a terrain are as one."""
@@ -115,12 +145,7 @@ def nearest_normal(walker, at, margin):
     deepest, normal = -math.inf, walker.up
     for k in range(walker.found):
         j = near.row[k]
-        if is_sensor(state, j) or character.present[j]:
-            continue
-        away, half, close = to_collider(state, at, j), state.bodies.half_extents[j], True
-        for m in range(len(away)):
-            close &= abs(item(away, m)) <= item(half, m) + item(walker.half_extents, m) + margin
-        if close:
+        if not is_sensor(state, j) and not character.present[j] and is_near(walker, j, at, margin):
             depth, out, _ = overlap(state, walker.row, j, at)
             if depth > deepest:
                 deepest, normal = depth, out

@@ -74,7 +74,7 @@ class Character(Component):
     step_height, snap
         m: it steps onto edges so high; it stays on a floor that falls away by so much in a step
     skin
-        m, above 0, that it keeps to all it meets
+        m, above 0, that it keeps to all it meets on its own way
     acceleration, air_acceleration
         m/s^2, towards ``move`` on the ground and in the air
     gravity

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...framework.compilation import inlined, part
 from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, scale, sub
 from ...systems.queries.compiled import front_of, is_from_front, is_one_way, is_sensor, overlap
-from .casts import REACH, SLOPE, across, cast_near, deepest, ground_kind, is_dynamic
+from .casts import REACH, SLOPE, across, cast_near, deepest, grazed, ground_kind, is_dynamic
 from .records import EXACT, MOST_HITS, SLIDES
 
 MOST_PLANES = 32
@@ -93,19 +93,20 @@ def slide(walker, at, wish, is_walking, is_carried, ignored):
             break
         way = divided(left, size)
         j, distance, out, point = cast_near(walker, at, way, size + REACH * skin, ignored)
-        if j < 0:
-            return add(at, left)
-        slope = 0.0 - dot(out, way)
-        free = max(0.0, distance - skin / max(slope, 1e-3))
-        if free >= size:
-            if is_dynamic(state, j) and free < size + skin:
+        free = max(0.0, distance - skin / max(0.0 - dot(out, way), 1e-3)) if j >= 0 else size
+        beside, back, side, touch = grazed(walker, add_scaled(at, way, min(free, size)), way, ignored)
+        if beside >= 0:
+            j, out, point, free = beside, side, touch, max(0.0, min(free, size) + back)
+        elif free >= size:
+            if j >= 0 and is_dynamic(state, j) and free < size + skin:
                 note_hit(work, j, out)  # it follows what it pushes
             return add(at, left)
         at = add_scaled(at, way, free)
         left = add_scaled(left, way, 0.0 - free)
         note_hit(work, j, out)
         if is_walking:
-            if climbs(walker, j, out, add_scaled(at, way, distance - free), point):
+            touching = add_scaled(at, way, distance - free) if beside < 0 else add_scaled(at, out, 0.0 - skin)
+            if climbs(walker, j, out, touching, point):
                 left = along_floor(across(left, walker.up), out, walker.up)
             elif dot(out, walker.up) > -0.1:
                 level = across(out, walker.up)

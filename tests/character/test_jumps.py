@@ -116,6 +116,20 @@ def test_in_the_air_it_is_steered_by_air_acceleration(figure):
 
 
 @each_figure
+@pytest.mark.parametrize("whole", [True, False])
+def test_it_keeps_its_skin_to_a_wall_beside_which_it_jumps(figure, whole):
+    """Of one box or of many, at random speeds and heights, on the way up, down and as it lands."""
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        stage = Stage(figure, x=rng.uniform(-2.0, -0.5), jump_height=rng.uniform(1.0, 3.0))
+        for k in range(1 if whole else 9):
+            stage.box((0, k), (2, 9 if whole else k + 1))
+        stage.move(rng.uniform(0.5, 8.0))
+        track = stage.run(180, lambda step, me=stage.me: setattr(me, "jump", step % 60 < 25))
+        assert (-0.4 - track.x).min() == pytest.approx(SKIN, abs=1e-8)
+
+
+@each_figure
 def test_landing_is_told_once_with_its_speed(figure):
     stage = Stage(figure, y=1.2)
     floor = stage.box((-5, -1), (5, 0))
@@ -222,7 +236,7 @@ def test_it_slides_down_walls_slowly_and_jumps_off_them(figure):
     assert stage.me.wall_entity == wall
     assert stage.me.wall_normal == pytest.approx(vector(figure.d, -1.0), abs=1e-9)
     assert -np.diff(track.y)[-10:] == pytest.approx(2.0 * STEP, abs=1e-9)
-    assert 0.0 < 1.0 - 0.4 - track.x[-1] < SKIN + 1e-9
+    assert track.x[-1] == pytest.approx(1.0 - 0.4 - SKIN, abs=1e-9)
     start = stage.place.position.copy()
     track = stage.run(20, stage.hold(jump=True))
     t = STEP * np.arange(1, 21)
