@@ -17,10 +17,11 @@ from .plugin_broad_phase import PluginBroadPhase
 from .records import FRAME_SIZE
 from .stages import BRUTE_FORCE, NO_SEARCH, PLUGIN, UNIFORM_GRID, UNIFORM_GRID_MIN
 from .static_grid import NEVER_BUILT
-from .tree.tree import SpatialTree
+from .tree.tree import CandidateLimitError, SpatialTree
 from .uniform_grid import LONGEST, NOTE_CHUNK, OUTSIDE_MAX
 
-MOST_KINDS = 8  # of layers, for each of which there is a tree: as many as games have
+MANY_CANDIDATES = 100  # candidates of a body, on average, from which layers are looked at before boxes are tested
+MOST_KINDS = 8  # of layers, for each of which there is a tree then: as many as games have
 
 
 class CandidateSearch:
@@ -38,8 +39,8 @@ class CandidateSearch:
     ) -> None:  # fmt: skip
         self._state, self._world, self._box_now, self._run_stage = state, world, box_now, run_stage
         self._plugin = PluginBroadPhase(world.registry)
-        first, self._asleep, self._static, self._empty = (SpatialTree(state.dimensions) for _ in range(4))
-        self._trees = [first]  # of what moves: one of all, or one for each kind of layers
+        self._moving, self._asleep, self._static, self._empty = (SpatialTree(state.dimensions) for _ in range(4))
+        self._of_kinds: list[SpatialTree] = []  # of what moves, one for each kind of layers: where it crowds
         self._static_version, self._static_first = NEVER_BUILT, 0
         for grid in (state.grid, state.static_grid):
             grid.reserve(FRAME_SIZE, "frame")
@@ -67,39 +68,37 @@ class CandidateSearch:
             lower, upper = state.bodies.lower[: state.count], state.bodies.upper[: state.count]
             self._store(*self._plugin.pairs(self._world.settings.broad_phase, lower, upper, state.moving))
             return
-        kinds, kind = self._kinds_of_layers()
-        self._trees += (SpatialTree(state.dimensions) for _ in range(len(self._trees), len(kinds)))
-        trees = self._trees[: len(kinds)]
-        for k, tree in enumerate(trees):
-            lower = state.bodies.lower
-            if len(trees) > 1:
-                lower = lower[: state.moving].copy()
-                lower[state.first :][kind != k] = np.nan
-            tree.build(lower, state.bodies.upper, state.first, state.moving)
+        self._build(self._moving, state.first, state.moving)
         self._build_static()
-        for k, tree in enumerate(trees):
-            for other in range(k, len(trees)):
-                (layer, mask), (other_layer, other_mask) = kinds[k], kinds[other]
-                if layer & other_mask and other_layer & mask:
-                    self._store(*(tree.pairs_within() if other == k else tree.pairs_between(trees[other])))
-            self._store(*tree.pairs_between(self._static))
-            if state.first:
-                self._store(*tree.pairs_between(self._asleep))
+        try:
+            self._store(*self._moving.pairs_within(MANY_CANDIDATES * self._moving.count))
+        except CandidateLimitError:
+            self._search_by_layers()
+        self._store(*self._moving.pairs_between(self._static))
+        if state.first:
+            self._store(*self._moving.pairs_between(self._asleep))
 
-    def _kinds_of_layers(self) -> tuple[list[list[int]], np.ndarray]:
-        """The different (layer, mask) of what moves, and which of them each row has, so that crowds of what does not
-        meet each other need not be tested; only one if there are many, and of bodies without a shape none."""
+    def _search_by_layers(self) -> None:
+        """A crowd: what layers and masks keep apart in it is not tested."""
         state, colliders = self._state, self._state.colliders
         rows = np.arange(state.first, state.moving)
+        both = np.full((len(rows), 2), -1)
         if len(colliders.mask) > 0:
             at = state.bodies.collider_slot[rows], rows
-            layer = colliders.layer[at] if len(colliders.layer) > 0 else np.ones(len(rows), np.int64)
-            both = np.stack((layer, colliders.mask[at]), axis=1)
-            both[state.bodies.shape[rows] < 0] = 0
-            kinds, kind = np.unique(both, axis=0, return_inverse=True)
-            if len(kinds) <= MOST_KINDS:
-                return kinds.tolist(), kind.ravel()
-        return [[-1, -1]], np.zeros(len(rows), np.int64)
+            both[:, 0], both[:, 1] = colliders.layer[at] if len(colliders.layer) > 0 else 1, colliders.mask[at]
+        found, kind = np.unique(both, axis=0, return_inverse=True)
+        if not 1 < len(found) <= MOST_KINDS:
+            self._store(*self._moving.pairs_within())
+            return
+        kinds, trees = found.tolist(), self._of_kinds
+        trees += (SpatialTree(state.dimensions) for _ in range(len(trees), len(kinds)))
+        for k, (tree, (layer, mask)) in enumerate(zip(trees, kinds, strict=False)):
+            lower = state.bodies.lower[: state.moving].copy()
+            lower[state.first :][kind.ravel() != k] = np.nan
+            tree.build(lower, state.bodies.upper, state.first, state.moving)
+            for other, (other_layer, other_mask) in enumerate(kinds[: k + 1]):
+                if layer & other_mask and other_layer & mask:
+                    self._store(*(tree.pairs_within() if other == k else tree.pairs_between(trees[other])))
 
     def _store(self, first: np.ndarray, second: np.ndarray) -> None:
         candidates, after = self._state.candidates, self._state.candidates.count
@@ -133,10 +132,10 @@ class CandidateSearch:
         static_grid.serves = static_grid.suits and made_for == (state.statics_version, state.moving)
         start, stop = state.first if static_grid.serves else 0, state.first if grid.serves else state.moving
         if start < stop:
-            self._build(self._trees[0], start, stop)
+            self._build(self._moving, start, stop)
         if not static_grid.serves:
             self._build_static()
-        return self._trees[0] if start < stop else self._empty, self._empty if static_grid.serves else self._static
+        return self._moving if start < stop else self._empty, self._empty if static_grid.serves else self._static
 
     def index_for_stages(self, scene: Any) -> None:
         """The same within a step, and the trees where compiled code finds them."""

@@ -30,7 +30,7 @@ def touching(place, layer, mask, moving):
 
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("kinds", KINDS.values(), ids=KINDS)
-@pytest.mark.parametrize(("moving", "static", "extent"), [(60, 20, 2), (300, 20, 3), (300, 400, 3), (400, 90, 0.4)])
+@pytest.mark.parametrize(("moving", "static", "extent"), [(60, 20, 2), (300, 20, 3), (300, 400, 3), (600, 90, 0.1)])
 def test_all_that_layers_let_meet_is_found(kinds, moving, static, extent, d):
     """Few, many, crowded in one place: as by looking at every pair."""
     random = np.random.default_rng(moving + static + len(kinds))
