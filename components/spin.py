@@ -121,9 +121,7 @@ class Spin(Component):
 
     def velocity_at(self, point: Vector) -> np.ndarray:
         """(d,) m/s: the velocity of the body at ``point``, (d,) m in the world."""
-        arm, w = self._arm(point), self.angular_velocity
-        turned = np.cross(w, arm) if np.ndim(w) else w * np.array((-arm[1], arm[0]))
-        return self._handle(RigidBody).linear_velocity + turned
+        return self._handle(RigidBody).linear_velocity + turning_velocity(self.angular_velocity, self._arm(point))
 
     @property
     def moments(self) -> Angular:
@@ -191,6 +189,11 @@ class Spin(Component):
             argument.check_dimensions(found, d, self._entity)
             found = argument.whole(found, d) if argument.item_shape(d) else found
         return found
+
+
+def turning_velocity(spin: Any, arm: np.ndarray) -> np.ndarray:
+    """(d,) m/s: w x r of a point at an arm (d,) m from the position, with a spin in rad/s."""
+    return np.cross(spin, arm) if np.ndim(spin) else spin * np.array((-arm[1], arm[0]))
 
 
 def axes_of(rotation: np.ndarray) -> np.ndarray:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
@@ -222,7 +221,7 @@ class Simulation:
         if self._structure() != scene.structure and self.plugin_stages.follow(self.program):
             self.links.forget()
             self.parts_version += 1
-        with self._named_errors():
+        with self.attribute_errors():
             changed = scene.refresh()
         if changed:
             table.frames_applied = True
@@ -275,14 +274,8 @@ class Simulation:
 
     def link(self) -> None:
         """Compile or load what the step needs."""
-        with self._named_errors():
-            self.parts_version += self.links.link(self.forces.kind())
-
-    @contextmanager
-    def _named_errors(self) -> Iterator[None]:
-        """Errors of what cannot be compiled say of which plugin that is."""
         try:
-            yield
+            self.parts_version += self.links.link(self.forces.kind())
         except Exception as error:
             self.attribute_errors.describe(error)
             raise

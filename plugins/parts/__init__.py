@@ -9,7 +9,7 @@ import numpy as np
 from ...components import Collider, RigidBody, Transform
 from ...components.part_of import Changes, PartOf, rows_of_parts
 from ...components.rigid_body import WEIGHTLESS
-from ...components.spin import Spin, mass_of_shape
+from ...components.spin import Spin, mass_of_shape, turning_velocity
 from ...framework import Plugin, World
 from ...systems.parts.records import PARTS
 from .outline import Outline as Outline
@@ -99,9 +99,8 @@ class Parts(Plugin):
         way = Pose.of(0.0, transform.rotation, d).point(centre)
         transform.position = transform.position + way
         if moving and Spin in own and RigidBody in own:
-            w = own[Spin].angular_velocity
-            turned = np.cross(w, way) if np.ndim(w) else w * np.array((-way[1], way[0]))
-            own[RigidBody].linear_velocity = own[RigidBody].linear_velocity + turned
+            handle = own[RigidBody]
+            handle.linear_velocity = handle.linear_velocity + turning_velocity(own[Spin].angular_velocity, way)
         for component, handle in own.items():
             if issubclass(component, Collider):
                 handle.offset = handle.offset - centre

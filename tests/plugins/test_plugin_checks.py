@@ -418,30 +418,22 @@ def test_what_cannot_be_compiled_is_named():
     world.close()
 
 
-def halved(r):  # as if @plugin.kernel were forgotten
-    return 0.5 * r
+def unmarked(r):  # as if @plugin.kernel were forgotten
+    return 1.0 * r
 
 
 @pytest.mark.compiled
 def test_a_helper_that_is_no_kernel_is_named_in_the_first_step():
     """Generic pairs take a support by address: it is compiled while the shapes of the scene are looked at."""
-    plugin = Plugin("discs")
 
-    @plugin.shape(cost=2)
-    class Round(Collider):
-        reach = column(positive=True)
+    def support(shape, direction):
+        return scale(direction, unmarked(shape.reach) / length(direction))
 
-        def bounds(shape, dimensions):
-            return (shape.reach,) * 2 if dimensions == 2 else (shape.reach,) * 3
-
-        def support(shape, direction):
-            reach = halved(shape.reach)
-            return scale(direction, reach / length(direction))
-
+    plugin, disc = registered(support=support)
     with World(Physics(), plugin) as world:
         world.create_entity(Transform((0, 0)), AABBCollider((1, 1)))
-        world.create_entity(Transform((0, 1)), RigidBody(), Round(1.0))
-        message = "^opening the step failed in step 0 .*shape Round: support cannot be compiled; functions that it"
+        world.create_entity(Transform((0, 1)), RigidBody(), disc(1.0))
+        message = "^opening the step failed in step 0 .*shape DiscCollider: support cannot be compiled; functions"
         with pytest.raises(StepError, match=message):
             world.step()
 

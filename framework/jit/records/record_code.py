@@ -253,9 +253,10 @@ class _StoreItem(AbstractTemplate):
         if len(arguments) == 3 and isinstance(arguments[0], ColumnType):
             found, (column, _, given) = _index_type(*arguments[:2]), arguments
             if found is not None:
-                sizes = [len(kind) for kind in (found[1], given) if isinstance(kind, types.BaseTuple)]  # pyright: ignore[reportArgumentType]
-                if sizes[1:] not in ([], sizes[:1]):
-                    raise TypingError(f"{column.label or 'this column'} takes {sizes[0]} numbers here, got {sizes[1]}")
+                both = isinstance(found[1], types.BaseTuple) and isinstance(given, types.BaseTuple)
+                if both and len(given) != len(found[1]):  # pyright: ignore[reportArgumentType]
+                    takes = f"{column.label or 'this column'} takes {len(found[1])} numbers here"  # pyright: ignore[reportArgumentType]
+                    raise TypingError(f"{takes}, got {len(given)}")  # pyright: ignore[reportArgumentType]
                 return signature(types.none, column, found[0], found[1])
         return None
 
