@@ -110,10 +110,11 @@ def _is_carom(component: type[Component]) -> bool:
 
 
 def levels_of(path: str | Path) -> list[str | None]:
-    """The names of the levels in an LDtk project; of a map of Tiled, or a file that cannot be read, [None]."""
+    """The names of the levels in an LDtk project; of one without levels, a map of Tiled, or a file that cannot be read,
+    [None]."""
     try:
         node = document(Path(path))
-        return list(level_names(node)) if is_ldtk(node) else [None]
+        return [*level_names(node)] or [None] if is_ldtk(node) else [None]
     except RefusedError:
         return [None]
 
@@ -159,7 +160,7 @@ class Plan:
         try:
             node = document(file)
             if is_ldtk(node):
-                data = read_ldtk(file, node, level, findings, known.is_class)
+                data = read_ldtk(file, node, level, findings, known.is_class, known.materials)
             else:
                 data = read_tiled(file, node, findings)
         except (RefusedError, RecursionError) as error:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from .reading import Node, Property, above_0, document, nodes, number, whole, wo
 from .tiled import LARGEST
 
 SHAPES = {"Rectangle": "rectangle", "Ellipse": "ellipse", "Cross": "point", "Tile": "tile"}
-MARKS = {"solid": "Solid", "oneway": "OneWay", "one_way": "OneWay", "decoration": "Decoration"}
+MARKS = {"oneway": "OneWay", "one_way": "OneWay", "decoration": "Decoration"}
 
 
 def is_ldtk(node: Node) -> bool:
@@ -22,14 +22,17 @@ def is_ldtk(node: Node) -> bool:
 
 
 def read_ldtk(
-    path: Path, node: Node, level: str | None, findings: Findings, is_class: Callable[[str], bool]
-) -> MapData:
+    path: Path, node: Node, level: str | None, findings: Findings, is_class: Callable[[str], bool],
+    materials: Collection[str],
+) -> MapData:  # fmt: skip
     """The level of that name; the only one if None. RefusedError if there is none.
 
     is_class
         whether a name is one of a component or prefab: other points are named by it
+    materials
+        names of materials: values of IntGrid layers with other names, no classes either, are plain solid
     """
-    return Reader(path, node, findings, is_class).level(_level_of(path, node, level))
+    return Reader(path, node, findings, is_class, materials).level(_level_of(path, node, level))
 
 
 def level_names(node: Node) -> list[str]:
@@ -54,8 +57,11 @@ def _level_of(path: Path, node: Node, name: str | None) -> Node:
 
 
 class Reader:
-    def __init__(self, path: Path, node: Node, findings: Findings, is_class: Callable[[str], bool]) -> None:
+    def __init__(
+        self, path: Path, node: Node, findings: Findings, is_class: Callable[[str], bool], materials: Collection[str]
+    ) -> None:
         self.path, self.findings, self.is_class, self.node = path, findings, is_class, node
+        self.materials = materials
         defs = node["defs"]
         if not isinstance(defs, dict):
             raise RefusedError("'defs' must be an object")
@@ -115,9 +121,14 @@ class Reader:
         for k, value in enumerate(sorted({*values.tolist()} - {0})):
             name, numbers[value] = names.get(value, ""), first + 1 + k
             where, size = f"IntGrid value {value}" + f" {name!r}" * bool(name), (self.data.tile, self.data.tile)
-            self.data.tiles[numbers[value]] = Tile(where, MARKS.get(name.casefold(), name) if name else "Solid", size)
+            self.data.tiles[numbers[value]] = Tile(where, self.kind_of(name), size)
         known, which = np.unique(values, return_inverse=True)
         return np.array([numbers[value] for value in known.tolist()])[which].reshape(rows, columns)
+
+    def kind_of(self, name: str) -> str:
+        """The class of an IntGrid value of that name."""
+        known = name in self.materials or self.is_class(name)
+        return MARKS.get(name.casefold(), name if known else "Solid")
 
     def painted(self, node: Node) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What a layer shows, rules and painted tiles."""

@@ -51,6 +51,9 @@ def test_all_findings_are_listed(carom, level, tmp_path):
     level.write_text(level.read_text().replace('name="mas"', 'name="mass"'))
     assert carom("maps", "check", "level.tmx", "--with", "game.py").exit_code == 0
     (tmp_path / "other.tmj").write_text("{")
+    write(tmp_path / "none.ldtk", {"levels": [], "defs": {}})
+    none = carom("maps", "check", "none.ldtk")
+    assert (none.exit_code, none.stdout) == (1, "none.ldtk: the project has 0 levels: there is nothing to load\n")
     several = carom("maps", "check", "level.tmx", "other.tmj", "--with", "game.py")
     assert several.exit_code == 1
     assert several.stdout.startswith("other.tmj: other.tmj is no JSON that can be read")

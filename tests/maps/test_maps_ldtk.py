@@ -73,6 +73,17 @@ def test_a_level_becomes_a_world(tmp_path, world):
     assert {tiles.materials[tiles.material_of(3, 3)].friction for tiles in icy} == {0.02}
 
 
+@pytest.mark.parametrize(("ice", "solid"), [({}, "1235"), ({"ice": {"friction": 0.5}}, "1235"), ({"ice": None}, "135")])
+def test_values_are_solid_whatever_their_name(ice, solid, tmp_path, world):
+    """1 has no name, 2 is ice, 3 one_way, 4 Decoration, 5 a component where the game is known, and a wall else."""
+    path = write(tmp_path / "world.ldtk", project(level("L", [[1, 2, 3, 4, 5]])))
+    assert maps.load(path, world, (Spring,), materials=ice).of_class["Spring"]
+    without_the_game, made = maps.world_of(path)
+    assert "Spring" not in made.of_class
+    for each, where in ((world, solid), (without_the_game, "1235")):
+        assert [x + 1 for x in range(5) if each.ray_cast((x + 0.5, 1.5), (0, -0.9))] == [*map(int, where)]
+
+
 def test_one_of_several_levels_is_chosen(tmp_path, world):
     one, two = level("One", CELLS[3:]), level("Two", np.ones((2, 3), int), worldX=500)
     external = {**two, "layerInstances": None, "externalRelPath": "world/Two.ldtkl"}
@@ -95,7 +106,6 @@ def test_one_of_several_levels_is_chosen(tmp_path, world):
         ({"things": [entity("x", "Enemy", 0, 0, fields=[field("helth", "Int", 3)])]}, r"property 'helth': .*'health'"),
         ({"things": [entity("x", "Enemy", 0, 0, fields=[field("health", "Int", -3)])]}, r"property 'health'.*at least"),
         ({"things": [entity("x", "Enemy", 0, 0, fields=[NOBODY])]}, r"object q, which is not in the map"),
-        ({"cells": [[2]]}, r"IntGrid value 2 'ice', class 'ice': it is no component"),
         ({"short": True}, r"layer 'Ground': its data has 1 cells, and the level 2 x 1 = 2"),
         ({"tile": {"px": [1]}}, r"layer 'Ground': 'src' must be two numbers"),
     ],
