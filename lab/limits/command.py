@@ -70,7 +70,7 @@ def _run(loaded: Loaded, world: World, seconds: float, bar: Progress) -> list[tu
     """Run for so many seconds; the times at the start and at intervals, with the limits then."""
     steps = round(seconds / world.settings.dt)
     bar.say(f"{loaded.name}, steps of {number(world.settings.dt)} s")
-    found = []
+    found, moves = [], loaded.compared is not None
     with loaded.attribute_errors(), stdout_kept_clean():
         for look in sorted({round(steps * k / LOOKS) for k in range(LOOKS + 1)}):
             bar.advance(look - world.step_count)
@@ -83,6 +83,9 @@ def _run(loaded: Loaded, world: World, seconds: float, bar: Progress) -> list[tu
                     physics.report_faults("")  # of what no step has looked at yet
                 raise Problem(": ".join((f"{loaded.name}: not finite after {world.time:.4g} s", *world.faults[:1])))
             found.append((world.time, step_limits(world)))
+            moves |= len(moving) > 0  # what moves may come later
+    if not moves:
+        raise Problem(f"{loaded.name}: there is no body that moves by itself: nothing to measure")
     return found
 
 

@@ -76,7 +76,7 @@ def apart(one: tuple[Any, Floats], other: tuple[Any, Floats]) -> tuple[Floats, N
     """Of two states, each ids and positions: how far the bodies are apart that both have, (n,), and their ids."""
     ids, a, b = np.intersect1d(one[0], other[0], return_indices=True)
     ways = one[1][a] - other[1][b]
-    return np.sqrt((ways * ways).reshape(len(ids), -1).sum(axis=1)), ids
+    return np.sqrt((ways * ways).sum(axis=1)), ids
 
 
 def sensor_entities(world: World) -> NDArray[np.int64]:

@@ -109,6 +109,30 @@ def test_the_command_tells_what_broke_while_it_watched(carom, tmp_path):
     assert "broken.py: not finite after 0.6 s: entity 1: linear_velocity is [nan, nan]" in result.output
 
 
+LATER = IMPORTS + """
+seconds = 0.1
+
+class Later(System):
+    def process(self, dt):
+        if self.world.step_count == COMES:
+            self.world.create_entity(Transform((0, 0)), RigidBody(), SphereCollider(0.3))
+
+def build(settings, seed=0):
+    world = World(Physics(dimensions=2), settings=settings)
+    world.add_system(Later())
+    world.create_entity(Transform((0, 5)), AABBCollider(half_extents=(1, 1)))
+    return world
+"""
+
+
+def test_what_moves_may_come_while_it_watches(carom):
+    Path("still.py").write_text(LATER.replace("COMES", "-1"))
+    refused = refusal(carom("limits", "still.py"))
+    assert refused == "carom: still.py: there is no body that moves by itself: nothing to measure"
+    Path("later.py").write_text(LATER.replace("COMES", "3"))
+    assert "Nothing limits the step" in carom("limits", "later.py").stdout
+
+
 @pytest.mark.parametrize(("arguments", "message"), [
     (["stack", "--seconds", "-1"], "'--seconds': -1.0 is not in the range x>=0"),
     (["stak"], "no scene named 'stak'; did you mean 'stack'"),
