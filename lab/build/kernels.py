@@ -171,6 +171,6 @@ def write(names: Sequence[str]) -> None:
         prepare(sys.argv[2:], names)
         kernels = [*linked_kernels(), *called_kernels()]
     except (BuildError, Problem) as error:
-        print(f"Error: {error}", file=sys.stderr)
+        print(f"carom: {error}", file=sys.stderr)
         sys.exit(Problem.exit_code)
     Path(sys.argv[1]).write_bytes(pickle.dumps(kernels))

@@ -12,7 +12,13 @@ STOPPED = 130  # exit code after Ctrl-C
 
 
 class Commands(click.Group):
-    """A click group whose errors are one line on stderr, and exit code 2."""
+    """A click group whose errors are one line on stderr, and exit code 2; without arguments its help."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if not args and self.no_args_is_help:  # click takes it for an error
+            click.echo(ctx.get_help())
+            ctx.exit()
+        return super().parse_args(ctx, args)
 
     def main(self, *args: Any, **options: Any) -> Any:
         options["standalone_mode"] = False

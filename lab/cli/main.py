@@ -27,16 +27,10 @@ COMMANDS = {
 }
 
 
-@click.group(
-    cls=LateCommands, late=COMMANDS, context_settings={"help_option_names": ["-h", "--help"]},
-    invoke_without_command=True,
-)  # fmt: skip
+@click.group(cls=LateCommands, late=COMMANDS, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="carom")
-@click.pass_context
-def cli(context: click.Context) -> None:
+def cli() -> None:
     """carom: a physics framework for games, from the command line."""
-    if context.invoked_subcommand is None:
-        click.echo(context.get_help())
 
 
 def main() -> None:

@@ -96,6 +96,17 @@ def test_an_error_in_the_middle_of_a_run_names_its_line(carom, ball):
     assert "Traceback" not in result.stderr
 
 
+@pytest.mark.parametrize("group", [[], ["maps"]])
+def test_a_group_without_arguments_shows_its_help(carom, group):
+    result = carom(*group)
+    assert (result.exit_code, result.stdout, result.stderr) == (0, carom(*group, "--help").stdout, "")
+
+
+def test_what_stops_a_build_is_one_line_too(carom, capfd):
+    assert carom("build", "bal.py").exit_code == 2
+    assert capfd.readouterr().err == "carom: no file 'bal.py'\n"
+
+
 def test_missing_file_suggests_its_neighbour(carom, ball):
     assert "did you mean 'ball.py'?" in refusal(carom("run", "bal.py"))
 
