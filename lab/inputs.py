@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import os
 import weakref
 from bisect import bisect_right
 from collections.abc import Iterable
+from numbers import Real
 from pathlib import Path
 from typing import Self
 
@@ -43,8 +45,21 @@ class Inputs:
         return found
 
     def record(self, time: float, held: Iterable[str]) -> None:
-        """Call it in each step with what is held then; ValueError for a time before the last one."""
+        """Call it in each step with what is held then. ValueError for a time that is not finite, or before the last
+        one, and for a key that is no single word; TypeError for what is no number, and keys that are no texts."""
+        if not isinstance(time, Real):
+            raise TypeError(f"time must be a number of seconds, got {time!r}")
+        time = float(time)
+        if not math.isfinite(time):
+            raise ValueError(f"time must be a finite number of seconds, got {time!r}")
+        if isinstance(held, str):
+            raise TypeError(f"held must be all keys that are held, as {{{held!r}}}, got {held!r}")
         words = frozenset(held)
+        for word in words:
+            if not isinstance(word, str):
+                raise TypeError(f"keys are texts, got {word!r}")
+            if word.split() != [word]:
+                raise ValueError(f"a key is one word, without spaces, got {word!r}")
         if self._times and time < self._times[-1]:
             raise ValueError(f"{time:g} s is before {self._times[-1]:g} s")
         if not self._held or words != self._held[-1]:

@@ -159,6 +159,26 @@ def test_inputs_are_played_back_with_steps_of_any_length(tmp_path):
         Inputs.read(tmp_path / "b.keys")
 
 
+@pytest.mark.parametrize(("time", "held", "named"), [
+    (0.0, "jump", "'jump'"), (0.0, {"page up"}, "'page up'"), (0.0, {""}, "''"), (0.0, {1}, "1"), (0.0, {b"q"}, "b'q'"),
+    ("0", (), "'0'"), (None, (), "None"), (math.nan, (), "nan"), (math.inf, {"q"}, "inf"),
+])  # fmt: skip
+def test_inputs_that_a_file_would_not_hold_are_refused(time, held, named):
+    keys = Inputs()
+    with pytest.raises((TypeError, ValueError), match=f"got {named}$"):
+        keys.record(time, held)
+    assert keys.held(1.0) == frozenset()
+
+
+def test_inputs_are_read_as_they_were_recorded(tmp_path):
+    keys = Inputs()
+    for time in (np.float32(0.0), *np.arange(1, 5) / 60, np.int64(1)):
+        keys.record(time, {f"k{time:.2f}", "umlaut-ü"})
+    keys.write(tmp_path / "a.keys")
+    back = Inputs.read(tmp_path / "a.keys")
+    assert [back.held(k / 60) for k in range(90)] == [keys.held(k / 60) for k in range(90)]
+
+
 def runner(settings=None, seed=0):
     """5 m/s to the right from 0.31 s to 0.72 s: 2.05 m, in steps of any length."""
     keys = Inputs([(0.31, "right"), (0.72, "")])
