@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from operator import index
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ class Rollback:
         the World; nothing else may step it
     apply
         is called before each step with the inputs, a list with one of each player, and writes them into the world.
-        Inputs are anything that compares with ``==``
+        Inputs are anything that compares with ``==``, such as numbers and tuples; arrays do not
     players
         how many
     most
@@ -55,7 +56,10 @@ class Rollback:
         self._wrong: int | None = None  # the first frame with a guess that was wrong
 
     def inputs(self, player: int) -> list[Any]:
-        """All inputs of a player that are known, from frame 0 on; not to be changed."""
+        """All inputs of a player that are known, from frame 0 on; not to be changed. ValueError if there is no such
+        player."""
+        if player not in range(len(self._inputs)):
+            raise ValueError(f"Rollback: player must be a number from 0 to {len(self._inputs) - 1}, got {player!r}")
         return self._inputs[player]
 
     @property
@@ -65,15 +69,24 @@ class Rollback:
 
     def give(self, player: int, frame: int, inputs: Iterable[Any]) -> None:
         """The inputs of a player in ``frame`` and those that follow. What is known already is skipped, and what leaves
-        a gap is ignored: send all that the other may lack."""
-        known = self._inputs[player]
-        if not 0 <= frame <= len(known):
-            return
-        for new in list(inputs)[len(known) - frame :]:
-            at = len(known)
-            if at in self._used and self._used[at][player] != new:
-                self._wrong = at if self._wrong is None else min(at, self._wrong)
-            known.append(new)
+        a gap is ignored: send all that the other may lack. ValueError for a player or a frame that cannot be, TypeError
+        for inputs that do not compare with ``==``; nothing of them is known then."""
+        known = self.inputs(player)
+        if index(frame) < 0:
+            raise ValueError(f"Rollback.give: frame must be at least 0, got {frame!r}")
+        new = list(inputs)[len(known) - frame :] if frame <= len(known) else []
+        wrong = [] if self._wrong is None else [self._wrong]
+        for at, each in enumerate(new, len(known)):
+            guess = self._used[at][player] if at in self._used else each
+            try:
+                differs = bool(guess != each)
+            except ValueError as error:
+                what = "inputs must compare with ==, as numbers and tuples do, and arrays do not"
+                raise TypeError(f"Rollback.give: {what}, got {each!r}") from error
+            if differs and at in self._used:
+                wrong.append(at)
+        self._wrong = min(wrong, default=None)
+        known += new
 
     def step(self) -> bool:
         """One frame more; False, and none is played, if a player is too far behind."""

@@ -99,3 +99,22 @@ def test_it_waits_for_the_slowest_and_ignores_gaps():
     for wrong in ({"players": 0}, {"most": 0}):
         with pytest.raises(ValueError, match="Rollback needs"):
             Rollback(world, apply, **wrong)
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize(("wrong", "told"), [
+    ((2, 0, [1]), "from 0 to 1, got 2"), ((-1, 0, [1]), "from 0 to 1, got -1"), ((0, -1, [1]), "at least 0, got -1"),
+    ((0, 0.5, [1]), "'float'"), ((0, 0, 5), "'int' object is not iterable"),
+    ((0, 0, [0.5, np.zeros(2)]), r"do not, got array\(\[0., 0.\]\)"),
+    ((0, 0, [0.5, 0.5, (0.5, np.zeros(2))]), "do not, got .0.5, array"),
+])  # fmt: skip
+def test_what_cannot_be_an_input_is_refused_at_once(wrong, told):
+    world, apply = game()
+    rollback = Rollback(world, lambda inputs: apply([0.0, 0.0]), idle=(0.5, np.ones(2)))
+    for _ in range(3):
+        rollback.step()
+    with pytest.raises((ValueError, TypeError), match=told):
+        rollback.give(*wrong)
+    assert [rollback.inputs(player) for player in (0, 1)] == [[], []]
+    rollback.settle()
+    assert rollback.replayed == 0
