@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
+from ..drawing.up import up_of
 from ..framework import World
 from ..framework.typing import Vector
 from .camera import Camera
@@ -16,8 +15,7 @@ def camera_of(world: World, size: Vector = (1280, 720)) -> Camera | OrbitCamera:
     """A camera for its worlds; in 3D gravity tells what is down."""
     if world.dimensions == 2:
         return Camera(size)
-    down = np.asarray(world.gravity)
-    return OrbitCamera(size, up=-down if np.any(down) else (0.0, 1.0, 0.0))
+    return OrbitCamera(size, up=up_of(world))
 
 
 def painter_of(world: World) -> Any:

@@ -24,7 +24,7 @@ MOST_SEGMENTS = 160_000
 MOST_CONTACTS_3D = 200  # more would hide the bodies
 SPOTS = (0.6, 0.4, 0.2)  # rad, on balls in 3D, at both ends of each axis: how far they reach
 ANGLES = np.linspace(0, 2 * np.pi, 40, endpoint=False)
-FACE_SHADE = np.array([(0.3, 0.6, 0.5), (0.3, 0.0, 0.5)])  # of faces in 3D that look down or up, by the axis
+FACE_SHADE = np.array([(0.3, 0.6, 0.5), (0.3, 0.0, 0.5)])  # of faces in 3D that look down or up, by axis of the ground
 FAINT = 0.3  # opacity of sensors
 GLASS = 0.13  # opacity of walls in 3D
 Painted = tuple[int, Floats, Any, Any]  # the row of a body, a polygon in the plane, the colours of it and its edge
@@ -81,7 +81,8 @@ def _draw_solids(
 def _painted_faces(bodies: Figures, shade: Floats, projection: Projection) -> Iterator[Painted]:
     """Each face that looks at the camera."""
     for group, seen, normals in _seen_faces(bodies, projection):
-        squares, owner = normals**2, bodies.rows(group)[seen]
+        normals, owner = normals @ projection.ground.T, bodies.rows(group)[seen]
+        squares = normals**2
         dark = FACE_SHADE[(normals[:, 1] > 0.0).astype(int)]
         share = (squares * dark).sum(axis=1) / squares.sum(axis=1)
         colours = canvas.mixed(shade[owner], canvas.BACKGROUND, share)

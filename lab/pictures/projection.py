@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...drawing.up import Y_UP, axes_round
+from ...framework.typing import Vector
+
 Floats = NDArray[np.float64]
 
 AZIMUTH, ELEVATION = np.radians(-58.0), np.radians(20.0)
@@ -17,25 +20,27 @@ DISTANCE = 2.6  # of the camera from the middle of the view, in diagonals of the
 class Projection:
     """The space between ``lower`` and ``upper``, viewed from outside.
 
-    ``axes`` (d, d): rows are right, up and, in 3D, towards the camera; y points up in the picture.
+    ``axes`` (d, d): rows are right, up and, in 3D, towards the camera; ``ground``: along it, up and along it.
     """
 
     lower: Floats
     upper: Floats
     axes: Floats
     distance: float
+    ground: Floats
 
     @classmethod
-    def of(cls, lower: Floats, upper: Floats) -> Projection:
-        """A projection of the space between two corners."""
+    def of(cls, lower: Floats, upper: Floats, up: Vector = Y_UP) -> Projection:
+        """A projection of the space between two corners; in 3D ``up`` is up in the picture, in 2D y."""
         if len(lower) == 2:
-            return cls(lower, upper, np.eye(2), np.inf)
-        level = np.cos(ELEVATION)
-        toward = np.array([-level * np.sin(AZIMUTH), np.sin(ELEVATION), level * np.cos(AZIMUTH)])
-        right = np.cross([0.0, 1.0, 0.0], toward)
+            return cls(lower, upper, np.eye(2), np.inf, np.eye(2))
+        ahead, above, side = ground = axes_round(np.asarray(up, float))
+        level = np.cos(AZIMUTH) * side - np.sin(AZIMUTH) * ahead
+        toward = np.cos(ELEVATION) * level + np.sin(ELEVATION) * above
+        right = np.cross(above, toward)
         right /= np.linalg.norm(right)
         axes = np.stack([right, np.cross(toward, right), toward])
-        return cls(lower, upper, axes, DISTANCE * float(np.linalg.norm(upper - lower)))
+        return cls(lower, upper, axes, DISTANCE * float(np.linalg.norm(upper - lower)), ground)
 
     @property
     def dimensions(self) -> int:

@@ -11,6 +11,7 @@ from matplotlib.colors import to_rgba_array
 
 from ...components.part_of import PartOf
 from ...drawing import Drawing, Lines, Style
+from ...drawing.up import up_of
 from ...systems.shapes.rotation import axes_of
 from ..measure.bodies import QUIET, Floats
 from ..measure.paths import Traces
@@ -58,7 +59,8 @@ def draw_run(run: Run, out: Path, view: Any = None) -> list[Path]:
     """
     still = Still.of(Drawing(run.world))
     ends = find_view(still, run.traces) if view is None else view
-    projection = Projection.of(*(np.asarray(end, float) for end in ends))
+    lower, upper = (np.asarray(end, float) for end in ends)
+    projection = Projection.of(lower, upper, up_of(run.world))
     frame = projection.frame()
     if is_file(out):
         out.parent.mkdir(parents=True, exist_ok=True)

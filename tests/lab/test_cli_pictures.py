@@ -19,7 +19,7 @@ from carom.drawing import Drawing, Style
 from carom.framework import Settings, World
 from carom.lab.measure.run import FEW_BODIES, FEW_STEPS, run
 from carom.lab.pictures.projection import Projection
-from carom.lab.pictures.run_pictures import GHOSTS, Still, draw_final, draw_traces, find_view
+from carom.lab.pictures.run_pictures import GHOSTS, Still, draw_final, draw_run, draw_traces, find_view
 from carom.plugins import Physics, capsule, convex_hull, convex_polygon, half_space, tile_grid
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_hull import ConvexHullCollider
@@ -387,6 +387,22 @@ def test_what_is_turned_in_space_is_drawn_so():
             assert np.abs(colour_at(x * RIGHT + way) - background).max() > 20
         for way in (2.4 * along, -2.4 * along, 0.6 * across, -0.6 * across, 1.8 * RIGHT):
             np.testing.assert_array_equal(colour_at(x * RIGHT + way), background)
+
+
+@pytest.mark.parametrize("axes", [
+    ((1, 0, 0), (0, 0, 1), (0, -1, 0)), ((1, 0, 0), (0, -1, 0), (0, 0, -1)), ((0, 1, 0), (1, 0, 0), (0, 0, -1)),
+])  # fmt: skip
+def test_up_is_against_gravity(axes, tmp_path):
+    """The picture of a turned world, under the same part of gravity, is that of the world."""
+    pictures = []
+    for turn in (np.eye(3), np.array(axes, float)):
+        with World(Physics(dimensions=3, gravity=-9.81 * turn[1])) as world:
+            world.create_entity(Transform((0, -0.5, 0) @ turn), AABBCollider(np.abs((5, 0.5, 4) @ turn)))
+            for k in range(3):
+                world.create_entity(Transform((k, 1 + k, -k) @ turn), RigidBody(), AABBCollider(0.5))
+            (file,) = draw_run(run(world, 3), tmp_path / f"{len(pictures)}.png")
+        pictures.append(np.array(Image.open(file), int))
+    assert (np.abs(pictures[0] - pictures[1]) > 40).mean() < 1e-3 < (pictures[0] != pictures[0][0, 0]).mean()
 
 
 def test_the_spots_of_a_ball_in_space_turn_with_it():

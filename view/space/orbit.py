@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...drawing.up import Y_UP, axes_round
 from ...framework.typing import Vector
 from ..camera import pixels_of, place_of
 
@@ -43,14 +44,10 @@ class OrbitCamera:
         yaw: float = 0.6,
         pitch: float = 0.4,
         *,
-        up: Vector = (0.0, 1.0, 0.0),
+        up: Vector = Y_UP,
     ) -> None:
         self.size, self.middle, self.distance, self.yaw, self.pitch = size, middle, distance, yaw, pitch
-        self.up = place_of(up, "OrbitCamera.up", 3)
-        self.up /= np.linalg.norm(self.up)
-        self._ahead = np.eye(3)[int(np.argmin(np.abs(self.up)))]  # where it looks at a yaw of 0
-        self._ahead = self._ahead - (self._ahead @ self.up) * self.up
-        self._ahead /= np.linalg.norm(self._ahead)
+        self._ahead, self.up, self._side = axes_round(place_of(up, "OrbitCamera.up", 3))  # it looks there at a yaw of 0
 
     @property
     def size(self) -> tuple[int, int]:
@@ -89,8 +86,7 @@ class OrbitCamera:
     @property
     def axes(self) -> Floats:
         """(3, 3): as rows, unit vectors to the right, upwards and ahead."""
-        side = np.cross(self._ahead, self.up)
-        level = math.cos(self.yaw) * self._ahead + math.sin(self.yaw) * side
+        level = math.cos(self.yaw) * self._ahead + math.sin(self.yaw) * self._side
         ahead = math.cos(self.pitch) * level - math.sin(self.pitch) * self.up
         right = np.cross(ahead, self.up)
         right /= np.linalg.norm(right)
