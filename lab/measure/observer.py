@@ -23,7 +23,7 @@ from .bodies import Floats, overlaps_of, sensor_entities, size_of, sizes_of, sta
 from .timing import now, timed
 
 # Failures of runs; STOPPED: ended by an error.
-NOT_FINITE, ESCAPED, TUNNELLED, BLEW_UP, STOPPED = "not finite", "escaped", "tunnelled", "blew up", "stopped"
+NOT_FINITE, ESCAPED, MISSED, BLEW_UP, STOPPED = "not finite", "escaped", "missed a contact", "blew up", "stopped"
 SETTLED = 0.5  # fraction of the run after which contacts at rest are measured
 EARLY = 0.2  # fraction of the run after which statistics begin
 MOST_TIMES = 200  # impacts whose times are kept

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..cli.usage_errors import Problem, did_you_mean
 from ..measure.bodies import apart
-from ..measure.observer import BLEW_UP, NOT_FINITE, TUNNELLED, RunResult, mean_of
+from ..measure.observer import BLEW_UP, MISSED, NOT_FINITE, RunResult, mean_of
 from ..reporting.text import metres
 from .grid import STILL, Facts
 
@@ -277,7 +277,7 @@ def norms_for(facts: Facts, asked: Sequence[str]) -> tuple[dict[str, Norm], tupl
 def failure_of(seen: RunResult, right: RunResult, chaotic: bool) -> str | None:
     """The reason why the run has no error figure, or None.
 
-    Tunnelled: a body that touches something in the reference has touched nothing.
+    Missed: a body that touches something in the reference has touched nothing; it has passed through it or beside it.
     """
     if seen.failure or not np.isfinite(seen.position).all():
         return seen.failure or NOT_FINITE
@@ -287,7 +287,7 @@ def failure_of(seen: RunResult, right: RunResult, chaotic: bool) -> str | None:
         return BLEW_UP
     same = seen.fixed and right.fixed and not right.values  # a game tells itself what went wrong
     if same and {*right.struck} & {*right.entities} - {*seen.struck}:
-        return TUNNELLED
+        return MISSED
     return None
 
 

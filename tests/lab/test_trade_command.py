@@ -40,7 +40,7 @@ def test_five_lines_a_table_and_a_chart(carom, tmp_path):
     assert re.match(r"mine\.py: use Settings\(.*\), [\d.]+ times the cost of Settings\(\) now", first)
     assert [line.split()[0] for line in rest] == ["now", "use"]
     assert "us per frame of 1/60 s on this machine" in rest[1]
-    assert "escaped" in rest[0] or "tunnelled" in rest[0]
+    assert "escaped" in rest[0] or "missed a contact" in rest[0]
     for words in ("mine.py: worst error of all runs (position)", "reference: event_driven, steps of 1/120"):
         assert words in table, words
     assert (tmp_path / "out/trade/trade-mine-py.png").read_bytes().startswith(b"\x89PNG")

@@ -136,6 +136,18 @@ def test_balls_on_a_line_touch_in_order():
     assert found.points[0].figures["order"].error == 0
 
 
+def test_what_passes_beside_has_missed_a_contact():
+    """The right arc touches a ledge 1 cm below its apex, Euler's is lower by g dt t / 2 = 8 cm, and touches nothing."""
+    def ledge(settings, seed=0):
+        world = World(Physics(dimensions=2, gravity=(0, -10)), settings=settings)
+        world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(3, 10)), SphereCollider(0.1))
+        world.create_entity(Transform((3, 5.59)), AABBCollider((0.5, 0.5)))
+        return world
+
+    found = trade(ledge, seconds=1.5, vary={"dt": (1 / 60,), **METHOD}, **FEW).scenes[0]
+    assert found.points[0].failed == "3 of 3 missed a contact"
+
+
 def test_inputs_are_played_back_with_steps_of_any_length(tmp_path):
     keys = Inputs([(0.0, "right"), (0.5, "right jump"), (0.5 + 1 / 60, "right"), (1.0, "")])
     keys.write(tmp_path / "a.keys")
