@@ -8,15 +8,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...components import Collider
+from ...components.part_of import PartOf
 from ...framework import CaromError, NoPhysicsError, World
+from ...plugins.joints.joint import Joint, whole_body
+from ...plugins.joints.kinds import KINDS
 from ..reporting.text import jsonable
 from .stability import stability_limits
 from .stiffness import modes_of, unmeasured
+
+Bools, Rows = NDArray[np.bool_], NDArray[np.int64]
 
 SAFETY = 0.9  # fraction of the limit that is suggested
 FASTEST = 200  # bodies that are compared with all others
@@ -154,8 +160,8 @@ def _first_to_grow(world: World) -> Oscillation | None:
 def _first_passage(world: World) -> Passage | None:
     """The pair that may tunnel at the shortest step, of the fastest bodies and all that they may meet.
 
-    Left out: sensors, what has no end, bodies with ``ccd``, pairs that layers and groups keep apart, or of which none
-    is dynamic. A tile map counts as one body.
+    Left out: sensors, what has no end, bodies with ``ccd``, parts of one body, pairs that layers, groups or joints
+    keep apart, or of which none is dynamic. A tile map counts as one body.
     """
     bodies, count = world.bodies, len(world.bodies)
     services: Any = world.physics
@@ -178,6 +184,7 @@ def _first_passage(world: World) -> Passage | None:
     a, dynamic = fast[:, None], rows < bodies.dynamic.rows.stop
     meet = (a != solid) & (dynamic[a] | dynamic[solid]) & (layer[a] & mask[solid] != 0) & (layer[solid] & mask[a] != 0)
     meet &= (speed[a] > 0.0) & ((group[a] != group[solid]) | (group[a] == 0))
+    _leave_out_connected(world, meet, fast, solid)
     if not meet.any():
         return None
     limits = np.where(meet, size[a] + size[solid], np.inf) / np.where(meet, speed[a] + speed[solid], 1.0)
@@ -185,3 +192,17 @@ def _first_passage(world: World) -> Passage | None:
     pair = np.array(sorted((fast[one], solid[other]), key=lambda row: -speed[row]))
     numbers = speed[pair].sum(), size[pair].sum(), limits[one, other]
     return Passage(*bodies.entity[pair].tolist(), *map(float, numbers))
+
+
+def _leave_out_connected(world: World, meet: Bools, a: Rows, b: Rows) -> None:
+    """Rows ``a`` (n,) and ``b`` (m,) do not ``meet`` (n, m) where they are of one body, or a joint keeps their bodies
+    apart. By the components, as the records of parts and joints are those of the last step."""
+    contents, body = world._contents(), np.array(world.bodies.entity)
+    parts = {entity: whole_body(contents, entity) for entity, _ in world.get_component(PartOf)}
+    if parts:
+        body = np.array([parts.get(entity, entity) for entity in body.tolist()])
+    meet &= body[a][:, None] != body[b]
+    for kind in (*KINDS, *world.registry.joints):
+        for _, joint in cast("list[tuple[int, Joint]]", world.get_component(kind)):
+            for one, other in ((joint.a, joint.b), (joint.b, joint.a)) if not joint.collide_connected else ():
+                meet[np.ix_(body[a] == one, body[b] == other)] = False

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 from helpers_motion import SpringAndDrag, oscillators
-from worlds import ball, box, floor, make_world
+from worlds import ball, box, floor, make_world, mostly_2d
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, NoPhysicsError, Settings, StepError, System, World
@@ -16,6 +16,9 @@ from carom.lab.limits.step_length import SAFETY, step_limits, suggest_dt
 from carom.plugins import Physics
 from carom.plugins.half_space import HalfSpaceCollider
 from carom.plugins.half_space import plugin as half_space
+from carom.plugins.joints import Distance, Joints
+from carom.plugins.parts import PartOf, Parts
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
 from carom.plugins.springs import Springs
 
 # -- no limits, and invalid input ----------------------------------------------------------------
@@ -164,3 +167,30 @@ def test_the_first_passage_against_all_pairs(seed):
         if "dynamic" in (a[0], b[0]) and a[3] & b[4] and b[3] & a[4] and a[1] + b[1] > 0 and not a[5] == b[5] != 0
     )
     assert step_limits(world).tunnelling == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("stepped", [False, True])
+@mostly_2d
+def test_bodies_that_are_connected_meet_others_alone(d, stepped):
+    """A hammer of a body, a part of it and a part of that, and two bodies beside it, tied to each other."""
+    def limits(*more, **joint):
+        world = World(Physics(dimensions=d), Rotation(), Parts(), Joints())
+
+        def body(x, speed=40.0):
+            moves = RigidBody(linear_velocity=(0, speed, 0)[:d])
+            return world.create_entity(Transform((x, 0, 0)[:d]), moves, Spin(), BoxCollider(0.1))
+
+        a, b, c = body(0), body(1), body(2)
+        head = world.create_entity(PartOf(a, (0.3, 0, 0)[:d]), BoxCollider(0.05))
+        world.create_entity(PartOf(head, (0.1, 0, 0)[:d]), BoxCollider(0.02))
+        for one, other in ((a, b), (b, c), (c, a)):
+            world.create_entity(Distance(one, other, **joint))
+        for each in more:
+            body(*each)
+        if stepped:
+            world.step()
+        return step_limits(world)
+
+    assert limits().passage is None
+    assert limits(collide_connected=True).tunnelling == pytest.approx((0.04 + 0.2) / 80)
+    assert limits((9.0, 0.0)).tunnelling == pytest.approx((0.04 + 0.2) / 40)
