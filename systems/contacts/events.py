@@ -258,11 +258,19 @@ class ContactEvents(StagedSystem):
         if enabled is not None:
             contacts.enabled[contacts.now, : len(enabled)] = enabled
 
+    def _may_meet_any(self, row: int) -> bool:
+        """Whether there is a body with a shape beside that of a row, and those that joints keep from touching it."""
+        state, bodies, joints = self._state, self._state.bodies, self._state.solver.joints
+        owner = bodies.owner[: state.count] if state.has_parts else np.arange(state.count)
+        others = bodies.entity[owner[(bodies.shape[: state.count] >= 0) & (owner != owner[row])]]
+        a, b, own = joints.apart_a[: joints.apart], joints.apart_b[: joints.apart], bodies.entity[owner[row]]
+        return not np.isin(others, np.concatenate((b[a == own], a[b == own]))).all()
+
     def report_faults(self, dt: float) -> None:
         """Note what has gone wrong in the step of ``dt``, s."""
         state, impacts, solver = self._state, self._impacts, self._state.solver
         entity, faults, faulty = state.bodies.entity, solver.faults, solver.faulty
-        if state.too_fast_for_discrete:
+        if state.too_fast_for_discrete and self._may_meet_any(state.too_fast_row):
             fast = int(entity[state.too_fast_row])
             self.world.report_fault(
                 f"entity {fast}: so fast that discrete collisions may miss what it passes: set its ccd, or "

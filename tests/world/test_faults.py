@@ -9,10 +9,14 @@ import esper
 import numpy as np
 import pytest
 from helpers_steps import both_ways  # noqa: F401  every test with each
-from worlds import make_world
+from worlds import make_world, mostly_2d
 
-from carom.components import RigidBody, SphereCollider, Transform
-from carom.framework import FaultError, PhysicsWarning
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import FaultError, PhysicsWarning, Settings, World
+from carom.plugins import Physics
+from carom.plugins.joints import Distance, Joints
+from carom.plugins.parts import PartOf, Parts
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 
 def fast_body(world, x):
@@ -126,3 +130,24 @@ def test_systems_report_faults_of_their_own():
     world.report_fault("the map has two holes", kind="map")
     assert [str(warning.message) for warning in warnings_of(world.step)] == ["the map has a hole"]
     assert world.faults == ["the map has two holes (2 times, step 0)"]
+
+
+@mostly_2d
+def test_what_has_nothing_to_pass_is_not_too_fast(d):
+    """Alone, with a thin part, and tied to another one; and told as soon as there is a body that it may meet."""
+    with World(Physics(dimensions=d), Rotation(), Parts(), Joints(), settings=Settings(on_fault="ignore")) as world:
+        fast = RigidBody(linear_velocity=(0, 90, 0)[:d])
+        body = world.create_entity(Transform((0, 0, 0)[:d]), fast, Spin(), BoxCollider(0.1))
+        for more in (
+            (), (PartOf(body, (0.5, 0, 0)[:d]), BoxCollider(0.02)),
+            (Transform((1, 0, 0)[:d]), RigidBody(linear_velocity=(0, 90, 0)[:d]), Spin(), BoxCollider(0.1)),
+        ):  # fmt: skip
+            other = world.create_entity(*more)
+            if len(more) == 4:
+                world.create_entity(Distance(body, other))
+            world.step()
+            assert not world.faults
+        world.create_entity(Transform((9, 0, 0)[:d]), AABBCollider(0.1))
+        world.step()
+        (fault,) = world.faults
+        assert "so fast that discrete collisions may miss" in fault
