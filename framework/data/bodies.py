@@ -130,7 +130,7 @@ class Bodies:
             raise TypeError(f"rows_of takes the ids of entities, got {entities!r}")
         rows = self._table.rows_of(ids.astype(np.int64))
         if rows.min(initial=0) < 0:
-            raise KeyError(ids.item(int(rows.argmin())))
+            raise KeyError(f"entity {ids.item(int(rows.argmin()))} is no body of this world")
         return rows
 
     def __len__(self) -> int:

@@ -261,6 +261,8 @@ class Column:
         except (ValueError, TypeError, OverflowError):
             wanted = {"i": "an integer", "b": "True or False"}.get(np.dtype(self.dtype).kind, "a number")
             rule = f"must be {wanted}" if self.item == "scalar" else "must be numbers"
+            if type(value) is int and wanted == "an integer":
+                rule = "must be from -2**63 to 2**63 - 1"
             if hasattr(value, "entity"):  # of a component
                 rule, shown = f"{rule}: give its entity, which create_entity returns", f"a {type(value).__name__}"
             raise self._error(value if shown is None else shown, rule, entity) from None

@@ -104,6 +104,8 @@ class Component:
             if not name.startswith("_"):
                 also = {word: known for known, field in self.columns.items() for word in field.also}
                 near = did_you_mean(name, [word for word in dir(self) if word[0] != "_"], also)
+            elif name in ("_store", "_version", "_entity"):
+                near = f": {type(self).__name__}.__init__ must call super().__init__ first"
             raise AttributeError(f"{type(self).__name__} has no attribute {name!r}{near}")
 
     def __dir__(self) -> list[str]:

@@ -67,7 +67,7 @@ class Table(TableColumns):
         """The row of that entity; KeyError if it has none."""
         row = self.row_of(entity)
         if row < 0:
-            raise KeyError(entity)
+            raise KeyError(f"entity {entity!r} is no body of this world")
         return row
 
     def row_of(self, entity: int) -> int:

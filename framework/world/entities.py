@@ -200,7 +200,7 @@ class EntityVerbs:
                 component.check_in(contents, entity, beside)
             elif isinstance(component, type):
                 raise TypeError(f"components are instances: {component.__name__}(...), got the class itself")
-            elif isinstance(component, (list, tuple, Many)):
+            elif component is None or isinstance(component, (list, tuple, Many)):
                 raise TypeError(f"components are given one by one, got {component!r}")
         named = [c for c in components if isinstance(c, Component) and c._layers]
         for component, bits in [(c, c.bits_by_name(self._layer_names, entity)) for c in named]:

@@ -179,6 +179,8 @@ MANY = [  # dimensions, what is given for three entities, and what the error say
 ONE = [
     (2, lambda: Transform((0, 0)), lambda: RigidBody, r"RigidBody\(\.\.\.\), got the class itself"),
     (2, lambda: [Transform((0, 0)), RigidBody()], RigidBody, "one by one"),
+    (2, lambda: Transform((0, 0)), lambda: None, "one by one, got None"),
+    (2, lambda: SphereCollider(1.0, layer=1 << 63), RigidBody, r"layer must be from -2\*\*63 to 2\*\*63 - 1"),
     (2, lambda: Transform(3, 7), RigidBody, r"Transform\.position must be 2 or 3 numbers, got 3"),  # not (3, 3), 7 rad
     (3, lambda: Transform((0, 0, 0), rotation=0.5), RigidBody, r"Transform\.rotation must be a quaternion"),
     (2, lambda: RigidBody(mass=-2), RigidBody, r"RigidBody\.mass must be positive, got -2$"),
@@ -208,6 +210,22 @@ def test_errors_of_one_say_what_was_meant_and_create_nothing(d, one, other, mess
         world.create_entity(one(), other())
     assert world.create_entity() == 1
     assert len(world.bodies) == 0
+
+
+def test_what_no_component_and_no_body_has_is_said():
+    class Unfilled(Component):
+        level = column(3.0)
+
+        def __init__(self, level):
+            self.level = level
+
+    world = make_world()
+    one = ball(world, 0.0)
+    with pytest.raises(AttributeError, match=r"Unfilled\.__init__ must call super\(\)\.__init__ first"):
+        Unfilled(2.0)
+    for find in (lambda: world.bodies.row_of(77), lambda: world.bodies.rows_of([one, 77])):
+        with pytest.raises(KeyError, match="entity 77 is no body of this world"):
+            find()
 
 
 def test_how_many_and_of_what():
