@@ -204,5 +204,6 @@ def _leave_out_connected(world: World, meet: Bools, a: Rows, b: Rows) -> None:
     meet &= body[a][:, None] != body[b]
     for kind in (*KINDS, *world.registry.joints):
         for _, joint in cast("list[tuple[int, Joint]]", world.get_component(kind)):
-            for one, other in ((joint.a, joint.b), (joint.b, joint.a)) if not joint.collide_connected else ():
+            a_body, b_body = (parts.get(cast(int, end), end) for end in (joint.a, joint.b))
+            for one, other in ((a_body, b_body), (b_body, a_body)) if not joint.collide_connected else ():
                 meet[np.ix_(body[a] == one, body[b] == other)] = False

@@ -72,7 +72,6 @@ class JointRows:
                 column[j] = getattr(row, name)
         record.breaking_force[span] = joint.breaking_force or math.inf
         record.breaking_torque[span] = joint.breaking_torque or math.inf
-        self._keep_apart(joint)
         return bodies, before != now
 
     def lay(self, joint: Joint, keys: list[Any]) -> slice:
@@ -164,9 +163,9 @@ class JointRows:
 
     # -- bodies that joints keep from touching ----------------------------------------------------
 
-    def _keep_apart(self, joint: Joint) -> None:
-        apart = not joint.collide_connected and WORLD not in (joint.a, joint.b)
-        pair = (min(joint.a, joint.b), max(joint.a, joint.b)) if apart else None
+    def keep_apart(self, joint: Joint, ends: list[int]) -> None:
+        """The joint keeps the whole bodies ``ends`` from touching, if it does that."""
+        pair = None if joint.collide_connected or WORLD in ends else (min(ends), max(ends))
         if self._pairs.get(joint.entity) == pair:
             return
         self._part(joint.entity)

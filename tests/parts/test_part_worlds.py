@@ -265,6 +265,27 @@ def test_forces_and_joints_at_a_part_move_the_body():
     )
 
 
+def test_a_joint_at_a_part_keeps_the_whole_body_from_touching():
+    """And the body that the part belongs to later; what it has left touches then."""
+    world, _ = parts_world()
+    world.add_plugin(Joints())
+    ball = world.create_entity(Transform((0, 0)), RigidBody(), SphereCollider(0.4))
+    body, later = (world.create_entity(Transform((x, 0)), RigidBody(), SphereCollider(0.4)) for x in (0.5, -0.5))
+    part = world.create_entity(PartOf(body, (0, 0.5)), SphereCollider(0.4))
+    joint = world.create_entity(Weld(part, ball, anchor=(0, 0)))
+
+    def touching():
+        world.step()
+        pairs = {*zip(world.contacts.entity_a.tolist(), world.contacts.entity_b.tolist(), strict=True)}
+        return {a + b - ball for a, b in pairs if ball in (a, b)}
+
+    assert touching() == {later}
+    world.component_for_entity(part, PartOf).body = later
+    assert touching() == {body}
+    world.delete_entity(joint, immediate=True)
+    assert touching() >= {body, later}
+
+
 @pytest.mark.compiled
 @pytest.mark.parametrize("mode", MODES)
 def test_a_table_that_is_pressed_into_the_floor_is_put_back_once_not_by_each_foot(mode):
