@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 from typing import Any
 
@@ -33,7 +34,9 @@ class Commands(click.Group):
                 raise
             click.echo(f"carom: {' '.join(error.format_message().split())}", err=True)
             sys.exit(2)
-        exec("")  # else Python has no exit code after a Ctrl-C that came in code made of a string, as of named tuples
+        if result == STOPPED:  # what a Ctrl-C left of a compiler may crash the interpreter as it takes that down
+            sys.stdout.flush()
+            os._exit(STOPPED)
         sys.exit(result if isinstance(result, int) else 0)
 
 
