@@ -92,6 +92,7 @@ PREDICTED = Section(
     "body", "collisions", RESTED,
     warm_started=flags(default=False),  # the resting prediction has changed its velocity
     warm_start_velocity=vectors(unit="m/s"),
+    swings=flags(default=False),  # that was by joints alone which hold, of those that have any
 )  # fmt: skip
 REST_COLUMNS = Section(
     "body", "collisions", RESTED,

@@ -21,6 +21,7 @@ from .impacts.jointed import bend_struck, respond_joined, strike_joined
 from .impacts.together import resolve_simultaneous
 from .impacts.turning import respond_at_arms, turn_by_impact
 from .integration.system import Integration
+from .joints.groups import mark_joined
 from .joints.solving import solve_joined_range
 from .linking.parts import (
     ARMS_AT_REST,
@@ -34,6 +35,7 @@ from .linking.parts import (
     JOINED_RANGE,
     JOINED_RESPONSE,
     JOINED_START,
+    JOINED_SUPPORT,
     TAKE_TOGETHER,
     TOUCH_OF_TURN,
     TURN_BY_IMPACT,
@@ -166,7 +168,7 @@ LINKED_PARTS = {
     CLOSING_POINT: closing_point, ARMS_AT_REST: lay_arms, TURNING_RESPONSE: respond_at_arms,
     TURN_BY_IMPACT: turn_by_impact, JOINED_ISLANDS: measure_joined_islands, JOINED_BODIES: gather_joined,
     JOINED_RESPONSE: respond_joined, JOINED_IMPACT: strike_joined, JOINED_START: bend_struck,
-    JOINED_RANGE: solve_joined_range,
+    JOINED_RANGE: solve_joined_range, JOINED_SUPPORT: mark_joined,
 }  # fmt: skip
 
 # The system of each stage; "" for those that open and close a step.

@@ -29,8 +29,9 @@ from ..parts.rows import owner_of, place_of
 
 MOST_ITERATIONS = 96  # a chain of 60 bodies is solved to rounding; longer ones bounce with less energy
 SOLVED = 1e-16  # of the energy that joints would take if each row were alone: less is none
-# What joints take back as well: how fast bodies part what they hold, on their paths or as the solver has them; how far.
-TAKE_NOTHING, TAKE_SPEEDS, TAKE_STARTS, TAKE_WAYS = range(4)
+# What joints take back as well: how fast bodies part what they hold, now, before and behind their flight to an impact,
+# or as the solver has them; how far.
+TAKE_NOTHING, TAKE_SPEEDS, TAKE_FLIGHT, TAKE_STARTS, TAKE_WAYS = range(5)
 HELD = 1e-10  # of what an impulse would move without joints: less is nothing
 
 
@@ -179,13 +180,33 @@ def changes_of(state, rows, impulses):
     return energy
 
 
-@inlined
+@part
+def given_in_flight(state, i):
+    """What joints were foreseen to give body i on its flight, halfway through which it is now, and its path has."""
+    impacts, bodies, k = state.impacts, state.bodies, owner_of(state, i)
+    if not (state.any_warm_started and bodies.warm_started[k] and bodies.swings[k]):
+        return zero_of(state)
+    share = 2.0 * (impacts.now - impacts.since) / impacts.end
+    if state.path_degree == 1:
+        share = state.force_travels if impacts.since == 0.0 else 0.0
+    return scale(bodies.warm_start_velocity[k], share)
+
+
+@part
 def motion_to_take(state, i, takes):
-    """(velocity, spin) of body i on its path, or as the solver has it."""
+    """(velocity, spin) of body i now; or the sum of those before and behind its flight, without what joints were
+    foreseen to give it, or as the solver has them, before an impact as behind it."""
+    bodies, impacts, since, k = state.bodies, state.impacts, state.impacts.since, owner_of(state, i)
     if takes == TAKE_STARTS:
         q = place_of(state, i)
-        return state.solver.velocity[q], state.solver.spin[q]
-    return rate_along(path_of(state, i), state.impacts.now), state.bodies.spin[i]
+        return scale(state.solver.velocity[q], 2.0), scale(state.solver.spin[q], 2.0)
+    path = path_of(state, i)
+    if takes == TAKE_SPEEDS:
+        now = add(rate_along(path, impacts.now), impacts.settled[k])
+        return now, add(bodies.spin[i], impacts.settled_spin[k])
+    start = rate_along(path, since) if since > 0.0 else bodies.start_velocity[i]
+    end = rate_along(path, 2.0 * impacts.now - since)
+    return sub(add(start, end), given_in_flight(state, i)), scale(bodies.spin[i], 2.0)
 
 
 @part

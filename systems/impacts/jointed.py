@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, add_scaled, dot, item, length, scale
+from ...framework.vectors import add, add_scaled, dot, item, length, scale, sub
 from ..codes import OK
 from ..contacts.solving.rows import rotate_body
 from ..integration.turning import arms_to, velocity_by_spin
@@ -16,16 +16,17 @@ from ..shapes.poses import advance_pose, motion_of, set_motion
 from .impulses import count_impact, deflect
 from .joint_answers import (
     HELD,
+    TAKE_FLIGHT,
     TAKE_NOTHING,
     TAKE_SPEEDS,
     TAKE_STARTS,
     TAKE_WAYS,
     answer,
+    given_in_flight,
     list_answering,
     parted_by,
     push_rows,
     rows_that_answer,
-    strike,
 )
 from .turning import add_spin, arms_of, impulses_of, slip_direction
 from .worklist import list_pairs_of
@@ -33,15 +34,72 @@ from .worklist import list_pairs_of
 ONE_MOTION = 1e-5  # of the product: answers are as exact as that; two impulses that differ by less do one thing
 
 
+@part
+def last_impact_of(state, group):
+    """When a body of that group has had its last impact in this step; -1: it has had none."""
+    impacts, pairs, last = state.impacts, state.pairs, -1.0
+    for k in range(impacts.logged):
+        c = impacts.log_pair[k]
+        if group_of(state, pairs.a[c]) == group or group_of(state, pairs.b[c]) == group:
+            last = impacts.log_time[k]
+    return last
+
+
+@part
+def settle_group(state, i, t):
+    """The group of body i."""
+    impacts, joints, zero, group = state.impacts, state.solver.joints, zero_of(state), group_of(state, i)
+    impacts.since = max(0.0, last_impact_of(state, group)) if group >= 0 else 0.0
+    impacts.now = 0.5 * (impacts.since + t)
+    rows = list_answering(state, i, i)
+    answer(state, rows, ((i, i), (zero, zero), zero), 0.0, zero, TAKE_FLIGHT)
+    for e in range(rows):
+        for row in (joints.row_a[joints.open_row[e]], joints.row_b[joints.open_row[e]]):
+            if row >= 0:
+                k = owner_of(state, row)
+                impacts.settled[k] = sub(impacts.gained[k], given_in_flight(state, row))
+                impacts.settled_spin[k] = impacts.gained_spin[k]
+    impacts.now = t
+
+
+@part
+def settle(state, sides, t):
+    """``settled``: what makes the flight of what joints connect with two bodies, to an impact at time t, end as joints
+    have it. These were foreseen to give what they gave in the step before, in the direction of then, and on a straight
+    path all at once: in place of that they give, at half of the way, what makes the velocities before and behind part
+    what they hold as much, one way and the other, so that energy is the same."""
+    (a, b), impacts, zero = sides, state.impacts, zero_of(state)
+    for i in (a, b):
+        k = owner_of(state, i)
+        impacts.settled[k] = impacts.settled_spin[k] = zero
+    settle_group(state, a, t)
+    if group_of(state, b) != group_of(state, a):
+        settle_group(state, b, t)
+
+
+@part
+def gain_settled(state, rows, sides):
+    """Two bodies, and those of rows, gain what has settled them and what the rows push."""
+    impacts, joints = state.impacts, state.solver.joints
+    for e in range(-1, rows):
+        one, other = sides if e < 0 else (joints.row_a[joints.open_row[e]], joints.row_b[joints.open_row[e]])
+        for i in (one, other):
+            if i >= 0:
+                k = owner_of(state, i)
+                impacts.gained[k], impacts.gained_spin[k] = impacts.settled[k], impacts.settled_spin[k]
+    push_rows(state, rows, joints.push)
+
+
 def respond_joined(state, sides, met, motion, e, mu):
     """What ``respond_at_arms`` tells, where joints hold one of the two."""
     bodies, (a, b), (t, normal, point, apart) = state.bodies, sides, met
     now, (velocity, speed) = state.impacts.now, motion
-    state.impacts.now = t
+    settle(state, sides, t)
     arms = arms_to(bodies, a, b, normal, point, apart)
     light, touch, nothing = bodies.inverse_mass[a] + bodies.inverse_mass[b], (sides, arms, normal), scale(normal, 0.0)
     rows, parted = rows_that_answer(state, touch)
     answer(state, rows, touch, 0.0, nothing, TAKE_SPEEDS)
+    gain_settled(state, rows, sides)
     settled, nn = parted_by(state, touch), dot(parted, normal)
     speed += dot(settled, normal)
     smooth, pull = -(1.0 + e) * min(0.0, speed) * (light / nn), nothing
@@ -79,13 +137,13 @@ def strike_joined(state, event, impulse, friction, dt):
     impacts, joints, bodies = state.impacts, state.solver.joints, state.bodies
     a, b = state.pairs.a[impacts.event_pair[event]], state.pairs.b[impacts.event_pair[event]]
     touch = (a, b), arms_of(state, event), impacts.event_normal[event]
+    settle(state, touch[0], impacts.now)
     motions = motion_of(state, a), motion_of(state, b)  # of the end of the step
     advance_pose(state, a, bodies.spin[a], impacts.now - dt)
     advance_pose(state, b, bodies.spin[b], impacts.now - dt)
     rows, _ = rows_that_answer(state, touch)
     answer(state, rows, touch, impulse, friction, TAKE_SPEEDS)
-    strike(state, rows, touch, 0.0, scale(friction, 0.0))
-    push_rows(state, rows, joints.push)
+    gain_settled(state, rows, touch[0])
     set_motion(state, a, motions[0])
     set_motion(state, b, motions[1])
     take_gains(state, a, dt)
@@ -104,27 +162,16 @@ def strike_joined(state, event, impulse, friction, dt):
 
 
 @part
-def last_impact_of(state, group):
-    """When a body of that group has had its last impact in this step; -1: it has had none."""
-    impacts, pairs, last = state.impacts, state.pairs, -1.0
-    for k in range(impacts.logged):
-        c = impacts.log_pair[k]
-        if group_of(state, pairs.a[c]) == group or group_of(state, pairs.b[c]) == group:
-            last = impacts.log_time[k]
-    return last
-
-
-@part
 def displace(state, i, takes):
-    """Body i starts in the solver by so much elsewhere as it has gained, or with twice as much other velocities."""
+    """Body i starts in the solver by so much elsewhere as it has gained, or with other velocities."""
     impacts, solver, k, zero = state.impacts, state.solver, owner_of(state, i), zero_of(state)
     q = place_of(state, k)
     if takes == TAKE_WAYS:
         solver.shift[q] = add(solver.shift[q], impacts.gained[k])
         rotate_body(solver, q, add(solver.turn[q], impacts.gained_spin[k]))
     else:
-        solver.velocity[q] = add_scaled(solver.velocity[q], impacts.gained[k], 2.0)
-        solver.spin[q] = add_scaled(solver.spin[q], impacts.gained_spin[k], 2.0)
+        solver.velocity[q] = add(solver.velocity[q], impacts.gained[k])
+        solver.spin[q] = add(solver.spin[q], impacts.gained_spin[k])
     impacts.gained[k], impacts.gained_spin[k] = zero, zero
 
 

@@ -42,6 +42,8 @@ BODIES_OF_MEMBERS = Section(
     first_member=ints("int32"),
     gained=vectors(unit="m/s"),  # change of velocity
     gained_spin=vectors(unit="rad/s"),  # of what joints hold
+    settled=vectors(unit="m/s"),  # of that, by what joints have done in the flight to an impact
+    settled_spin=vectors(unit="rad/s"),
 )  # fmt: skip
 LOG = Section(
     "impact", "impacts", BOUNCED,
@@ -65,6 +67,7 @@ IMPACTS = Schema(
     touchdown_pair=integer(),  # the last one of whose bodies landings were searched
     touchdown_time=number(unit="s"),  # the time of its impact while they are searched, else 0
     now=number(unit="s"),
+    since=number(unit="s"),  # of the flight of what joints hold, to an impact
     end=number(unit="s"),  # of the step
     until=number(unit="s"),
     # impacts at the same time

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from ...framework.compilation import inlined, part
+from ..codes import OK
 from ..islands import join_roots, root_of
 from ..parts.rows import owner_of
-from .records import NOT_JOINED
+from .records import HOLD, NOT_JOINED
 
 
 @inlined
@@ -57,3 +58,19 @@ def is_joined(state, a, b):
     """Whether joints hold one of two bodies that can be moved."""
     joined = state.bodies.joined
     return state.solver.joints.active > 0 and (joined[a] != NOT_JOINED or joined[b] != NOT_JOINED)
+
+
+def mark_joined(state, dt):
+    """What joints hold is ``warm_started``; ``swings`` what nothing else holds, nor drives."""
+    joints, bodies = state.solver.joints, state.bodies
+    for e in range(joints.active):
+        for i in (joints.row_a[joints.order[e]], joints.row_b[joints.order[e]]):
+            if i >= 0:
+                bodies.swings[owner_of(state, i)] = not bodies.warm_started[owner_of(state, i)]
+    for e in range(joints.active):
+        j = joints.order[e]
+        for i in (joints.row_a[j], joints.row_b[j]):
+            if i >= 0 and state.bodies.inverse_mass[owner_of(state, i)] > 0.0:
+                bodies.warm_started[owner_of(state, i)] = True
+                bodies.swings[owner_of(state, i)] &= joints.rule[j] == HOLD
+    return OK

@@ -17,11 +17,11 @@ from ..shapes.linking.signatures import call_in_dimension
 (
     BOUND_SEARCHES, FIRST_TOUCH, TAKE_TOGETHER, FREE_TURN, TURNING_TOUCH, TOUCH_OF_TURN, CLOSING_POINT, ARMS_AT_REST,
     TURNING_RESPONSE, TURN_BY_IMPACT, JOINED_ISLANDS, JOINED_BODIES, JOINED_RESPONSE, JOINED_IMPACT,
-    JOINED_START, JOINED_RANGE,
-) = PLACES = range(16)  # fmt: skip
+    JOINED_START, JOINED_RANGE, JOINED_SUPPORT,
+) = PLACES = range(17)  # fmt: skip
 SWEPT_PARTS, IMPACT_PARTS = (BOUND_SEARCHES, FIRST_TOUCH), (FIRST_TOUCH,)
 TURNING_PARTS = (FREE_TURN, TURNING_TOUCH, TOUCH_OF_TURN, CLOSING_POINT, ARMS_AT_REST, TURNING_RESPONSE, TURN_BY_IMPACT)
-JOINT_PARTS = (JOINED_ISLANDS, JOINED_BODIES, JOINED_RANGE)
+JOINT_PARTS = (JOINED_SUPPORT, JOINED_ISLANDS, JOINED_BODIES, JOINED_RANGE)
 JOINT_IMPACT_PARTS = (JOINED_RESPONSE, JOINED_IMPACT, JOINED_START)
 IN_SPACE = (FREE_TURN,)  # in a plane nothing calls it
 
@@ -45,6 +45,7 @@ def signature_of(place: int, dimensions: int) -> Signature:
         of_step, response, turn_by_impact,
         of_step, of_step, response, turn_by_impact, of_step,
         f(record_kind(SOLVER, dimensions), i, floats(2), tuple_of(i, i, i, i)),
+        of_step,
     )[place]  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from ....framework.compilation import packed, part
 from ....framework.schedule.stages import Rows
 from ....framework.vectors import add, add_scaled, dot, length, scale, sub
 from ...codes import OK
+from ...linking.parts import JOINED_SUPPORT, call_of_step
 from ...parts.rows import owner_of
 from ...parts.stages import copy_prediction_to_parts
 from ...records import CURVES, PREDICTED
@@ -36,19 +37,17 @@ def mark_disabled(state):
 
 
 @part
-def mark_supported(state):
+def mark_supported(state, dt):
     """``warm_started`` of the bodies that contacts or joints have held and still do."""
-    memory, joints, now = state.warm_start, state.solver.joints, state.warm_start.now
+    memory, now = state.warm_start, state.warm_start.now
     inverse_mass, warm_started = state.bodies.inverse_mass, state.bodies.warm_started
     for m in range(memory.counts[now]):
         if not memory.off[m]:
             for i in (owner_of(state, memory.first[now, m]), owner_of(state, memory.second[now, m])):
                 if inverse_mass[i] > 0.0:
                     warm_started[i] = True
-    for e in range(joints.active):
-        for i in (joints.row_a[joints.order[e]], joints.row_b[joints.order[e]]):
-            if i >= 0 and inverse_mass[owner_of(state, i)] > 0.0:
-                warm_started[owner_of(state, i)] = True
+    if state.solver.joints.active > 0:
+        call_of_step(state.links[JOINED_SUPPORT], state, dt)
 
 
 @part
@@ -92,7 +91,7 @@ def predict_rest(state, dt):
     state.any_warm_started = True
     state.force_travels = 0.5 if state.path_degree > 1 else (0.0 if state.moves_with_old_velocity else 1.0)
     mark_disabled(state)
-    mark_supported(state)
+    mark_supported(state, dt)
     travels = state.force_travels
     for i in range(state.first, state.moving):
         if bodies.warm_started[i]:
