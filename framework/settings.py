@@ -149,4 +149,12 @@ def _init(self: Settings, *args: Any, **values: Any) -> None:
     _generated(self, *args, **values)
 
 
+def _set(self: Settings, name: str, value: Any) -> None:
+    _refuse_unknown({name: value})
+    raise dataclasses.FrozenInstanceError(
+        f"Settings are frozen: world.settings = world.settings.replace({name}={value!r})"
+    )
+
+
 Settings.__init__ = _init  # type: ignore[method-assign]
+Settings.__setattr__ = _set  # type: ignore[method-assign]

@@ -62,6 +62,7 @@ NEAR = {
     "plugin module": (lambda: World(Physics(dimensions=2), rotation), TypeError, "mean rotation.Rotation()?"),
     "module of a plugin": (lambda: make_world(2).add_plugin(capsule), TypeError, "did you mean capsule.plugin?"),
     "iterations": (lambda: Settings(iterations=10), TypeError, "did you mean 'substeps'"),
+    "settings": (lambda: set_to_one(make_world(2).settings, "dt"), AttributeError, "world.settings.replace(dt=1.0)"),
     "event": (lambda: make_world(2).on("contact_started", print), ValueError, "did you mean 'contact_begin'"),
     "own event": (lambda: make_world(2).on("level_up", print), ValueError, "world.events.define('level_up')"),
     "attribute": (misspelt_gravity, AttributeError, "did you mean 'gravity'"),
