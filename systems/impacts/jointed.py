@@ -10,7 +10,7 @@ from ..codes import OK
 from ..contacts.solving.rows import rotate_body
 from ..integration.turning import arms_to, velocity_by_spin
 from ..joints.groups import group_of
-from ..joints.records import POINT
+from ..joints.records import HOLD, POINT
 from ..parts.rows import owner_of, place_of
 from ..shapes.poses import advance_pose, motion_of, set_motion
 from .impulses import count_impact, deflect
@@ -51,7 +51,15 @@ def settle_group(state, i, t):
     impacts, joints, zero, group = state.impacts, state.solver.joints, zero_of(state), group_of(state, i)
     impacts.since = max(0.0, last_impact_of(state, group)) if group >= 0 else 0.0
     impacts.now = 0.5 * (impacts.since + t)
-    rows = list_answering(state, i, i)
+    rows = 0
+    for e in range(list_answering(state, i, i)):
+        j = joints.open_row[e]
+        for row in (joints.row_a[j], joints.row_b[j]):
+            if row >= 0:
+                impacts.settled[owner_of(state, row)] = impacts.settled_spin[owner_of(state, row)] = zero
+        if joints.rule[j] == HOLD:
+            joints.open_row[rows] = j
+            rows += 1
     answer(state, rows, ((i, i), (zero, zero), zero), 0.0, zero, TAKE_FLIGHT)
     for e in range(rows):
         for row in (joints.row_a[joints.open_row[e]], joints.row_b[joints.open_row[e]]):
@@ -79,14 +87,15 @@ def settle(state, sides, t):
 
 @part
 def gain_settled(state, rows, sides):
-    """Two bodies, and those of rows, gain what has settled them and what the rows push."""
-    impacts, joints = state.impacts, state.solver.joints
+    """Two bodies, and those of rows, gain what has settled them and what the rows push: all of that, or nothing."""
+    impacts, joints, zero = state.impacts, state.solver.joints, zero_of(state)
     for e in range(-1, rows):
         one, other = sides if e < 0 else (joints.row_a[joints.open_row[e]], joints.row_b[joints.open_row[e]])
         for i in (one, other):
             if i >= 0:
                 k = owner_of(state, i)
-                impacts.gained[k], impacts.gained_spin[k] = impacts.settled[k], impacts.settled_spin[k]
+                impacts.gained[k] = impacts.settled[k] if rows > 0 else zero
+                impacts.gained_spin[k] = impacts.settled_spin[k] if rows > 0 else zero
     push_rows(state, rows, joints.push)
 
 
