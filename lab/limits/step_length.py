@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...components import Collider
 from ...components.part_of import PartOf
@@ -21,8 +20,6 @@ from ...plugins.joints.kinds import KINDS
 from ..reporting.text import jsonable
 from .stability import stability_limits
 from .stiffness import modes_of, unmeasured
-
-Bools, Rows = NDArray[np.bool_], NDArray[np.int64]
 
 SAFETY = 0.9  # fraction of the limit that is suggested
 FASTEST = 200  # bodies that are compared with all others
@@ -178,13 +175,20 @@ def _first_passage(world: World) -> Passage | None:
     size, speed = columns.min_extent[:count].copy(), np.linalg.norm(bodies.linear_velocity, axis=1)
     speed[bodies.static.rows] = 0.0
     endless = np.isinf(columns.upper[:count] - columns.lower[:count]).all(axis=1)
-    counts = (services.scene.levels[0, :count] >= 0) & ~sensor & ~endless & ~np.asarray(bodies.ccd, bool)
+    parts = {part: whole_body(world._contents(), part) for part, _ in world.get_component(PartOf)}
+    body, ccd = np.array([parts.get(each, each) for each in bodies.entity.tolist()]), np.asarray(bodies.ccd, bool)
+    counts = (services.scene.levels[0, :count] >= 0) & ~sensor & ~endless & ~ccd & ~ccd[bodies.rows_of(body)]
     solid = np.flatnonzero(counts & np.isfinite(speed))
     fast = solid[np.argsort(-speed[solid], kind="stable")[:FASTEST]]
     a, dynamic = fast[:, None], rows < bodies.dynamic.rows.stop
     meet = (a != solid) & (dynamic[a] | dynamic[solid]) & (layer[a] & mask[solid] != 0) & (layer[solid] & mask[a] != 0)
     meet &= (speed[a] > 0.0) & ((group[a] != group[solid]) | (group[a] == 0))
-    _leave_out_connected(world, meet, fast, solid)
+    meet &= body[a] != body[solid]
+    for kind in (*KINDS, *world.registry.joints):  # their record is that of the last step
+        for _, joint in cast("list[tuple[int, Joint]]", world.get_component(kind)):
+            ends = [parts.get(cast(int, end), end) for end in (joint.a, joint.b)]
+            for one, other in (ends, ends[::-1]) if not joint.collide_connected else ():
+                meet[np.ix_(body[fast] == one, body[solid] == other)] = False
     if not meet.any():
         return None
     limits = np.where(meet, size[a] + size[solid], np.inf) / np.where(meet, speed[a] + speed[solid], 1.0)
@@ -192,18 +196,3 @@ def _first_passage(world: World) -> Passage | None:
     pair = np.array(sorted((fast[one], solid[other]), key=lambda row: -speed[row]))
     numbers = speed[pair].sum(), size[pair].sum(), limits[one, other]
     return Passage(*bodies.entity[pair].tolist(), *map(float, numbers))
-
-
-def _leave_out_connected(world: World, meet: Bools, a: Rows, b: Rows) -> None:
-    """Rows ``a`` (n,) and ``b`` (m,) do not ``meet`` (n, m) where they are of one body, or a joint keeps their bodies
-    apart. By the components, as the records of parts and joints are those of the last step."""
-    contents, body = world._contents(), np.array(world.bodies.entity)
-    parts = {entity: whole_body(contents, entity) for entity, _ in world.get_component(PartOf)}
-    if parts:
-        body = np.array([parts.get(entity, entity) for entity in body.tolist()])
-    meet &= body[a][:, None] != body[b]
-    for kind in (*KINDS, *world.registry.joints):
-        for _, joint in cast("list[tuple[int, Joint]]", world.get_component(kind)):
-            a_body, b_body = (parts.get(cast(int, end), end) for end in (joint.a, joint.b))
-            for one, other in ((a_body, b_body), (b_body, a_body)) if not joint.collide_connected else ():
-                meet[np.ix_(body[a] == one, body[b] == other)] = False

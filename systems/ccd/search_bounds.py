@@ -25,6 +25,7 @@ from ..integration.trajectory import (
     travel_of,
 )
 from ..linking.parts import FIRST_TOUCH, call_first_touch
+from ..parts.rows import owner_of
 from ..shapes.dispatch import restitution_of
 from ..shapes.tolerances import contact_margin, is_turning, smaller_extent, turning_travel, way_of_turning
 from .time_of_impact import APART, bounds_stay_disjoint
@@ -42,10 +43,12 @@ GIVE = 0.05  # of the extent: that much farther than its search bounds a body ma
 @inlined
 def is_swept(state, a, b, travel):
     """Whether a pair is swept that travels so far within the step."""
-    mode, bodies = state.mode, state.bodies
-    if mode == EVENT_DRIVEN:
+    bodies, swept = state.bodies, state.mode == CONTINUOUS
+    if state.mode == EVENT_DRIVEN:
         return True
-    return (mode == CONTINUOUS or bodies.ccd[a] or bodies.ccd[b]) and travel > FAST * smaller_extent(bodies, a, b)
+    for i in (a, b, owner_of(state, a), owner_of(state, b)):
+        swept |= bodies.ccd[i]
+    return swept and travel > FAST * smaller_extent(bodies, a, b)
 
 
 @part

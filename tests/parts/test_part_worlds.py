@@ -265,6 +265,21 @@ def test_forces_and_joints_at_a_part_move_the_body():
     )
 
 
+@pytest.mark.parametrize("swept", ["body", "part", "none"])
+def test_ccd_of_a_body_is_that_of_its_parts(swept):
+    """A part that has it alone is swept too; without it both may pass, and that is told."""
+    world, _ = parts_world(on_fault="ignore")
+    world.create_entity(Transform((0, 1)), BoxCollider((0.01, 0.5)))
+    moves = RigidBody(linear_velocity=(250, 0), ccd=swept == "body")
+    body = world.create_entity(Transform((-1.5, 0)), moves, SphereCollider(0.1))
+    part = world.create_entity(PartOf(body, (0, 1)), SphereCollider(0.1))
+    assert len(world.bodies) == 3
+    body_of(world, part).ccd = swept == "part"
+    world.step()
+    assert (at(world, body).x < 0.0) == (swept != "none")
+    assert any("so fast" in str(fault) for fault in world.faults) == (swept == "none")
+
+
 def test_a_joint_at_a_part_keeps_the_whole_body_from_touching():
     """And the body that the part belongs to later; what it has left touches then."""
     world, _ = parts_world()
