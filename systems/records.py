@@ -62,7 +62,11 @@ HELD_COLUMNS = Section(
     hold=vectors(default=0.0, unit="m/s^2"),  # what they gave it in the last step in which they did,
     held_velocity=vectors(default=0.0, unit="m/s"),  # and with what velocity it ended that
 )  # fmt: skip
-HIDDEN_COLUMNS = (*SLEEP_COLUMNS, *HELD_COLUMNS)
+DAMPING_COLUMNS = Section(
+    "body", "the table", "linear_damping and what a plugin adds to it; the same array if none does",
+    total_damping=floats(default=0.0, unit="1/s"),
+)  # fmt: skip
+HIDDEN_COLUMNS = (*SLEEP_COLUMNS, *HELD_COLUMNS, *DAMPING_COLUMNS)
 
 # Columns of the bodies that are made within a step or when rows have moved.
 START_COLUMNS = Section(
@@ -163,7 +167,7 @@ def all_rows(state):
 BODY_COLUMNS = tuple(name for section in BODY_SECTIONS for name in section)
 
 BODIES = Schema(
-    "Bodies", *TABLE_SECTIONS, SLEEP_COLUMNS, HELD_COLUMNS, *BODY_SECTIONS,
+    "Bodies", *TABLE_SECTIONS, SLEEP_COLUMNS, HELD_COLUMNS, DAMPING_COLUMNS, *BODY_SECTIONS,
     Section(
         "body", "rotation", "some body is rotated, or a shape reads its axes",
         axes=floats(unit="1"),  # rotation matrices (n, d, d), flat,

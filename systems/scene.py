@@ -19,6 +19,7 @@ from .records import (
     BODY_COLUMNS,
     COLLIDERS,
     COLLISIONS,
+    DAMPING_COLUMNS,
     HELD_COLUMNS,
     HIDDEN_COLUMNS,
     SLEEP_COLUMNS,
@@ -240,6 +241,7 @@ class Scene:
         for name in TABLE_COLUMNS:
             if name in table.arrays:
                 setattr(bodies, name, table.arrays[name])
+        bodies.total_damping = bodies.linear_damping
         for name in HIDDEN_COLUMNS:
             if f"_{name}" in table.arrays:
                 setattr(bodies, name, table.arrays[f"_{name}"])
@@ -511,6 +513,6 @@ def make_table(dimensions: int) -> Table:
     table.add_array("torque", "angular", on_demand=True)
     table.add_array("inverse_mass")
     table.add_array(STOPS, dtype=np.int8, on_demand=True)
-    for name, column in (*SLEEP_COLUMNS.fields.items(), *HELD_COLUMNS.fields.items()):
+    for name, column in (*SLEEP_COLUMNS.fields.items(), *HELD_COLUMNS.fields.items(), *DAMPING_COLUMNS.fields.items()):
         table.add_array(f"_{name}", column.item, dtype=column.dtype, on_demand=True)
     return table

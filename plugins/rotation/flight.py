@@ -81,6 +81,8 @@ def at_most(w, most):
 def torque_on(state, spin, turns, i, k):
     """Along one axis."""
     torque, given = spin.constant_torque[i, k] + spin.applied_torque[i, k] + spin.step_torque[i, k], turns.torque
+    if len(turns.lifting) > 0:
+        torque += turns.lifting[i, k]
     if len(given) == 0:
         return torque
     return torque + given[i if is_plane(state) else 3 * i + k]

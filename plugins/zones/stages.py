@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+import math
 
 from ...components.spin import Spin
 from ...framework import Plugin
@@ -12,9 +13,11 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.records.schema import Schema, floats, integer, ints, table, vectors
 from ...framework.vectors import add, add_scaled, item, length, replace, scale, sub
 from ...systems.integration.stages import phi1
+from ...systems.integration.turns import TURNS
 from ...systems.narrow_phase.stages import layers_meet
 from ...systems.parts.rows import owner_of
 from ...systems.shapes.dispatch import evaluate, half_extents, write_rotated
+from ...systems.shapes.quaternions import write_axes
 from ...systems.shapes.surfaces import along_world
 from .components import Field, Water, Wind
 from .displacement import submerged
@@ -22,11 +25,11 @@ from .displacement import submerged
 acting = Plugin("zones")
 
 # By row of the bodies: whether this zone has acted on it; of all water that it is in the mass that it displaces, the
-# rate at which that slows it, and the flow times that rate. torque: about its position, three numbers, the last one in
-# a plane. step: of these.
+# rate at which that slows it, that at the start of the step, and the flow times the rate. torque: about its position,
+# three numbers, of which a plane uses the first. sums: of this step's forces so far.
 ZONES = Schema(
-    "Zones", seen=ints(), displaced=floats(unit="kg"), rate=floats(unit="1/s"), flow=vectors(unit="m/s^2"),
-    torque=table("float64", 3, unit="N m"), step=integer(),
+    "Zones", seen=ints(), displaced=floats(unit="kg"), rate=floats(unit="1/s"), first_rate=floats(unit="1/s"),
+    flow=vectors(unit="m/s^2"), torque=table("float64", 3, unit="N m"), sums=integer(),
 )  # fmt: skip
 PLACES = "position", "quarantined", "levels", "shapes", "offset", "rotation", "sensor", "layer", "mask", "group"
 
@@ -34,8 +37,14 @@ PLACES = "position", "quarantined", "levels", "shapes", "offset", "rotation", "s
 @part
 def has_room(state, zones):
     """Whether there are rows for all bodies; else they are made, and the stage runs again."""
-    rows = min(len(zones.seen), len(zones.displaced), len(zones.rate), len(zones.flow), len(zones.torque))
-    return rows >= state.count
+    rows = min(len(zones.displaced), len(zones.rate), len(zones.first_rate), len(zones.flow), len(zones.torque))
+    return min(rows, len(zones.seen)) >= state.count
+
+
+@part
+def has_lifted(state, zones):
+    """Whether water has acted in this step."""
+    return zones.sums > 0 and has_room(state, zones)
 
 
 @part
@@ -45,11 +54,12 @@ def centre_of(state, i):
 
 @part
 def follow(state, i):
-    """The shape of row i is as it is turned at this moment: the broad phase comes after the flight."""
+    """The shape of row i is as it is turned at this moment, perhaps within the step: the broad phase comes after it."""
     bodies, shape = state.bodies, state.bodies.shape[i]
     if shape >= 0:
         at = state.colliders.offset[state.shapes.slots[shape], i]
         if state.rotated:
+            write_axes(state, i)
             at = along_world(state, i, at)
             write_rotated(state, shape, i, state.rotated)
         bodies.offset[i] = at
@@ -167,6 +177,16 @@ Surface = collections.namedtuple("Surface", "zone half up top bottom gravity")
 
 
 @part
+def surface_of(state, j, up, gravity):
+    """Of the zone in row j. What has no end upwards is an open sea, level with its centre."""
+    half, centre, height, reach = half_extents(state, state.bodies.shape[j], j), centre_of(state, j), 0.0, 0.0
+    for k in range(len(half)):
+        height += item(centre, k) * up[k]
+        reach += item(half, k) * abs(up[k]) if up[k] != 0.0 else 0.0
+    return Surface(j, half, up, height + reach if reach < math.inf else height, height - reach, gravity)
+
+
+@part
 def add_water(state, water, zones, i, surface):
     """What a body displaces of a zone, and how that turns it."""
     bodies, o = state.bodies, owner_of(state, i)
@@ -182,24 +202,56 @@ def add_water(state, water, zones, i, surface):
     lift, last = surface.gravity * mass * bodies.gravity_scale[o], len(arm) - 1
     x, y = middle[0] + item(arm, 0), middle[1] + item(arm, 1)
     z = middle[2] + (item(arm, last) if last == 2 else 0.0)
-    zones.torque[o, 0] += lift * (y * up[2] - z * up[1])
-    zones.torque[o, 1] += lift * (z * up[0] - x * up[2])
-    zones.torque[o, 2] += lift * (x * up[1] - y * up[0])
+    if last == 1:
+        zones.torque[o, 0] += lift * (x * up[1] - y * up[0])
+    else:
+        zones.torque[o, 0] += lift * (y * up[2] - z * up[1])
+        zones.torque[o, 1] += lift * (z * up[0] - x * up[2])
+        zones.torque[o, 2] += lift * (x * up[1] - y * up[0])
+
+
+@part
+def forget_torques(turns):
+    for i in range(len(turns.lifting)):
+        turns.lifting[i, 0] = turns.lifting[i, 1] = turns.lifting[i, 2] = 0.0
+
+
+@acting.stage(after="limit_velocities", records=(ZONES, TURNS), needed="dynamic bodies")
+def begin_water(state, dt, zones, turns):
+    """water has not acted in this step"""
+    zones.sums = 0
+    forget_torques(turns)
+
+
+@part
+def drag_on(state, dt, zones, i):
+    """The acceleration by drag, beside what the integrator makes of ``first_rate`` as of damping: the flow, and what
+    the rate has changed by since. In an event-driven world, where damping is a kick, all of it, as at the start.
+
+    Changes are slowed by themselves, so that none throws the body back.
+    """
+    bodies, rate, first = state.bodies, zones.rate[i], zones.first_rate[i]
+    v, change, drawn = bodies.linear_velocity[i], rate - first, zones.flow[i]
+    if change != 0.0 and rate > 0.0:
+        drawn = scale(drawn, (first + change * phi1(-abs(change) * dt)) / rate)
+    drawn = add_scaled(drawn, v, -change * phi1(-abs(change) * dt))
+    return add_scaled(drawn, bodies.start_velocity[i] if zones.sums > 1 else v, -first) if state.flies else drawn
 
 
 @acting.stage(
     after="sum_forces", records=(Water, ZONES),
     reads=(
-        *PLACES, "linear_velocity", "mass", "gravity_scale", "water.density", "water.drag", "water.flow",
+        *PLACES, "linear_velocity", "start_velocity", "mass", "gravity_scale", "water.density", "water.drag",
+        "water.flow",
     ),
     writes=("force",), needed="colliders",
 )  # fmt: skip
 def lift(state, dt, water, zones):
-    """water lifts the bodies in it, and slows them"""
+    """water lifts the bodies in it, and draws them along"""
     bodies, nothing = state.bodies, zero_of(state)
     if not has_room(state, zones):
         return state.count
-    zones.step = state.step_number
+    zones.sums += 1
     for i in range(state.force_first, state.dynamic):
         zones.displaced[i], zones.rate[i], zones.flow[i] = 0.0, 0.0, nothing
         zones.torque[i, 0] = zones.torque[i, 1] = zones.torque[i, 2] = 0.0
@@ -207,35 +259,99 @@ def lift(state, dt, water, zones):
     for j in range(begin_zones(state)):
         if not (water.present[j] and is_zone(state, j)):
             continue
-        half, centre, height, reach = half_extents(state, bodies.shape[j], j), centre_of(state, j), 0.0, 0.0
-        for k in range(len(half)):
-            height, reach = height + item(centre, k) * up[k], reach + item(half, k) * abs(up[k])
+        surface = surface_of(state, j, up, g)
         for i in range(state.force_first, state.dynamic):
             o = owner_of(state, i)
-            if state.force_first <= o < state.dynamic and is_in(state, j, half, i):
-                add_water(state, water, zones, i, Surface(j, half, up, height + reach, height - reach, g))
+            if state.force_first <= o < state.dynamic and is_in(state, j, surface.half, i):
+                add_water(state, water, zones, i, surface)
     for i in range(state.force_first, state.dynamic):
-        if zones.displaced[i] > 0.0:
+        if zones.sums == 1:
+            zones.first_rate[i] = zones.rate[i]
+        if zones.displaced[i] > 0.0 or zones.first_rate[i] > 0.0:
             force, by = bodies.force[i], g * zones.displaced[i] * bodies.gravity_scale[i]
             for k in range(len(force)):
                 force = replace(force, k, item(force, k) + by * up[k])
-            drawn = sub(zones.flow[i], scale(bodies.linear_velocity[i], zones.rate[i]))
-            bodies.force[i] = scale(add_scaled(force, drawn, bodies.mass[i]), phi1(-zones.rate[i] * dt))
+            bodies.force[i] = add_scaled(force, drag_on(state, dt, zones, i), bodies.mass[i])
     return state.count
+
+
+@acting.stage(after="sum_forces", records=(ZONES, TURNS), needed="dynamic bodies")
+def turn_by_lift(state, dt, zones, turns):
+    """what floats rights itself"""
+    for i in range(state.force_first, state.dynamic if has_lifted(state, zones) and len(turns.lifting) > 0 else 0):
+        for k in range(3):
+            turns.lifting[i, k] = zones.torque[i, k]
+
+
+@part
+def braked_share(state, dt, zones, i):
+    """Of an impulse that acts throughout the step, what is left of it at the end, after drag and damping."""
+    own, rate = state.bodies.linear_damping[i], zones.first_rate[i]
+    return phi1(-rate * dt) * exp(-0.5 * own * dt) if state.flies else phi1(-(own + rate) * dt)
+
+
+@acting.stage(
+    after="keep_start", records=(ZONES,), reads=("linear_damping",), writes=("total_damping", "inverse_mass"),
+    needed="dynamic bodies",
+)  # fmt: skip
+def brake(state, dt, zones):
+    """water slows what it is around, as damping does"""
+    bodies, wet = state.bodies, has_lifted(state, zones)
+    for i in range(state.first, state.dynamic):
+        rate = zones.first_rate[i] if wet else 0.0
+        if state.flies and rate > 0.0:
+            bodies.inverse_mass[i] *= phi1(-rate * dt)
+            rate = 0.0
+        bodies.total_damping[i] = bodies.linear_damping[i] + rate
+
+
+@part
+def weigh_dry(state):
+    """1 / mass as it was before ``brake``."""
+    bodies = state.bodies
+    for i in range(state.first, state.dynamic):
+        o = owner_of(state, i)
+        if bodies.inverse_mass[i] > 0.0 and state.first <= o < state.dynamic:
+            bodies.inverse_mass[i] = 1.0 / bodies.mass[o]
+
+
+@acting.stage(before="end_flight", records=(ZONES,), reads=("mass",), writes=("inverse_mass",), needed="colliders")
+def leave_water(state, dt, zones):
+    """impacts are too short for drag"""
+    if has_lifted(state, zones) and state.flies:
+        weigh_dry(state)
+
+
+@acting.stage(
+    before="gather", records=(ZONES,), reads=("linear_damping",), writes=("inverse_mass",), needed="colliders"
+)
+def weigh_wet(state, dt, zones):
+    """contacts and joints push throughout the step, and drag slows what they do: as much as what forces do"""
+    bodies = state.bodies
+    for i in range(state.first, state.dynamic if has_lifted(state, zones) else 0):
+        o = owner_of(state, i)
+        if state.first <= o < state.dynamic and zones.first_rate[o] > 0.0:
+            bodies.inverse_mass[i] *= braked_share(state, dt, zones, o)
+
+
+@acting.stage(after="put_back", records=(ZONES, TURNS), reads=("mass",), writes=("inverse_mass",), needed="colliders")
+def end_water(state, dt, zones, turns):
+    """1 / mass again; what floats at rest may sleep"""
+    if has_lifted(state, zones):
+        weigh_dry(state)
+        forget_torques(turns)
 
 
 @acting.stage(
     after="keep_start", records=(Spin, ZONES), reads=("sleep_state", "quarantined"),
-    writes=("spin.step_torque", "spin.angular_velocity"), needed="colliders",
+    writes=("spin.angular_velocity",), needed="colliders",
 )  # fmt: skip
 def turn_in_water(state, dt, spin, zones):
-    """water turns the bodies that float in it, and slows that"""
+    """water slows the turning of the bodies that float in it"""
     bodies, plane = state.bodies, len(zero_of(state)) == 2
-    wet = zones.step == state.step_number and has_room(state, zones)
-    for i in range(state.first, state.dynamic if wet else 0):
-        if not spin.present[i] or bodies.sleep_state[i] > 0 or bodies.quarantined[i] or zones.displaced[i] == 0.0:
+    for i in range(state.first, state.dynamic if has_lifted(state, zones) else 0):
+        if not spin.present[i] or bodies.sleep_state[i] > 0 or bodies.quarantined[i] or zones.first_rate[i] == 0.0:
             continue
-        decay = exp(-zones.rate[i] * dt)
+        decay = exp(-zones.first_rate[i] * dt)
         for k in range(1 if plane else 3):
-            spin.step_torque[i, k] += zones.torque[i, 2 if plane else k]
             spin.angular_velocity[i, k] *= decay

@@ -15,7 +15,7 @@ from ...framework.jit.records.record import Record
 from ...framework.schedule.phases import ForceSystem, Phase
 from ...framework.schedule.plan import PlannedKernel
 from ...framework.schedule.stages import Program, PythonPart, Rows, Stage, asked
-from ..parts.stages import carry_forces
+from ..parts.stages import begin_parts, carry_forces
 from ..sleeping.stages import AWAKE
 from ..stage_system import StagedSystem
 from .stages import limit_velocities, sum_forces
@@ -80,6 +80,8 @@ class ForceAccumulation(StagedSystem):
 
     def evaluate(self, time: float) -> None:
         """Sum all forces at the state in the columns; ``time`` in seconds."""
+        if self._state.has_parts:
+            self._program.run_one(begin_parts.__name__, self.world.settings.dt)
         self._program.run_span(sum_forces.__name__, self.world.settings.dt)
         self.add_systems(time)
         if self._state.has_parts:

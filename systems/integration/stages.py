@@ -104,7 +104,7 @@ def is_near_origin(x, v):
 def any_damping(state):
     """Whether any dynamic body is damped."""
     bodies = state.bodies
-    damping, out, damped = bodies.linear_damping, bodies.quarantined, False
+    damping, out, damped = bodies.total_damping, bodies.quarantined, False
     for i in range(state.first, state.dynamic if len(damping) > 0 else 0):
         damped |= (damping[i] != 0.0) & (not out[i])
     return damped
@@ -136,7 +136,7 @@ def euler(state, h, with_new_velocity):
         return 0
     bodies, dynamic = state.bodies, state.dynamic
     position, velocity, force = bodies.position, bodies.linear_velocity, bodies.force
-    inverse_mass, damping = bodies.inverse_mass, bodies.linear_damping
+    inverse_mass, damping = bodies.inverse_mass, bodies.total_damping
     damped, usual = any_damping(state), True
     for i in range(dynamic if damped else state.first, dynamic):  # no exponentials and no branches in this loop
         old = velocity[i]
@@ -175,7 +175,7 @@ def verlet_drift(state, h):
         return 0
     bodies, light_h, keep = state.bodies, h, state.force_changes
     position, velocity, force = bodies.position, bodies.linear_velocity, bodies.force
-    damping, acceleration = bodies.linear_damping, bodies.acceleration
+    damping, acceleration = bodies.total_damping, bodies.acceleration
     for i in range(state.first, state.dynamic):
         c = damping[i]
         h = light_h if c <= state.heavy_damping else state.heavy_step
@@ -204,7 +204,7 @@ def kick_gain(z, h):
 def verlet_kick(state, h):
     """The second half: the mean of both accelerations instead of the first."""
     bodies, light_h = state.bodies, h
-    velocity, force, damping = bodies.linear_velocity, bodies.force, bodies.linear_damping
+    velocity, force, damping = bodies.linear_velocity, bodies.force, bodies.total_damping
     for i in range(state.first, state.dynamic):
         h = light_h if damping[i] <= state.heavy_damping else state.heavy_step
         gain = kick_gain(-damping[i] * h, h)
@@ -236,7 +236,7 @@ def runge_kutta_stage(state, h):
     x0, v0 = bodies.previous_position, bodies.start_velocity
     first, middle, speeds, kicks = bodies.acceleration, bodies.rk_middle, bodies.rk_speeds, bodies.rk_kicks
     for i in range(state.first, state.dynamic):
-        f1, f2, f3, decay, half_decay, half_gain = runge_kutta_weights(-bodies.linear_damping[i] * h)
+        f1, f2, f3, decay, half_decay, half_gain = runge_kutta_weights(-bodies.total_damping[i] * h)
         a, v = scale(bodies.force[i], bodies.inverse_mass[i]), velocity[i]
         if stage == 0:
             first[i], speeds[i], kicks[i] = a, v, scale(a, f1)
@@ -264,7 +264,7 @@ def first_half_kick(state, h):
     if state.drifted:
         return 0
     bodies, damped = state.bodies, False
-    position, velocity, damping = bodies.position, bodies.linear_velocity, bodies.linear_damping
+    position, velocity, damping = bodies.position, bodies.linear_velocity, bodies.total_damping
     for i in range(state.first, state.dynamic):
         decay = 1.0
         if damping[i] != 0.0:
@@ -283,7 +283,7 @@ def second_half_kick(state, h):
     bodies = state.bodies
     if state.drifted or not (state.force_changes or state.damped):
         return 0
-    velocity, force, damping = bodies.linear_velocity, bodies.force, bodies.linear_damping
+    velocity, force, damping = bodies.linear_velocity, bodies.force, bodies.total_damping
     for i in range(state.first, state.dynamic):
         decay = exp(-0.5 * damping[i] * h) if damping[i] != 0.0 else 1.0
         change = sub(scale(scale(force[i], 0.5), bodies.inverse_mass[i]), bodies.acceleration[i])

@@ -16,6 +16,7 @@ from ...framework.schedule.plan import PlannedKernel, kernels_of
 from ...framework.schedule.stages import Program, PythonPart, Rows, Stage
 from ...framework.world.world import World
 from ..forces.accumulation import ForceAccumulation
+from ..forces.stages import sum_forces
 from ..joints.bodies import begin_joints
 from ..parts.stages import carry_forces, move_parts
 from ..records import COLLISIONS, SPINS, all_rows
@@ -40,20 +41,20 @@ from .stages import (
     verlet_drift,
     verlet_kick,
 )
-from .turns import ROTATION_COLUMNS
+from .turns import ROTATION_COLUMNS, TURNS
 
 STANDARD = frozenset((*STANDARD_INTEGRATORS.values(), Flight))
 ON_WAY = "runge_kutta_stage"  # stages of plugins next to it turn bodies beside all that an integrator calls
-TURNS_BESIDE = "turns bodies beside each stage of the integrator: force systems give torques"
+TURNS_BESIDE = "turns bodies beside each stage of the integrator: forces give torques"
 FLIES = "free flight of the bodies that forces move, unless nothing acts and none is damped"
 MOTION = ("position", "linear_velocity")
-FORCED = (*MOTION, "force", "inverse_mass", "linear_damping")
+FORCED = (*MOTION, "force", "inverse_mass", "total_damping")
 
 
 class Integration(StagedSystem):
     """Writes the free-flight prediction into position and linear_velocity and keeps the start state.
 
-    Reads force, inverse_mass, linear_damping; writes position, linear_velocity, previous_position and the path that
+    Reads force, inverse_mass, total_damping; writes position, linear_velocity, previous_position and the path that
     the bodies take within the step.
     """
 
@@ -177,6 +178,8 @@ class Integration(StagedSystem):
         if type(integrator) in STANDARD and (state.flies or state.force_changes):
             self._scene.reserve(*integrator.COLUMNS)
         self.turns.within, self.turns.torque = False, np.empty(0)
+        if self._stages_turn():
+            self.turns.reserve(self._scene.table.capacity, "lifting")
 
     # -- a step -----------------------------------------------------------------------------------
 
@@ -213,29 +216,35 @@ class Integration(StagedSystem):
         table.make("force")
         table.make("linear_damping")
         table.lend("linear_damping", False)
-        names = ("position", "linear_velocity", "force", "inverse_mass", "linear_damping")
+        names = ("position", "linear_velocity", "force", "inverse_mass", "total_damping")
         names += ("previous_position", "start_velocity")
         self._motion = Motion(*(getattr(bodies, name)[first:dynamic] for name in names), None, self._program)
         self._viewed = self._scene.version, first
 
+    def _stages_turn(self) -> bool:
+        """Whether stages of plugins give torques with their forces."""
+        stages = self._registry.stages.values()
+        return any(stage.anchor == sum_forces.__name__ and TURNS in stage.schemas for stage in stages)
+
     def _turning(self) -> list[str]:
         """Names of the stages that turn bodies beside those of the integrator: of a built-in one that evaluates torques
-        several times, if force systems give any."""
+        several times, if force systems or stages of plugins give any."""
         integrator = self.integrator
-        if type(integrator) not in STANDARD or integrator.evaluations == 1 or not self._forces.kind()[1]:
+        if type(integrator) not in STANDARD or integrator.evaluations == 1:
+            return []
+        if not (self._forces.kind()[1] or self._stages_turn()):
             return []
         return [stage.name for stage in self._program.stages if stage.plugin and stage.anchor == ON_WAY]
 
     def _take_torques(self, motion: Motion) -> np.ndarray | None:
         """The column of those of force systems, if any gives some."""
-        motion.turn = None
-        if not self._forces.kind()[1]:
-            return None
-        turns, torque, turning = self.turns, self._scene.table.make("torque"), self._turning()
-        turns.torque = torque.reshape(-1)
+        motion.turn, table, turns, turning, torque = None, self._scene.table, self.turns, self._turning(), None
+        if self._forces.kind()[1]:
+            torque = table.make("torque")
+            turns.torque = torque.reshape(-1)
         turns.within = bool(turning)
         if turning:
-            turns.reserve(len(torque), *ROTATION_COLUMNS)
+            turns.reserve(table.capacity, *ROTATION_COLUMNS)
             turns.begins = True
             motion.turn = functools.partial(self._turn, turning)
         return torque

@@ -18,7 +18,7 @@ from ...framework.plugins.registry import PluginStage, Registry
 from ...framework.schedule.stages import Program, Stage
 from ..joints.records import JOINTS
 from ..parts.records import PARTS
-from ..records import BODY_COLUMNS
+from ..records import BODY_COLUMNS, DAMPING_COLUMNS
 from ..scene import Scene
 from ..stage_list import MADE_AGAIN
 from .compiled import PRESENT, own_schema, visible_columns
@@ -97,6 +97,8 @@ class PluginStages:
                 table.make(name)
             elif name in BODY_COLUMNS:
                 self._scene.reserve(name)
+            elif name in DAMPING_COLUMNS:
+                self._scene.make(name)
         for stage, own in self._own.items():
             addresses[program.index[stage.name]] = own.address
             for source, name in zip(stage.records, own.schema.fields, strict=True):
