@@ -24,7 +24,8 @@ class Rollback:
 
     As long as an input is not known, the last one of that player is taken for it. When it comes, and is another, the
     world goes back to its frame and is stepped forward again in the next :meth:`step` or :meth:`settle`. The worlds of
-    all players then have the same bits, if the world holds all state of the game.
+    all players then have the same bits, if the world holds all state of the game. If a step or ``apply`` raises, the
+    world is as it was before that frame, which the next call plays.
 
     world
         the World; nothing else may step it
@@ -54,6 +55,7 @@ class Rollback:
         self._snapshots: dict[int, Snapshot] = {}  # before each frame that is not confirmed
         self._hashes: dict[int, str] = {}
         self._wrong: int | None = None  # the first frame with a guess that was wrong
+        self._reached = 0  # the frame to play again up to
 
     def inputs(self, player: int) -> list[Any]:
         """All inputs of a player that are known, from frame 0 on; not to be changed. ValueError if there is no such
@@ -97,24 +99,30 @@ class Rollback:
         return True
 
     def settle(self) -> None:
-        """Play again what was played with wrong guesses."""
-        if self._wrong is None:
-            return
-        now, self.frame, self._wrong = self.frame, self._wrong, None
-        self.world.restore(self._snapshots[self.frame])
-        self.replayed += now - self.frame
-        while self.frame < now:
+        """Play again what was played with wrong guesses; what raises is played once more by the next call."""
+        if self._wrong is not None:
+            self.world.restore(self._snapshots[self._wrong])
+            self._reached = max(self._reached, self.frame)
+            self._used = {frame: used for frame, used in self._used.items() if frame < self._wrong}
+            self.frame, self._wrong = self._wrong, None
+        while self.frame < self._reached:
             self._play()
+            self.replayed += 1
 
     def _play(self) -> None:
         frame, confirmed = self.frame, self.confirmed
         if frame % CHECKED == 0:
             self._hashes[frame] = self.world.state_hash()
+        before = self.world.snapshot()
         if frame >= confirmed:  # else nothing leads back to here
-            self._snapshots[frame] = self.world.snapshot()
+            self._snapshots[frame] = before
         used = [known[frame] if frame < len(known) else known[-1] if known else self._idle for known in self._inputs]
-        self._apply(used)
-        self.world.step()
+        try:
+            self._apply(used)
+            self.world.step()
+        except BaseException:
+            self.world.restore(before)  # of a step that fails the inputs are not undone
+            raise
         self._used[frame] = used
         self.frame += 1
         for kept, oldest in (

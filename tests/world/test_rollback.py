@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from carom import AABBCollider, Physics, RigidBody, Rollback, SphereCollider, Transform, World
+from carom import (
+    AABBCollider,
+    Physics,
+    RigidBody,
+    Rollback,
+    SphereCollider,
+    StepError,
+    System,
+    Transform,
+    World,
+)
 
 
 def game():
@@ -86,6 +96,52 @@ def test_worlds_that_differ_are_found_out():
 
 
 @pytest.mark.plain
+@pytest.mark.plain
+@pytest.mark.parametrize("where", ["apply", "step"])
+@pytest.mark.parametrize("at", [0, 3, 4, 7])
+def test_what_raises_is_played_once_more(where, at):
+    """Inputs act once, made bodies are made once, and no frame gets lost, in frames that are played again as well."""
+    errors = []
+
+    class Fails(System):
+        def process(self, dt):
+            if where == "step" and errors and world.step_count == errors[0]:
+                errors.clear()
+                raise RuntimeError("once")
+
+    def apply(inputs):
+        world.component_for_entity(body, RigidBody).apply_impulse((sum(inputs), 0))
+        if inputs[1] == 2:
+            world.create_entity(Transform((0, 9)), RigidBody())
+        if where == "apply" and errors and world.step_count == errors[0]:
+            errors.clear()
+            raise RuntimeError("once")
+
+    def play(call):
+        try:
+            call()
+        except (StepError, RuntimeError):
+            call()
+
+    found = []
+    for failing in (False, True):
+        world = World(Physics(2))
+        world.add_system(Fails())
+        body = world.create_entity(Transform((0, 0)), RigidBody())
+        rollback = Rollback(world, apply)
+        for again in (False, True):  # all as guessed; then with what has come late
+            errors[:] = [at] if failing else []
+            if again:
+                rollback.give(1, 0, [0, 0, 1, 2, 1, 0, 0, 0])
+                play(rollback.settle)
+            for frame in () if again else range(8):
+                rollback.give(0, frame, [1])
+                play(rollback.step)
+            found.append((rollback.frame, world.step_count, len(world.bodies), world.state_hash()))
+        assert not errors or at < 2
+    assert found[:2] == found[2:]
+
+
 def test_it_waits_for_the_slowest_and_ignores_gaps():
     world, apply = game()
     rollback = Rollback(world, apply, most=3)
