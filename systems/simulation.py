@@ -179,7 +179,7 @@ class Simulation:
         self.table.in_step = True
         sleepers = self.sleepers
         if sleepers.on:
-            sleepers.kept = None
+            sleepers.kept, sleepers.before = None, sleepers.followed
         self._follow(others_write)
         if sleepers.on:
             sleepers.begin_step()
@@ -322,6 +322,7 @@ class Simulation:
         if state.kept:
             state.warm_start.now, state.contacts.now = state.warm_start.before, state.contacts.before
         self.contacts.forget_step(state.step_number)
+        table.static_version += 1
         self.sleepers.abandon_step()
         state.moved = state.forces_summed = state.found_current = False
         state.kept = 0
@@ -332,7 +333,6 @@ class Simulation:
         if len(bodies.place):
             bodies.place[:] = -1
         restart(table, slice(0, table.count), ("rotation",))
-        table.static_version += 1
         self.queries.forget()
         table.in_step = False
 

@@ -49,7 +49,8 @@ class Sleepers:
         self.impulses = Stored(state.warm_start, IMPULSE_COLUMNS, WARM_START_ROWS)
         self._dt = 1.0  # s, of the step that the impulses are of
         self.links = self.sizes = np.empty((0, 2), np.int64)
-        self._followed: Any = None  # the structure that all this is of
+        self.followed: Any = None  # the structure that all this is of,
+        self.before: Any = None  # and what it was of before this step
         self._seen = -1
         self._box_now = box_now  # makes the boxes of all bodies where they are at this moment
         self._changes: list[list[float]] = []  # boxes in which shapes have changed: what sleeps near them wakes
@@ -85,7 +86,7 @@ class Sleepers:
         if seen != self._seen:
             self._scene.reserve(*SLEEPING)
             structure = self._structure()
-            if structure != self._followed:
+            if structure != self.followed:
                 self._follow(structure)
             self._seen = seen
             fresh = bool(words[self._asleep]) and (self._still()[table.stops[1] :] == AWAKE).any()
@@ -108,11 +109,11 @@ class Sleepers:
         if state.due < 0:
             self._all_wake, state.due = True, 0
         elif self._words[self._due]:
-            self._followed = self._structure()
+            self.followed = self._structure()
             self.links = links_with_falling(state, self.links)
         if state.due or (state.first == 0 and (state.asleep or table.blocks[0])):
             table.group_sleepers(self._still()[: table.stops[0]] == ASLEEP)
-            self._followed = self._structure()
+            self.followed = self._structure()
             self._exposed.take(np.flatnonzero(self._still() > AWAKE))
         self.on = state.sleeping or self._all_wake
         table.on_written = self._mark_row if self.on else None
@@ -160,7 +161,7 @@ class Sleepers:
 
     def _follow(self, structure: tuple[int, ...]) -> None:
         """Bodies have come, gone or changed: what was about to sleep does not; islands that miss something wake."""
-        before, self._followed = self._followed, structure
+        before, self.followed = self.followed, structure
         if self._state.due:
             self._keep()
             falling = np.flatnonzero(self._still() == FALLING_ASLEEP)
@@ -377,7 +378,7 @@ class Sleepers:
             names = [name for name in ("sleep_state", "rest_steps", "island") if len(getattr(bodies, name))]
             self.kept = (
                 {name: getattr(bodies, name)[:count].copy() for name in names},
-                self._saved_parts(), self._followed, self._all_wake,
+                self._saved_parts(), self._all_wake,
                 saved_rows(state.warm_start, WARM_START_NUMBERS), saved_rows(state.contacts, CONTACT_NUMBERS),
             )  # fmt: skip
 
@@ -389,9 +390,11 @@ class Sleepers:
         if state.first < state.kept_first and not state.others_write:  # woken within the step
             bodies.position[left_out] = bodies.previous_position[left_out] = bodies.rest_position[left_out]
             bodies.linear_velocity[left_out] = 0.0
+        # Static bodies are to be read again, but none has gone; who had when the step began is followed once more.
+        self.followed = self._structure() if self.before == self.followed else self.before
         if self.kept is None:
             return
-        (columns, parts, self._followed, all_wake, impulses, contacts), self.kept, self._seen = self.kept, None, -1
+        (columns, parts, all_wake, impulses, contacts), self.kept, self._seen = self.kept, None, -1
         self._all_wake = self.on = self._all_wake or all_wake
         self.on |= state.sleeping
         for name, column in columns.items():
@@ -427,7 +430,7 @@ class Sleepers:
         if not self.on:
             return None
         self.notice_written()
-        followed = self._structure() == self._followed
+        followed = self._structure() == self.followed
         more = {"changes": list(self._changes)} if self._changes else {}
         seen = self._versions() == self._seen
         return {**self._saved_parts(), "followed": followed, "seen": seen, "all_wake": self._all_wake, **more}
@@ -435,7 +438,7 @@ class Sleepers:
     def take_back(self, saved: Any) -> None:
         """The table is what it was then; if this world does not sleep, all of them wake."""
         state = self._state
-        self.kept, self._followed, self._seen = None, None, -1
+        self.kept, self.followed, self._seen = None, None, -1
         self._leave_out(0)
         self._placed, self._disturbed, self._pushed = None, bool((self._still() == WAKING).any()), True
         self._exposed.take(np.flatnonzero(self._still() > AWAKE))
@@ -450,7 +453,7 @@ class Sleepers:
         self._all_wake = saved["all_wake"] or not state.sleeping
         self.on = state.sleeping or self._all_wake
         if saved["followed"]:
-            self._followed = self._structure()
+            self.followed = self._structure()
         if saved["seen"]:
             self._scene.reserve(*SLEEPING)
             self._seen = self._versions()

@@ -6,10 +6,10 @@ import pickle
 
 import pytest
 from contacts.helpers_sleeping import CAUSES, GRAVITY, is_asleep, sleep, sleeping_tower, sleepy_world, tower, two_towers
-from worlds import ball, floor, run
+from worlds import Calls, ball, floor, run
 
 from carom.components import RigidBody, Transform
-from carom.framework import Phase, Settings, System, World
+from carom.framework import Phase, Settings, StepError, System, World
 from carom.plugins import Physics, convex_polygon
 from carom.plugins.springs import Springs
 
@@ -169,3 +169,37 @@ def test_turned_off_a_failed_step_puts_nobody_back_to_sleep(fails):
     assert not any(is_asleep(world, *boxes))
     assert len(world.contacts) == 3
     assert len(world.contacts.begin) == len(world.contacts.end) == 0
+
+
+@pytest.mark.parametrize("cause", ["", "delete", "impulse"])
+def test_a_step_that_fails_around_falling_asleep_is_taken_again_to_the_bit(cause):
+    """Whichever of the steps fails, before, in and after the one in which the tower falls asleep."""
+
+    def play(failing=None):
+        world, found = sleepy_world(), []
+        boxes = tower(world, 0.0)
+        state = {"on": False}
+
+        def fail():
+            if state["on"]:
+                raise RuntimeError("once")
+
+        world.add_system(Calls(Phase.END, fail))
+        for k in range(60):
+            if k == 50 and cause == "delete":
+                world.delete_entity(boxes[-1])
+            elif k == 50 and cause == "impulse":
+                world.component_for_entity(boxes[0], RigidBody).apply_impulse((0.5, 0.0))
+            if k == failing:
+                state["on"] = True
+                with pytest.raises(StepError):
+                    world.step()
+                state["on"] = False
+            world.step()
+            found.append((world.state_hash(), is_asleep(world, boxes[0])))
+        return found
+
+    expected = play()
+    first = next(k for k, (_, asleep) in enumerate(expected) if all(asleep))
+    for failing in (first - 1, first, first + 1, 50, 51):
+        assert play(failing) == expected, (failing, first)
