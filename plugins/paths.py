@@ -120,7 +120,7 @@ class FollowPaths(System):
     def process(self, dt: float) -> None:
         table, bodies = self.world.physics.table, self.world.bodies.kinematic
         self._refuse_loose()
-        rows = np.flatnonzero(table.has_mask(Path)[: table.count])
+        rows = np.flatnonzero(table.has_mask(Path)[: table.count] & ~self.world.physics.excluded())
         own = rows - bodies.rows.start
         if not len(rows):
             return
@@ -134,7 +134,7 @@ class FollowPaths(System):
         apart = np.linalg.norm(gap, axis=1)
         rounding = DIGITS * np.spacing(np.abs(target).max(axis=1))
         reach = speed * dt * np.where(ease, STEEPEST, 1.0) * (1.0 + ROUNDING) + rounding
-        off = apart > reach  # put elsewhere, or not there yet: straight to it
+        off = ~(apart <= reach)  # put elsewhere, or not there yet: straight to it; nan leaves travelled as it is
         velocity = gap / dt
         velocity[off] = gap[off] / apart[off, None] * speed[off, None]
         velocity[(apart <= rounding) & (after == travelled)] = 0.0  # so that what stands on it can sleep

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ..framework import Component, Phase, Plugin, System, column
 from ..framework.data.columns import special_column
+from ..framework.data.component import NOTHING
 
 __all__ = ["Timer", "Timers"]
 
@@ -34,6 +36,11 @@ class Timer(Component):
     started: float | None = special_column(default=None, optional=True, init=False, unit="s")
     count: int = special_column(default=0, dtype=int, init=False)
     period: float | None = special_column(default=None, optional=True, init=False, unit="s")
+
+    def check_in(self, contents: Any, entity: int | None, beside: Mapping[type[Any], Any] = NOTHING) -> None:
+        """It begins anew with the next step, unless an entity of this world has it still."""
+        if self._entity is None or contents.components_of(self._entity).get(Timer) is not self:
+            self.started, self.count, self.period = None, 0, None
 
     def left(self, time: float) -> float:
         """Seconds until it is due, at that ``time`` of the world: ``timer.left(world.time)``."""
@@ -70,10 +77,10 @@ class OfTimers(System):
         return [(entity, timer) for entity, timer in found if timer is not None]
 
     def rows(self) -> tuple[np.ndarray, list[np.ndarray]]:
-        """The rows of bodies with a timer, and the arrays of its columns."""
+        """The rows of bodies that take part and have a timer, and the arrays of its columns."""
         table = self.world.physics.table
         arrays = [table.arrays[each.key] for each in Timer.columns.values()]
-        return np.flatnonzero(table.has_mask(Timer)[: table.count]), arrays
+        return np.flatnonzero(table.has_mask(Timer)[: table.count] & ~self.world.physics.excluded()), arrays
 
 
 class StartTimers(OfTimers):
@@ -101,11 +108,19 @@ class FireTimers(OfTimers):
     """Sends the event of each timer that is due by the end of the step, in order of the entities."""
 
     phase = Phase.END
+    _fired: tuple[tuple[int, int, int, Timer], ...] = ()  # entity, row or -1, how often it has been due by now, timer
+
+    def on_add(self, world: Any) -> None:
+        """What fired goes on when nothing can undo the step any more."""
+        world.physics.plugin_stages.finishers.append(self._finish)
+
+    def on_remove(self, world: Any) -> None:
+        world.physics.plugin_stages.finishers.remove(self._finish)
 
     def process(self, dt: float) -> None:
         end = self.world.time + dt
         end += ROUNDING * dt + 4.0 * np.spacing(end)
-        due: list[tuple[int, int, int]] = []  # entity, row or -1, how often it has been due by now
+        due: list[tuple[int, int, int]] = []
         rows, arrays = self.rows()
         if len(rows):
             _, _, started, count, period = (array[rows] for array in arrays)
@@ -118,15 +133,19 @@ class FireTimers(OfTimers):
                 passed = int((end - timer.started) / timer.period)
                 if passed > timer.count:
                     due.append((entity, -1, passed))
-        fired = []
+        self._fired, fired = (), []
         for entity, row, passed in sorted(due):
             timer = self._running(entity)
             if timer is not None:
                 self.world.events.dispatch("timer", entity, timer)
                 fired.append((entity, row, passed, timer))
-        for entity, row, passed, timer in fired:  # last, for if a handler raises the step is taken again
+        self._fired = tuple(fired)
+
+    def _finish(self, world: Any) -> None:
+        for entity, row, passed, timer in self._fired:
             if self._running(entity) is timer:
                 self._go_on(entity, row, passed, timer)
+        self._fired = ()
 
     def _running(self, entity: int) -> Timer | None:
         """The entity's timer, if it has begun: what handlers have put there or deleted is none."""

@@ -123,6 +123,10 @@ class Quarantine:
             for shape in self._scene.linked.shapes:
                 for column in shape.component.columns.values():
                     yield from self._check(column, shape.component, ALL_ROWS)
+        for component in self._table.component_types:  # of carom's plugins, which read them; no colliders
+            if component.plugin and component is not Spin:
+                for column in component.columns.values():
+                    yield from self._check(column, component, ALL_ROWS)
 
     def _check(self, column: Column, component: Any, rows: int) -> Iterator[Checked]:
         array, bounds = self._table.arrays.get(column.key), column.bounds()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import pickle
 from fractions import Fraction
 
 import numpy as np
@@ -13,6 +14,7 @@ from carom import (
     NoPhysicsError,
     Phase,
     Physics,
+    Prefab,
     RigidBody,
     Settings,
     SphereCollider,
@@ -202,6 +204,67 @@ def test_a_handler_that_raises_loses_no_event(kind):
     log.clear()
     run(world, 7)
     assert log == [(5, ids[0]), (5, ids[1]), (5, ids[2]), (11, ids[1])]
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("kind", ["loose", "dynamic"])
+@pytest.mark.parametrize("repeat", [False, True])
+def test_a_step_that_fails_after_the_event_spends_no_timer(kind, repeat):
+    """What the handler did is undone, and done once when the step is taken again."""
+
+    class Fails(System):
+        on = False
+
+        def process(self, dt):
+            if self.on:
+                raise RuntimeError("once")
+
+    world = world_of()
+    world.add_system(fails := Fails())  # at the end, after the timers
+    ship = world.create_entity(Transform((-9.0, 0)), RigidBody())
+    give(world, kind, 0.1, repeat=repeat)
+    log = log_of(world)
+    world.on("timer", lambda entity, timer: world.component_for_entity(ship, RigidBody).apply_impulse((2.0, 0)))
+    run(world, 5)
+    fails.on = True
+    with pytest.raises(StepError):
+        world.step()
+    fails.on = False
+    run(world, 7)
+    assert [step for step, _ in log] == ([5, 5, 11] if repeat else [5, 5])
+    assert world.component_for_entity(ship, RigidBody).linear_velocity[0] == (4.0 if repeat else 2.0)
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("kind", ["loose", "dynamic"])
+def test_a_timer_that_is_given_again_begins_anew(kind):
+    """A copy of one that runs, of a prefab, pickled, or removed and added; in snapshots it goes on."""
+    world = world_of()
+    own = give(world, kind, 0.5, repeat=True)
+    run(world, 10)
+    kept, timer = world.snapshot(), world.component_for_entity(own, Timer)
+    log, other = log_of(world), world_of()
+
+    def new():
+        return () if kind == "loose" else (Transform((5.0, 0)), RigidBody())
+
+    given = [world.create_entity(*new(), each) for each in (timer.copy(), pickle.loads(pickle.dumps(timer)))]
+    given.append(Prefab(*new(), timer).spawn(world))
+    other_log = log_of(other)
+    there = other.create_entity(*new(), timer.copy())
+    run(other, 30)
+    run(world, 30)
+    assert other_log == [(29, there)]
+    assert log == [(29, own), *((39, entity) for entity in sorted(given))]
+    if kind != "loose":
+        world.add_component(own, world.remove_component(own, Timer))
+        log.clear()
+        run(world, 30)
+        assert [step for step, entity in log if entity == own] == [69]
+    world.restore(kept)
+    log.clear()
+    run(world, 30)
+    assert log == [(29, own)]
 
 
 def test_bodies_are_none_the_wiser():
