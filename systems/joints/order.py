@@ -49,7 +49,7 @@ def measure_group(state, j):
     direct.light[g] = max(direct.light[g], max(w_a, w_b))
     direct.heavy[g] = min(direct.heavy[g], w_a if w_a > 0.0 else w_b, w_b if w_b > 0.0 else w_a)
     direct.welds[g] += joints.kind[j] == TURN and joints.rule[j] == HOLD
-    if is_rigid(joints, j):
+    if joints.rule[j] in (HOLD, DRIVE, SERVO) and joints.most[j] == math.inf:
         direct.freedom[g] -= 2 * (len(joints.normal[j]) if joints.kind[j] == POINT else 1)
     if joints.kind[j] <= ROD and joints.rule[j] <= LIMIT:
         size = joints.low[j] if joints.rule[j] == HOLD else joints.high[j]

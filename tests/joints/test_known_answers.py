@@ -296,6 +296,24 @@ def test_motor_holds_a_pose_if_its_torque_is_enough(share, holds):
     assert (abs(at(world, arm).rotation) < 0.01) == holds
 
 
+@pytest.mark.parametrize(("d", "first", "substeps"), pairwise((2, 3), ("hinge", "motor"), (4, 16)))
+def test_a_motor_beside_a_hinge_holds_as_one_that_it_has(d, first, substeps):
+    """A small box far from its pin rests, whichever of the two joints was there first, with the torque m g r."""
+    gravity, axis = (0, -G, 0)[:d], {} if d == 2 else {"axis": (0, 0, 1)}
+    plugins, settings = (Physics(d, gravity=gravity), Rotation(), Joints()), Settings(substeps=substeps)
+    with World(*plugins, settings=settings) as world:
+        box = world.create_entity(Transform((1, 0, 0)[:d]), RigidBody(), Spin(), BoxCollider(0.1))
+        both = Hinge(None, box, anchor=(0,) * d, **axis), Motor(None, box, speed=0.0, **axis)
+        ids = [world.create_entity(each) for each in (both if first == "hinge" else both[::-1])]
+        motor = ids[first == "hinge"]
+        for _ in range(120):
+            world.step()
+            assert world.kinetic_energy() < 1e-3
+            assert np.linalg.norm(np.subtract(*plugins[2].anchors()), axis=1).max() < 0.01
+        torque = np.sum(plugins[2].state(motor).torque) / world.settings.dt
+        assert torque == pytest.approx(G, rel=1e-3)
+
+
 def test_hinge_stops_at_its_limits():
     world, joints = joint_world()
     leaf = plank(world, (0.5, 0))
