@@ -7,6 +7,7 @@ M the masses, an impulse along c moves c (M^-1 - M^-1 J' (J M^-1 J')^-1 J M^-1) 
 from __future__ import annotations
 
 import math
+from itertools import pairwise as pairwise_of
 
 import numpy as np
 import pytest
@@ -243,6 +244,28 @@ def test_what_circles_strikes_with_its_energy_whenever_in_a_step(d, mode, seed):
     assert min(lost) > 0.0
     assert max(lost) < 0.3
     assert np.ptp(lost) < 0.02
+
+
+@pytest.mark.parametrize("seed", seeds(12, 200))
+@pytest.mark.parametrize("d", [2, 3])
+def test_impacts_within_what_ropes_join_keep_momentum(d, seed):
+    """Four boxes on a rope and two rods, free: a taut rope answers, or would pull and does not; to rounding."""
+    random = np.random.default_rng(seed)
+    with World(Physics(d), Rotation(), Joints(), settings=Settings(collision=MODES[seed % 3])) as world:
+        boxes = []
+        for k in range(4):
+            body = RigidBody(random.uniform(0.5, 3), random.normal(0, 1, d))
+            spin = random.normal(0, 1) if d == 2 else random.normal(0, 1, 3)
+            body = body, BoxCollider((0.4, 0.2, 0.3)[:d], restitution=1), Spin(spin)
+            boxes.append(world.create_entity(Transform((1.3 * k, 0, 0)[:d]), *body))
+        rope = random.integers(3)
+        for k, (a, b) in enumerate(pairwise_of(boxes)):
+            world.create_entity(Distance(a, b, length=(0, 1.4) if k == rope else None))
+        world.step()
+        momentum, size = world.momentum(), (world.bodies.mass @ abs(world.bodies.linear_velocity)).sum()
+        for _ in range(250):
+            world.step()
+        assert abs(world.momentum() - momentum).max() < 1e-12 * size
 
 
 @pytest.mark.slow
