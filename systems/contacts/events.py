@@ -261,6 +261,8 @@ class ContactEvents(StagedSystem):
     def _may_meet_any(self, row: int) -> bool:
         """Whether there is a body with a shape beside that of a row, and those that joints keep from touching it."""
         state, bodies, joints = self._state, self._state.bodies, self._state.solver.joints
+        if not state.has_parts and np.count_nonzero(bodies.shape[: state.count] >= 0) > joints.apart + 1:
+            return True  # most worlds, and this is asked in each step
         owner = bodies.owner[: state.count] if state.has_parts else np.arange(state.count)
         others = bodies.entity[owner[(bodies.shape[: state.count] >= 0) & (owner != owner[row])]]
         a, b, own = joints.apart_a[: joints.apart], joints.apart_b[: joints.apart], bodies.entity[owner[row]]

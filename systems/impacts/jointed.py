@@ -22,6 +22,7 @@ from .joint_answers import (
     TAKE_STARTS,
     TAKE_WAYS,
     answer,
+    answers,
     given_in_flight,
     list_answering,
     parted_by,
@@ -51,14 +52,15 @@ def settle_group(state, i, t):
     impacts, joints, zero, group = state.impacts, state.solver.joints, zero_of(state), group_of(state, i)
     impacts.since = max(0.0, last_impact_of(state, group)) if group >= 0 else 0.0
     impacts.now = 0.5 * (impacts.since + t)
-    rows, holds = list_answering(state, i, i), True
-    for e in range(rows):
-        j = joints.open_row[e]
-        holds &= joints.rule[j] == HOLD  # else limits and motors are not known to be on the way
+    e, holds = group, True
+    while e >= 0:
+        j = joints.order[e]
+        holds &= joints.rule[j] == HOLD or not answers(joints, j)  # limits and motors are not known to be on the way
         for row in (joints.row_a[j], joints.row_b[j]):
             if row >= 0:
                 impacts.settled[owner_of(state, row)] = impacts.settled_spin[owner_of(state, row)] = zero
-    rows = rows if holds else 0
+        e = joints.stream[e]
+    rows = list_answering(state, i, i) if holds else 0
     answer(state, rows, ((i, i), (zero, zero), zero), 0.0, zero, TAKE_FLIGHT)
     for e in range(rows):
         for row in (joints.row_a[joints.open_row[e]], joints.row_b[joints.open_row[e]]):
