@@ -38,9 +38,21 @@ def row_near(state, entity, row):
     return row_of(state, entity)
 
 
+@inlined
+def takes_part(state, j):
+    """Whether a row of joints has its bodies, and one of them may move."""
+    joints = state.solver.joints
+    a, b = joints.row_a[j], joints.row_b[j]
+    gone = (a < 0 and joints.entity_a[j] > 0) or (b < 0 and joints.entity_b[j] > 0)
+    if gone or is_left_out(state, a) or is_left_out(state, b) or joints.rule[j] == FREE:
+        return False
+    return may_move(state, a) or may_move(state, b)
+
+
 @part
 def find_active(state):
-    """The rows of joints that hold a body which may move, in their order."""
+    """The rows of joints that hold a body which may move, in their order: motors and what else turns alone come first,
+    as what they let open would give energy."""
     joints, found = state.solver.joints, 0
     if joints.rows_version != state.version:
         for j in range(joints.count):
@@ -48,16 +60,15 @@ def find_active(state):
             joints.row_b[j] = row_near(state, joints.entity_b[j], joints.row_b[j])
         joints.rows_version = state.version
     for j in range(joints.count):
-        a, b = joints.row_a[j], joints.row_b[j]
         joints.old_load[j], joints.old_pull[j], joints.old_value[j] = joints.load[j], joints.pull[j], joints.value[j]
         joints.old_normal[j], joints.old_along_a[j] = joints.normal[j], joints.along_a[j]
         joints.total[j], joints.thrust[j] = 0.0, zero_of(state)
-        gone = (a < 0 and joints.entity_a[j] > 0) or (b < 0 and joints.entity_b[j] > 0)
-        if gone or is_left_out(state, a) or is_left_out(state, b) or joints.rule[j] == FREE:
-            continue
-        if may_move(state, a) or may_move(state, b):
-            joints.order[found] = j
-            found += 1
+    for turning in (True, False):
+        for j in range(joints.count):
+            turns = TURN <= joints.kind[first_of(joints, j)] < CUSTOM
+            if turns == turning and takes_part(state, j):
+                joints.order[found] = j
+                found += 1
     joints.active, joints.kept_in = found, state.step_number + 1
     join_held(state)
 

@@ -314,6 +314,22 @@ def test_a_motor_beside_a_hinge_holds_as_one_that_it_has(d, first, substeps):
         assert torque == pytest.approx(G, rel=1e-3)
 
 
+@pytest.mark.parametrize(("d", "first", "length"), pairwise((2, 3), ("hinge", "motor"), (1.0, 1.5, 2.5)))
+def test_a_motor_beside_a_hinge_of_free_bodies_gives_no_energy(d, first, length):
+    """Two boxes far apart that fly as one, whichever of the two joints was there first."""
+    axis = {} if d == 2 else {"axis": (0, 0, 1)}
+    with World(Physics(d, gravity=(0,) * d), Rotation(), Joints()) as world:
+        base = world.create_entity(Transform((0,) * d), RigidBody(mass=5.0), Spin(), BoxCollider(0.3))
+        moving = RigidBody(linear_velocity=(0, 0.5, 0)[:d])
+        box = world.create_entity(Transform((length, 0, 0)[:d]), moving, Spin(), BoxCollider(0.1))
+        both = Hinge(base, box, anchor=(0,) * d, **axis), Motor(base, box, speed=0.0, **axis)
+        for joint in both if first == "hinge" else both[::-1]:
+            world.create_entity(joint)
+        for _ in range(600):
+            world.step()
+            assert 0.09 < world.kinetic_energy() < 0.125
+
+
 def test_hinge_stops_at_its_limits():
     world, joints = joint_world()
     leaf = plank(world, (0.5, 0))
