@@ -41,14 +41,18 @@ GIVE = 0.05  # of the extent: that much farther than its search bounds a body ma
 
 
 @inlined
+def has_sweeps(state, i):
+    """Whether row i is swept against all others: it or the body that it is a part of has ccd, or all are swept."""
+    ccd = state.bodies.ccd
+    return state.mode != DISCRETE or ccd[i] or ccd[owner_of(state, i)]
+
+
+@inlined
 def is_swept(state, a, b, travel):
     """Whether a pair is swept that travels so far within the step."""
-    bodies, swept = state.bodies, state.mode == CONTINUOUS
     if state.mode == EVENT_DRIVEN:
         return True
-    for i in (a, b, owner_of(state, a), owner_of(state, b)):
-        swept |= bodies.ccd[i]
-    return swept and travel > FAST * smaller_extent(bodies, a, b)
+    return (has_sweeps(state, a) or has_sweeps(state, b)) and travel > FAST * smaller_extent(state.bodies, a, b)
 
 
 @part

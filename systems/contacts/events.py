@@ -15,6 +15,7 @@ from ...framework.schedule.stages import Check, Program, PythonPart, Stage
 from ...framework.world.contacts import ContactRows, Contacts
 from ...framework.world.events import CONTACT_EVENTS
 from ...framework.world.world import World
+from ..records import COLLIDERS
 from ..sleeping.sleepers import Sleepers
 from ..sleeping.stored import merged
 from ..stage_system import StagedSystem
@@ -22,6 +23,7 @@ from .event_stages import ROOM_FOR_FOUND, compare_contacts
 from .solving.faults import OVERLOADED, RESTRAINED, SQUEEZED, TORN_OPEN
 
 Columns = dict[str, np.ndarray]
+MEETING = ("layer", "mask", "group")  # of colliders: whom they meet
 
 
 class RecordedContacts:
@@ -259,12 +261,19 @@ class ContactEvents(StagedSystem):
             contacts.enabled[contacts.now, : len(enabled)] = enabled
 
     def _may_meet_any(self, row: int) -> bool:
-        """Whether there is a body with a shape beside that of a row, and those that joints keep from touching it."""
-        state, bodies, joints = self._state, self._state.bodies, self._state.solver.joints
-        if not state.has_parts and np.count_nonzero(bodies.shape[: state.count] >= 0) > joints.apart + 1:
+        """Whether layers, groups and joints let a body meet any other one."""
+        state, bodies, joints, there = self._state, self._state.bodies, self._state.solver.joints, self._state.count
+        near, kept = bodies.shape[:there] >= 0, {name: getattr(state.colliders, name) for name in MEETING}
+        if not (state.has_parts or any(map(len, kept.values()))) and near.sum() > joints.apart + 1:
             return True  # most worlds, and this is asked in each step
-        owner = bodies.owner[: state.count] if state.has_parts else np.arange(state.count)
-        others = bodies.entity[owner[(bodies.shape[: state.count] >= 0) & (owner != owner[row])]]
+        slot, rows = bodies.collider_slot[:there], np.arange(there)
+        layers, masks, groups = (
+            column[slot, rows] if len(column) else np.full(there, COLLIDERS.fields[name].default)
+            for name, column in kept.items()
+        )
+        near &= (layers & masks[row] != 0) & (masks & layers[row] != 0) & ((groups != groups[row]) | (groups == 0))
+        owner = bodies.owner[:there] if state.has_parts else rows
+        others = bodies.entity[owner[near & (owner != owner[row])]]
         a, b, own = joints.apart_a[: joints.apart], joints.apart_b[: joints.apart], bodies.entity[owner[row]]
         return not np.isin(others, np.concatenate((b[a == own], a[b == own]))).all()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ...framework.compilation import inlined, part
 from ...framework.schedule.stages import Rows
 from ...framework.vectors import dot, length, sub
+from ..ccd.search_bounds import has_sweeps
 from ..codes import OK, RUN_BROAD
 from ..integration.turning import size_of_turn
 from ..records import HALVES, PAIR_COLUMNS, SORTED
@@ -14,7 +15,6 @@ from .manifolds import is_near_manifold, mark_early
 # Candidates are sorted by comparison if there are so many times more bodies, else by counting.
 BODIES_PER_CANDIDATE = 64
 FAST_TURN = 1.0  # rad in a step
-SURE = 1.0 - 1e-12  # factor that makes a number less than the exact one, whatever the rounding
 
 
 @part
@@ -144,24 +144,17 @@ def is_solid_pair(state, a, b):
 
 @part
 def flag_fast_bodies(state, dt, struck):
-    """Note the body that moves farthest beyond its own extent, if that is more than the extent of the thinnest: where
-    no pair is swept, the two may have passed through each other. Once before the impacts, and once with their speeds:
-    what is ``struck`` meets others unseen until the next step, which takes it to be on the side where its centre is.
+    """Note the body that moves farthest beyond its own extent and that of the thinnest: where it is not swept, the two
+    may have passed through each other. Once before the impacts, and once with their speeds: what is ``struck`` meets
+    others unseen until the next step, which takes it to be on the side where its centre is.
     """
     bodies, farthest, thinnest = state.bodies, 0.0, min(state.thinnest_static, state.thinnest_moving)
-    any_fast = False
-    if state.sweeping or not state.moved:
-        return
-    for i in range(state.first, state.moving):  # seldom; squares, so that there are no roots, nor divisions
-        seen = 0.5 if struck and bodies.impact_count[i] > 0 else 1.0
-        v, room = bodies.start_velocity[i], SURE * seen * (bodies.min_extent[i] + thinnest)
-        any_fast |= not dot(v, v) * (dt * dt) <= room * room
-    for i in range(state.first, state.moving if any_fast else 0):
-        if bodies.shape[i] >= 0:
-            seen = 0.5 if struck and bodies.impact_count[i] > 0 else 1.0
-            beyond = length(bodies.start_velocity[i]) * dt - seen * bodies.min_extent[i]
-            if beyond > max(farthest, seen * thinnest):
-                farthest, state.too_fast_for_discrete, state.too_fast_row = beyond, True, i
+    for i in range(state.first, state.moving if state.moved else 0):
+        v, room = bodies.start_velocity[i], bodies.min_extent[i] + thinnest
+        room *= 0.5 if struck and bodies.impact_count[i] > 0 else 1.0
+        beyond = dot(v, v) * (dt * dt) - room * room
+        if beyond > farthest and bodies.shape[i] >= 0 and not has_sweeps(state, i):
+            farthest, state.too_fast_for_discrete, state.too_fast_row = beyond, True, i
 
 
 @part
@@ -169,8 +162,8 @@ def find_fast_turns(state):
     """Note a body that turns farther in a step than contacts can follow where no pair is swept: rows stand for one
     moment of it."""
     bodies = state.bodies
-    for i in range(state.first, state.moving if not state.sweeping else 0):
-        if bodies.rolling_radius[i] == 0.0 and size_of_turn(bodies.turn[i]) > FAST_TURN:
+    for i in range(state.first, state.moving):
+        if bodies.rolling_radius[i] == 0.0 and size_of_turn(bodies.turn[i]) > FAST_TURN and not has_sweeps(state, i):
             state.turns_too_far = i + 1
 
 

@@ -151,3 +151,27 @@ def test_what_has_nothing_to_pass_is_not_too_fast(d):
         world.step()
         (fault,) = world.faults
         assert "so fast that discrete collisions may miss" in fault
+
+
+@mostly_2d
+@pytest.mark.parametrize(
+    ("fast", "wall", "told"),
+    [
+        ({}, {}, True), ({"layer": 2}, {}, True), ({"layer": 2}, {"mask": 1}, False), ({"mask": 4}, {}, False),
+        ({"mask": 4}, {"layer": 4}, True), ({"group": 3}, {"group": 3}, False), ({"group": 3}, {"group": 4}, True),
+        ({"group": 3}, {"group": 3, "mask": 2}, False), ({"ccd": True}, {}, False),
+    ],
+)  # fmt: skip
+def test_what_is_not_swept_is_too_fast_for_what_it_may_meet(d, fast, wall, told):
+    """Whatever else is swept: another body with ccd meets all of them."""
+    with make_world(d, on_fault="ignore") as world:
+        fast, moving = dict(fast), {"linear_velocity": (90, 0, 0)[:d]}
+        body = RigidBody(ccd=fast.pop("ccd", False), **moving)
+        number = world.create_entity(Transform((0,) * d), body, SphereCollider(0.1, **fast))
+        world.create_entity(Transform((0, 50, 0)[:d]), AABBCollider(0.1, **wall))
+        for ccd in (None, True):
+            if ccd:
+                world.create_entity(Transform((0, 9, 0)[:d]), RigidBody(ccd=True), SphereCollider(0.1, mask=0))
+            world.faults.clear()
+            world.step()
+            assert [f"entity {number}: so fast" in fault for fault in world.faults] == [True] * told
