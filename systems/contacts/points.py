@@ -7,7 +7,7 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.stack_arrays import stack_array
-from ...framework.vectors import add, add_scaled, dot, length, row, scale, store, sub
+from ...framework.vectors import add, add_scaled, dot, length, replace, row, scale, store, sub
 from ..ccd.search_bounds import FAST, turns_far
 from ..ccd.turning_touch import FOLLOWED_TURN, turn_of_path
 from ..codes import OK
@@ -138,13 +138,29 @@ def note_middles(state, r, all_alike):
 
 
 @part
-def rolls(state, a, b, normal):
-    """Whether what turns far of a pair is the surface of balls, whose middles go by less than a part of the smaller."""
-    bodies, way = state.bodies, 0.0
-    for i in (a, b):
-        reach = length(bodies.offset[i]) if is_ball(state, i, normal) else bodies.reach[i]
-        way += size_of_turn(bodies.turn[i]) * reach
-    return way <= FAST * smaller_extent(bodies, a, b)
+def core_travel(state, i):
+    """How far turning moves points of body i at most, but for its rounding: that of a ball or a rod turns on the spot."""
+    bodies, turn, along, squares = state.bodies, state.bodies.turn[i], zero_of(state), 0.0
+    shape, angle = convex_at(state.shapes.parameters[bodies.shape[i]], i), size_of_turn(turn)
+    if shape[0] == 0 or not point_rounding(state, i) > 0.0 or not angle > 0.0:
+        return angle * bodies.reach[i]
+    for k in range(len(along)):
+        across = cross_spin(turn, replace(zero_of(state), k, 1.0))
+        along = across if dot(across, across) > dot(along, along) else along
+    for _ in range(2):  # both directions across the axis
+        along = scale(along, 1.0 / length(along))
+        middle, back = dot(bodies.offset[i], along), scale(along, -1.0)
+        high, low = dot(support_by_address(shape, along), along), dot(support_by_address(shape, back), back)
+        most = max(high + middle, low - middle)
+        squares += most * most
+        along = cross_spin(turn, along)
+    return angle * math.sqrt(squares)
+
+
+@part
+def rolls(state, a, b):
+    """Whether what turns far of a pair is rounded, and all else of it goes by less than a part of the smaller."""
+    return core_travel(state, a) + core_travel(state, b) <= FAST * smaller_extent(state.bodies, a, b)
 
 
 @part
@@ -240,7 +256,7 @@ def lay_arms(state, dt):
             build_arms(state, dt, r, solver.gap[solver.slot[r]])
             if dot(offset[a], offset[a]) + dot(offset[b], offset[b]) > 0.0:
                 note_middles(state, r, False)
-            if turns_far(state, a, b) and not rolls(state, a, b, solver.normal[solver.slot[r]]):
+            if turns_far(state, a, b) and not rolls(state, a, b):
                 lay_first_touch(state, dt, r)
     for r in range(solver.contacts if solver.lopsided else 0):
         note_middles(state, r, True)

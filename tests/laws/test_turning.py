@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers_pairwise import pairwise
 from rotation.helpers_turning import G, box, motion, pose, turned, turning_world, wall
 from worlds import MODES
 
@@ -121,6 +122,38 @@ def test_what_another_one_falls_flat_on_does_not_turn_by_a_bit(mode):
 def test_what_falls_flat_in_space_turns_by_rounding_alone(mode):
     """1237: it leant on two of its four points, which were as far as the others but for rounding, at .1 rad/s."""
     assert max(fall(seed, mode, 3) for seed in (0, 1, 1237)) < 1e-10
+
+
+def spun_rod(seed, mode, friction):
+    """(most energy over that at the start, depth in radii, and by how much the impulse of the floor is not the one
+    that acts, N s, at most) of a rod that lies on a floor and turns about its axis and the upright."""
+    random = np.random.default_rng([seed, 63])
+    with turning_world(3, G, capsule.plugin, collision=mode, on_fault="ignore") as world:
+        wall(world, (0.0, -1.0, 0.0), (300.0, 1.0, 300.0), friction=friction)
+        spin = Spin((0.0, random.uniform(0.5, 4.0), random.uniform(-20.0, -4.0)))
+        shape = capsule.CapsuleCollider(0.2, random.uniform(0.1, 0.5), friction=friction)
+        start = Transform((0.0, 0.2, 0.0), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0))
+        rod, seen = world.create_entity(start, RigidBody(), spin, shape), []
+        whole = world.kinetic_energy() + world.potential_energy()
+        for _ in range(240):
+            before = motion(world, rod)[0][1]
+            world.step()
+            acts, contacts = motion(world, rod)[0][1] - before + G * world.settings.dt, world.contacts
+            energy = (world.kinetic_energy() + world.potential_energy()) / whole
+            told = abs(contacts.normal_impulse.sum() - acts)
+            seen.append((energy, contacts.depth.max(initial=0.0) / 0.2, told))
+        return np.max(seen, axis=0)
+
+
+@pytest.mark.parametrize(("mode", "friction"), pairwise(MODES, (0.0, 0.4)))
+def test_a_rod_that_turns_on_its_axis_gains_no_energy(mode, friction):
+    """Its surface turns far in a step, and is where it was. It sank by a fifth of its radius, was lifted out by no
+    impulse, and had 1.6 times its energy after 4 s."""
+    for seed in range(3):
+        energy, depth, told = spun_rod(seed, mode, friction)
+        assert energy <= 1.0
+        assert depth < 0.05
+        assert told < 1e-6
 
 
 def lopsided(seed, mode, d):
