@@ -139,7 +139,7 @@ def note_middles(state, r, all_alike):
 
 @part
 def core_travel(state, i):
-    """How far turning moves points of body i at most, but for its rounding: that of a ball or a rod turns on the spot."""
+    """How far turning moves points of body i at most, but for its rounding: that of a ball or rod turns on the spot."""
     bodies, turn, along, squares = state.bodies, state.bodies.turn[i], zero_of(state), 0.0
     shape, angle = convex_at(state.shapes.parameters[bodies.shape[i]], i), size_of_turn(turn)
     if shape[0] == 0 or not point_rounding(state, i) > 0.0 or not angle > 0.0:
