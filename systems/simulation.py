@@ -78,7 +78,7 @@ class Simulation:
         self.adoption = Adoption(table, Transform, world._contents(), LevelCheck(table, world.registry))
         self.adoption.on_losing = partial(keep_gyration, table)
         self.bodies = Bodies(table)
-        source = RecordedContacts(self.program, self.sleepers, world.clock)
+        source = RecordedContacts(self.program, self.sleepers, world.clock, table, self.refresh_for_queries)
         self.contacts = Contacts(dimensions, self._membership, self._running_step, source)
         self.search = CandidateSearch(state, world, self._box_now, self.program.run_one)
         self.attribute_errors = ErrorAttribution(world.registry, state, self.scene.shapes)
@@ -109,6 +109,7 @@ class Simulation:
         """What the table calls when its columns change, and asks of the step."""
         table = self.table
         table.clock = self._world.clock
+        table.before_rows_move = self.contacts.take_deferred
         table.on_make, table.on_expose = self._follow_columns, self._follow_exposed
         table.on_arrays_changed, table.on_changed_inside = self.scene.follow_arrays, self.sleepers.follow_change
         table.forces_are_summed, table.has_flown = self._forces_are_summed, lambda: self.state.moved
@@ -161,14 +162,13 @@ class Simulation:
 
     def synchronize(self) -> None:
         """Bring the table in step with esper."""
-        self.take_deferred()
         self.adoption.synchronize()
         for follow in self.plugin_stages.adopters:
             follow(self._world)
 
     def open_window(self, step: int) -> None:
         self.contacts.open_window(step)
-        self.state.event_count = 0  # those of the last window that were never read
+        self.state.event_count, self.state.impacts_recorded = 0, True  # those of the last window that were never read
         self.table.frame += 1
 
     def begin_step(self, others_write: bool) -> None:
@@ -348,10 +348,10 @@ class Simulation:
             stop(self.table)
         self.table.in_step = False
         self.copies.kept = False
+        if self._words[self._found_current]:  # no RESPONSE has replaced them: they are read at any time
+            self.contacts.columns_now()  # before rows move
         if self.sleepers.on:
             self.sleepers.end_step()
-        if self._words[self._found_current]:  # no RESPONSE has replaced them: they are read at any time
-            self.contacts.columns_now()
 
     def report_faults(self, prefix: str) -> None:
         """Name the bodies whose state is not finite in the world's faults; they are taken out of the next step."""

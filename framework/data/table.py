@@ -49,6 +49,7 @@ class Table(TableColumns):
         self._next_row = 0  # after the one that was looked up last
         # called with what code of the game writes to a row, before it is; None: its components are others
         self.on_written: Callable[[int, str, Any], None] | None = None
+        self.before_rows_move: Callable[[], None] = lambda: None  # for what has noted rows, and reads them later
         self.on_rows_moved: Callable[[RowPlan], None] = lambda plan: None
         self.on_arrays_changed: Callable[[], None] = lambda: None  # called when a row has got another array
         self.on_changed_inside: Callable[[Any, int, int, np.ndarray], None] = lambda *_: None  # see changed_inside
@@ -154,6 +155,7 @@ class Table(TableColumns):
 
     def _regroup(self, removed: Any, added: Any, blocks: Any, moved: Any, blocks_moved: Any) -> tuple[Rows, np.ndarray]:
         """As ``rebuild``, and the rows ``moved`` come into other blocks."""
+        self.before_rows_move()
         values = {key: self.values(key, moved) for key in self.arrays} if len(moved) else {}
         if values:
             pairs = (removed, moved), (added, values["entity"]), (blocks, blocks_moved)

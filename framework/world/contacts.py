@@ -291,7 +291,6 @@ class Contacts(ContactRows):
     @property
     def impacts(self) -> ContactRows:
         """One row per impact, with ``time_of_impact``; a pair may have several in a step."""
-        self._source.record_impacts()
         return self._history("impacts")
 
     @property
@@ -345,7 +344,6 @@ class Contacts(ContactRows):
     def saved(self) -> dict[str, Any]:
         """The events of the window, for a snapshot; the contacts too if they have been read, and so may be changed."""
         self.take_deferred()
-        self._source.record_impacts()
         columns = _copied(self._own_columns) if self._columns_of == self._source.version else None
         histories = {name: [_copied(chunk) for chunk in chunks] for name, chunks in self._chunks.items()}
         return {"window": self.window, "columns": columns, "histories": histories}

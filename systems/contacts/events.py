@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...framework.data.esper_bridge import Membership
+from ...framework.data.table import Table
 from ...framework.jit.records.record import Record
 from ...framework.schedule.clock import Clock
 from ...framework.schedule.phases import Phase
@@ -29,8 +30,11 @@ MEETING = ("layer", "mask", "group")  # of colliders: whom they meet
 class RecordedContacts:
     """The contacts in a world's records, as columns."""
 
-    def __init__(self, program: Program, sleepers: Sleepers, clock: Clock) -> None:
+    def __init__(
+        self, program: Program, sleepers: Sleepers, clock: Clock, table: Table, refresh: Callable[[], None]
+    ) -> None:
         self._state = state = program.state
+        self._table, self._refresh = table, refresh  # makes what the records know of the bodies that of the table
         self._program, self._sleepers, self._clock = program, sleepers, clock
         self._touching, self._impacts = state.contacts, state.impacts
         self.record: Callable[[str, Columns], None] = lambda history, columns: None
@@ -126,15 +130,15 @@ class RecordedContacts:
 
     def record_waiting(self) -> None:
         """Add what has begun, ended and bounced in the last step to the histories, unless that is done."""
+        self._record_impacts()
         if self._state.event_count:
             self._state.event_count = 0
-            self.record_impacts()
             if self._touching.begins:
                 self.record("begin", self.began())
             if self._touching.ends:
                 self.record("end", self.ended())
 
-    def record_impacts(self) -> None:
+    def _record_impacts(self) -> None:
         """Add the impacts of the step that is running to the history, unless they are in it already."""
         if self._impacts.logged and not self._state.impacts_recorded:
             self._state.impacts_recorded = True
@@ -142,18 +146,18 @@ class RecordedContacts:
 
     def points(self, columns: Columns) -> Columns:
         """The same contacts, a row for each of their points, with its place in the columns; those of a pair of which
-        the solver knows none, or one, are as they are."""
+        the solver knows none, or one, are as they are, and where entity_a is no more."""
+        self._refresh()
         state, memory, now = self._state, self._state.warm_start, self._state.warm_start.now
         count = int(memory.counts[now]) if state.spinning else 0
         entity_a, entity_b = memory.entity_a[now, :count], memory.entity_b[now, :count]
         place = {pair: row for row, pair in enumerate(_pairs(columns))}
         found = zip(entity_a.tolist(), entity_b.tolist(), strict=True)
         rows = np.array([place.get(pair, -1) for pair in found], np.int64)
-        known, alone = rows >= 0, np.ones(len(columns["entity_a"]), bool)
+        first, bodies = self._table.rows_of(entity_a), state.bodies
+        known, alone = (rows >= 0) & (first >= 0), np.ones(len(columns["entity_a"]), bool)
         alone[rows[known]] = False
-        entity, bodies = state.bodies.entity[: state.count], state.bodies
-        order = np.argsort(entity)
-        first = order[np.searchsorted(entity, entity_a[known], sorter=order)]
+        first = first[known]
         point = bodies.position[first] + bodies.offset[first] + memory.place[now, :count][known]
         impulse = memory.total[now, :count][known]
         row = np.concatenate((rows[known], np.flatnonzero(alone)))

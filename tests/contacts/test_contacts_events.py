@@ -8,9 +8,10 @@ import esper
 import numpy as np
 import pytest
 from helpers_filters import EVENTS, pairs
-from worlds import ball, floor, make_world, run
+from worlds import MODES, ball, both_dimensions, box, floor, make_world, run, velocity
 
 from carom.components import RigidBody, SphereCollider, Transform
+from carom.systems.contacts.events import ContactEvents
 
 
 def listen(world, told, *names):
@@ -86,6 +87,48 @@ def test_no_step_no_events():
     assert [len(rows) for rows in (contacts.begin, contacts.stay, contacts.end, contacts.impacts)] == [0, 0, 0, 0]
     assert world.advance(1 / 60) == 1
     assert len(world.contacts.end) == 1
+
+
+def test_nothing_of_the_frame_before_is_told_in_one_without_a_step():
+    """Nor if nobody has looked at it."""
+    world = make_world()
+    ball(world, -0.51, 1.0, restitution=1.0)
+    ball(world, 0.51, -1.0, restitution=1.0)
+    assert (world.advance(1 / 60), world.advance(1 / 600)) == (1, 0)
+    assert len(world.contacts.begin) == len(world.contacts.impacts) == 0
+
+
+@both_dimensions
+@pytest.mark.parametrize("mode", MODES)
+def test_impacts_name_those_that_bounce_when_a_body_falls_asleep_in_that_step(mode, d):
+    """Its row goes before those of all that are awake, and the impacts are read after that."""
+    world = make_world(d, 10.0, sleeping=True, collision=mode)
+    floor(world)
+    balls = [ball(world, (2 * k - 20, 0.6 + 0.03 * k, 0)[:d], restitution=1.0) for k in range(60)]
+    crate = box(world, (-30, 0.5, 0)[:d])
+    for step in range(50):
+        before = {k: velocity(world, k)[1] for k in balls}
+        world.step()
+        bounced = [k for k in balls if before[k] < 0 < velocity(world, k)[1]]
+        assert np.sort(world.contacts.impacts.entity_b).tolist() == bounced
+        assert bounced or not 25 < step < 36
+    assert world.component_for_entity(crate, RigidBody).asleep
+
+
+def test_impacts_are_told_without_the_system_of_events():
+    """As they are with it, of all steps of a frame."""
+    told = []
+    for removed in ((), ContactEvents):
+        world = rain(1.0)
+        for system in world.systems:
+            if isinstance(system, removed):
+                world.remove_system(system)
+        told.append([])
+        for _ in range(12):
+            world.advance(4 / 60)
+            told[-1] += [(one.step, one.entity_a, one.entity_b) for one in world.contacts.impacts]
+    assert told[0] == told[1]
+    assert len(told[0]) > 5
 
 
 @pytest.mark.slow

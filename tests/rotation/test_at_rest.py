@@ -107,6 +107,24 @@ def test_the_manifold_has_the_corners_that_bear_it():
         assert [contact.entity_a for contact in points] == points.entity_a.tolist()
 
 
+def test_the_manifold_outlives_its_bodies():
+    """Without entity_a each contact is one row, as it was; the rows of others have moved."""
+    with ground() as world:
+        lower = [box(world, (3 * k, 0.5), (1, 0.5), friction=0.5) for k in range(4)]
+        upper = [box(world, (3 * k, 1.25), (0.25, 0.25), friction=0.5) for k in range(4)]
+        run(world, 5)
+        world.delete_entity(lower[1], immediate=True)
+        spawned = [box(world, (3 * k, 9), (1, 0.5)) for k in range(99)]
+        assert len(world.bodies) > len(spawned)
+        points, contacts = world.contacts.manifold, world.contacts
+        for k in range(4):
+            mine = points.entity_b == upper[k]
+            assert np.count_nonzero(mine) == 2 - (k == 1)
+            assert points.point[mine].mean(axis=0) == pytest.approx((3 * k, 1), abs=1e-3)
+            given = contacts.normal_impulse[contacts.entity_b == upper[k]]
+            assert points.normal_impulse[mine].sum() == pytest.approx(given[0])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seconds", [10, pytest.param(60, marks=pytest.mark.long)])
 def test_a_pyramid_of_fifty_rows_stands_still(seconds):
