@@ -10,7 +10,6 @@ from typing import Any
 
 import click
 import numpy as np
-from rich.console import Console
 
 from ...framework import CaromError, Settings, World
 from ...framework.schedule.profile_report import Stats
@@ -18,7 +17,7 @@ from ..measure.run import Drift, RunReport, run
 from ..plugins.command import plugin_named
 from ..reporting.output import drawing_if_there
 from ..reporting.progress import Progress
-from ..reporting.text import NOTHING, TextTable, counted, jsonable, number, values_text
+from ..reporting.text import NOTHING, TextTable, counted, jsonable, number, plain_console, values_text
 from .loading import Loaded, load, stdout_kept_clean
 from .options import NOT_NEGATIVE, Corners, View, json_option, traceback_option, world_options, writable_folder
 from .usage_errors import Problem, one_line
@@ -79,7 +78,7 @@ def run_command(
         if film is not None:
             film.after_step(done)
 
-    with Progress(Console(stderr=True)) as bar:
+    with Progress(plain_console(stderr=True)) as bar:
         bar.begin(steps)
         bar.say(loaded.name)
         with loaded.attribute_errors(), stdout_kept_clean():
@@ -169,18 +168,18 @@ AT_REST = 1e-2  # of the energy: a smaller kinetic energy is no scale for a drif
 
 def print_report(report: RunReport, profile: Stats | None = None) -> None:
     """Print the tables: settings, cost by system, the profile by kernel if there is one, and accuracy."""
-    console = Console()
-    console.print(f"\n{summary(report)}\n", highlight=False, markup=False)
+    console = plain_console()
+    console.print(f"\n{summary(report)}\n")
     cost(report).show()
     console.print()
     if profile is not None:
-        console.print(f"{profile}\n", highlight=False, markup=False, soft_wrap=True)
+        console.print(f"{profile}\n", soft_wrap=True)
         console.print(f"not in it: {report.compile_seconds:.3g} s for the steps that compiled or loaded kernels\n")
     quality(report).show()
     for line in fault_lines(report.faults):
-        console.print(f"! {line}", style=WARNING, highlight=False)
+        console.print(f"! {line}", style=WARNING)
     for picture in report.pictures:
-        console.print(f"picture: {picture}", highlight=False, soft_wrap=True)
+        console.print(f"picture: {picture}", soft_wrap=True)
 
 
 def fault_lines(faults: list[str]) -> list[str]:

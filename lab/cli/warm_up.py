@@ -12,7 +12,6 @@ from functools import partial
 from pathlib import Path
 
 import click
-from rich.console import Console
 
 from ...framework.compilation import log
 from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_folder, clear_cache
@@ -23,7 +22,7 @@ from ...framework.plugins.registry import Registry
 from ...plugins import Physics
 from ...systems.linking.preparation import all_functions
 from ..reporting.progress import Progress
-from ..reporting.text import TextTable
+from ..reporting.text import TextTable, plain_console
 from .loading import Loaded, load, stdout_kept_clean
 from .options import json_option, traceback_option
 from .usage_errors import Problem
@@ -68,7 +67,7 @@ def warm_up_command(
     if clear:
         count, size = clear_cache()
     else:
-        with Progress(Console(stderr=True)) as status:
+        with Progress(plain_console(stderr=True)) as status:
             rows = warm_up(_work(targets, [int(dimensions)] if dimensions else [2, 3]), status.say)
     after = cache_contents()
     if as_json:
@@ -119,7 +118,7 @@ def _print(rows: list[Row], folder: Path, before: int, after: tuple[int, int]) -
     cells = [(row.target, str(len(row.compiled)), str(row.found), f"{row.seconds:.1f}") for row in rows]
     TextTable("", ("needed by", "compiled", "in the cache already", "seconds"), cells).show()
     text = f"cache: {folder}, {after[0]:,} kernels, {_megabytes(after[1])} ({before:,} kernels before)"
-    Console().print(text, highlight=False, soft_wrap=True)
+    plain_console().print(text, soft_wrap=True)
 
 
 def _megabytes(size: int) -> str:

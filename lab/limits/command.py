@@ -8,7 +8,6 @@ from typing import Any
 
 import click
 import numpy as np
-from rich.console import Console
 
 from ...framework import Settings, World
 from ..cli.loading import Loaded, load, stdout_kept_clean
@@ -17,7 +16,7 @@ from ..cli.usage_errors import Problem
 from ..measure.bodies import apart, state_by_id
 from ..plugins.command import plugin_named
 from ..reporting.progress import Progress
-from ..reporting.text import jsonable, metres, number, values_text
+from ..reporting.text import jsonable, metres, number, plain_console, values_text
 from .step_length import StepLimits, step_limits
 
 LOOKS = 20  # times that a running scene is examined
@@ -45,7 +44,7 @@ def limits_command(
     def build() -> World:
         return loaded.build(settings, changes, seed, [plugin_named(name) for name in plugins])
 
-    with Progress(Console(stderr=True)) as bar, closing(build()) as world:
+    with Progress(plain_console(stderr=True)) as bar, closing(build()) as world:
         bar.begin(3 * round(seconds / world.settings.dt))
         found = _run(loaded, world, seconds, bar)
         with closing(build()) as half:

@@ -19,7 +19,7 @@ from ..cli.loading import import_file, module_of, stdout_kept_clean
 from ..cli.options import traceback_option
 from ..cli.usage_errors import Problem, did_you_mean, one_line
 from ..reporting.progress import Progress
-from ..reporting.text import TextTable, counted
+from ..reporting.text import TextTable, counted, plain_console
 from .check import Checked, check_plugin
 
 FOUND = 1  # exit code of a check with findings
@@ -56,8 +56,8 @@ def check_command(target: str) -> int:
     TARGET: the name of an installed plugin, a module, or a file; all plugins that it defines are checked.
     """
     found = plugins_of(target)
-    console, findings = Console(), 0
-    with Progress(Console(stderr=True)) as status:
+    console, findings = plain_console(), 0
+    with Progress(plain_console(stderr=True)) as status:
         for plugin in found:
             with stdout_kept_clean():
                 report = check_plugin(plugin, needed_by(plugin), lambda what, p=plugin: status.say(f"{p.name}: {what}"))
@@ -84,7 +84,7 @@ def _print(plugin: Plugin, report: list[Checked], console: Console) -> int:
         lines += [f"{number}. {checked.place}: {what}", f"   for {example}", f"   cure: {cure}"]
     lines.append(f"plugin {plugin.name}: {counted(len(found), 'finding') if found else 'nothing found'}")
     for line in lines:
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
+        console.print(line, soft_wrap=True)
     return len(found)
 
 

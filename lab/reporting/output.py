@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import click
-from rich.console import Console
 
 from ..cli.usage_errors import Problem
-from .text import TextTable, as_markdown
+from .text import TextTable, as_markdown, plain_console
 
 
 @dataclass(frozen=True)
@@ -37,12 +36,12 @@ class Output:
 
 def show_tables(tables: list[TextTable], remarks: list[str]) -> None:
     """For a person."""
-    console = Console()
+    console = plain_console()
     for table in tables:
         table.show()
         console.print()
     for remark in remarks:
-        console.print(remark, style="dim", highlight=False)
+        console.print(remark, style="dim")
 
 
 def drawing_if_there(name: str, what: str) -> Any:

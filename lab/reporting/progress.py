@@ -24,7 +24,8 @@ class Progress:
         self.done = 0.0
         self._console = console or Console(quiet=True)
         self._bar = rich.progress.Progress(
-            "[bold]{task.description}", rich.progress.BarColumn(bar_width=None), rich.progress.TaskProgressColumn(),
+            rich.progress.TextColumn("{task.description}", style="bold", markup=False),
+            rich.progress.BarColumn(bar_width=None), rich.progress.TaskProgressColumn(),
             rich.progress.TimeRemainingColumn(), "left", console=self._console, expand=True, auto_refresh=False,
             speed_estimate_period=120, disable=not self._console.is_terminal,
         )  # fmt: skip

@@ -59,6 +59,13 @@ def metres(value: float) -> str:
     return f"{100 * size:.2g} cm" if size < 1 else f"{size:.3g} m"
 
 
+def plain_console(stderr: bool = False) -> Any:
+    """A rich Console that prints texts as they are: brackets in faults, names and paths are no markup."""
+    from rich.console import Console
+
+    return Console(stderr=stderr, markup=False, highlight=False, emoji=False)
+
+
 @dataclass(frozen=True)
 class TextTable:
     """``rows`` of cells under ``headings``; the first ``words`` columns, and others with ``left``, are left-aligned."""
@@ -71,18 +78,16 @@ class TextTable:
 
     def show(self) -> None:
         """Print the table."""
-        from rich.console import Console  # only here: numbers need nothing of it
-        from rich.markup import escape
-        from rich.table import Table
+        from rich.table import Table  # only here: numbers need nothing of it
 
-        table = Table(title=escape(self.title) or None, title_justify="left", title_style="bold", box=None,
+        table = Table(title=self.title or None, title_justify="left", title_style="bold", box=None,
                       pad_edge=False, show_header=any(self.headings))  # fmt: skip
         for place, heading in enumerate(self.headings):
             words = place < self.words or place in self.left
             table.add_column(heading, justify="left" if words else "right", no_wrap=place == 0 and len(self.left) > 0)
         for row in self.rows:
-            table.add_row(*map(escape, row))
-        Console().print(table)
+            table.add_row(*row)
+        plain_console().print(table)
 
     def markdown(self) -> str:
         """The table as Markdown, under its title."""

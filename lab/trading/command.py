@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-from rich.console import Console
 
 from ...framework.settings import COLLISION_MODES
 from ..cli.group import STOPPED
@@ -25,6 +24,7 @@ from ..cli.options import (
 from ..cli.usage_errors import Problem
 from ..reporting.output import Output, drawing_if_there
 from ..reporting.progress import Progress
+from ..reporting.text import plain_console
 from .answer import answer, remarks, table
 from .grid import FIELDS
 from .trade import trade
@@ -109,7 +109,7 @@ def trade_command(
     writable_folder(kept, option="--runs")
     vary = {field: values for field in FIELDS if (values := given.pop(field))}
     command = shlex.join(["carom", "trade", *context.meta[WORDS]])
-    with Progress(Console(stderr=True)) as bar:
+    with Progress(plain_console(stderr=True)) as bar:
         try:
             result = trade(
                 *dict.fromkeys(scenes), norms=norms, max_error=max_error, max_cost=max_cost, absolute=absolute,

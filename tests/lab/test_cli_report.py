@@ -37,6 +37,23 @@ def test_energy_drift_is_measured_against_the_largest_kinetic_energy(carom, ball
     assert report["energy"]["relative"] == pytest.approx((1 / 60) / 0.5, rel=1e-9)
 
 
+def test_text_of_others_is_no_markup(carom, ball):
+    """Faults, names of systems and of files: brackets and colons are as they were written."""
+    ball.write_text(
+        ball.read_text().replace(
+            "    return world",
+            "    world.add_system(Door())\n    return world\n\n"
+            "from carom import System\n\n"
+            "class Door(System):\n    name = 'door [/b]'\n\n    def process(self, dt):\n"
+            "        self.world.report_fault('door [/open] is [red] :key:')",
+        )
+    )
+    ball = ball.rename("[red] [.py")
+    shown = carom("run", str(ball), "--steps", "2").stdout
+    for text in ("! door [/open] is [red] :key:", "picture: out/[red] [-final.png", "door [/b]"):
+        assert text in shown
+
+
 def test_bodies_beyond_the_walls_and_broken_ones_count_as_escaped(carom, ball):
     ball.write_text(
         ball.read_text().replace(

@@ -25,6 +25,13 @@ def test_the_time_left_follows_from_the_rate():
     assert re.findall(r"\d:\d\d:\d\d", shown.getvalue())[-1] == "0:07:40"
 
 
+def test_what_it_says_is_no_markup():
+    shown = io.StringIO()
+    with Progress(Console(file=shown, force_terminal=True, width=80)) as bar:
+        bar.say("doors [/open] [red]")
+    assert "doors [/open] [red]" in shown.getvalue()
+
+
 def test_without_a_terminal_there_is_a_line_now_and_then(monkeypatch):
     now = 100.0
     monkeypatch.setattr("carom.lab.reporting.progress.time.monotonic", lambda: now)
