@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from contacts.helpers_sleeping import MODES, is_asleep, sleep, sleeping_tower, sleepy_world, tower
 from helpers_pairwise import pairwise
-from worlds import METHODS, Calls, ball, box, make_world, position, run
+from worlds import METHODS, Calls, ball, box, make_world, position, run, velocity
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Phase, Settings, System, World
@@ -233,15 +233,23 @@ class Disable(System):
             self.world.contacts.enabled[:] = False
 
 
-def test_disabling_the_contact_of_sleepers_wakes_them():
+@pytest.mark.parametrize("woken", [False, True])
+def test_disabling_the_contact_of_sleepers_wakes_them(woken):
+    """It holds them for one more step, and acts at once on what is awake."""
     world, trapdoor = sleepy_world(), Disable()
     boxes = tower(world, 0.0, 1)
     trapdoor.open = False
     world.add_system(trapdoor)
     sleep(world, *boxes)
     trapdoor.open = True
+    if woken:
+        world.wake(boxes[0])
     world.step()
     assert is_asleep(world, *boxes) == [False]
+    for falls in (woken, True):
+        assert (velocity(world, boxes[0])[1] < 0.0) == falls
+        assert (len(world.contacts.of(boxes[0])), len(world.contacts.stay)) == ((0, 0) if falls else (1, 1))
+        world.step()
     run(world, 30)
     assert position(world, boxes[0])[1] < 0.0
     assert is_asleep(world, *boxes) == [False]
