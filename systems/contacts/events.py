@@ -159,8 +159,13 @@ class RecordedContacts:
         alone[rows[known]] = False
         first = first[known]
         point = bodies.position[first] + bodies.offset[first] + memory.place[now, :count][known]
-        impulse = memory.total[now, :count][known]
-        row = np.concatenate((rows[known], np.flatnonzero(alone)))
+        rows, impulse = rows[known], memory.total[now, :count][known]
+        # What impacts have given, which have no points here, is that of the nearest one to the contact's.
+        rest = columns["normal_impulse"] - np.bincount(rows, impulse, len(alone))
+        order = np.lexsort((np.linalg.norm(point - columns["point"][rows], axis=1), rows))
+        pairs, nearest = np.unique(rows[order], return_index=True)
+        impulse[order[nearest]] += np.maximum(rest[pairs], 0.0)
+        row = np.concatenate((rows, np.flatnonzero(alone)))
         sort = np.argsort(row, kind="stable")
         return {
             **{name: columns[name][row[sort]] for name in ("entity_a", "entity_b", "normal", "depth", "step")},

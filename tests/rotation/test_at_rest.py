@@ -107,6 +107,23 @@ def test_the_manifold_has_the_corners_that_bear_it():
         assert [contact.entity_a for contact in points] == points.entity_a.tolist()
 
 
+def test_the_impulses_of_a_manifold_are_that_of_its_contact():
+    """Of boxes that fall on a corner, bounce and come to rest; in some steps an impact and rest give a part each."""
+    rng, mixed = np.random.default_rng(4), 0
+    with ground() as world:
+        for k in range(30):
+            tilt, height = rng.uniform(-0.6, 0.6), rng.uniform(0.6, 3)
+            box(world, (3 * k, height), (0.5, 0.25), rotation=tilt, restitution=0.25 * (k % 3))
+        for _ in range(150):
+            world.step()
+            points, contacts, impacts = world.contacts.manifold, world.contacts, world.contacts.impacts
+            given = np.bincount(points.contact, points.normal_impulse, len(contacts))
+            assert given == pytest.approx(contacts.normal_impulse, rel=1e-9, abs=1e-6)
+            struck = np.bincount(impacts.entity_b, impacts.normal_impulse, 99)[contacts.entity_b]
+            mixed += np.count_nonzero((struck > 0) & (contacts.normal_impulse > 1.01 * struck))
+    assert mixed
+
+
 def test_the_manifold_outlives_its_bodies():
     """Without entity_a each contact is one row, as it was; the rows of others have moved."""
     with ground() as world:
