@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import numbers
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
@@ -86,6 +87,17 @@ class Window(ABC):
     @world.setter
     def world(self, world: World) -> None:
         raise AttributeError("a view shows one world: for the next level end its loop, and make another View(world)")
+
+    @property
+    def speed(self) -> float:
+        """Seconds of the world per second: 1 as it is. ValueError for what is no finite number of at least 0."""
+        return self._speed
+
+    @speed.setter
+    def speed(self, speed: float) -> None:
+        if isinstance(speed, bool) or not (isinstance(speed, numbers.Real) and 0 <= speed < math.inf):
+            raise ValueError(f"View: speed must be a finite number of at least 0, got {speed!r}")
+        self._speed = float(speed)
 
     # -- what draws -------------------------------------------------------------------------------
 

@@ -17,6 +17,7 @@ from .usage_errors import Problem, one_line
 
 Option = Callable[[Any], Any]
 Corners = tuple[tuple[float, ...], tuple[float, ...]]
+FARTHEST = 1e100  # m: pictures of what is farther overflow
 
 
 def together(*options: Option) -> Option:
@@ -77,13 +78,13 @@ class View(click.ParamType):
         try:
             return corners((numbers[:half], numbers[half:]))
         except (TypeError, ValueError):
-            self.fail(f"{value!r} is not a lower and an upper corner, as in 0,0,4,3", param, ctx)
+            self.fail(f"{value!r} is not a lower and an upper corner, as in 0,0,4,3, within {FARTHEST:g}", param, ctx)
 
 
 def corners(view: Any) -> Corners:
     """A lower and an upper corner in 2D or 3D; TypeError or ValueError for anything else."""
     lower, upper = (tuple(float(x) for x in end) for end in view)
-    if len(lower) not in (2, 3) or not all(-math.inf < a < b < math.inf for a, b in zip(lower, upper, strict=True)):
+    if len(lower) not in (2, 3) or not all(-FARTHEST <= a < b <= FARTHEST for a, b in zip(lower, upper, strict=True)):
         raise ValueError
     return lower, upper
 

@@ -7,6 +7,7 @@ import functools
 import hashlib
 import importlib
 import importlib.metadata
+import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import Any
 from ... import scenes
 from ...framework import Settings, World
 from ..cli.loading import Loaded, load
+from ..cli.usage_errors import Problem
 from ..inputs import texts_read
 
 DEFAULT_SECONDS = 5.0  # if the subject does not define it
@@ -35,11 +37,19 @@ class Subject:
 
     @classmethod
     def of(cls, target: Any, options: Mapping[str, Any] | None = None, seed: int = 0) -> Subject:
-        """From a scene's name, a path, or a build function; Problem if there is none of that name."""
+        """From a scene's name, a path, or a build function; Problem if there is none of that name, or its build does
+        not take the options."""
         chosen = tuple(sorted((options or {}).items()))
         if callable(target):
-            return cls(getattr(target, "__name__", "scene"), build=target, options=chosen, seed=seed)
-        return cls(load_once(str(target)).name, target=str(target), options=chosen, seed=seed)
+            made = cls(getattr(target, "__name__", "scene"), build=target, options=chosen, seed=seed)
+        else:
+            made = cls(load_once(str(target)).name, target=str(target), options=chosen, seed=seed)
+        for name, value in chosen:
+            try:
+                inspect.signature(made.build or load_once(str(target)).function).bind_partial(**{name: value})
+            except TypeError as error:
+                raise Problem(f"{made.name}: --option {name}={value}: build {error}") from None
+        return made
 
     def world(self, settings: Settings | None, seed: int | None = None) -> World:
         """A new world; Problem for errors in a user's file. settings None: the recommended ones."""

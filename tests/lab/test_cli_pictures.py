@@ -85,7 +85,7 @@ def test_a_recording_of_another_kind_is_refused_before_the_run(carom):
     assert "--record: a film has a name that ends in .mp4, .gif, .webp, not film.avi" in line
 
 
-@pytest.mark.parametrize("view", ["0,0,4", "0,0,4,x", "4,3,0,0", "0,0,4,inf"])
+@pytest.mark.parametrize("view", ["0,0,4", "0,0,4,x", "4,3,0,0", "0,0,4,inf", "0,0,1e308,1e308", "-1e101,0,1,1"])
 def test_a_view_that_is_none_is_refused(carom, view):
     assert "is not a lower and an upper corner" in refusal(carom("run", "jump", "--view", view))
 

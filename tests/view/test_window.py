@@ -1,5 +1,7 @@
 """A window's keys and mouse, its overlays, and what may happen to a world below it."""
 
+import math
+
 import numpy as np
 import pygame
 import pytest
@@ -65,6 +67,11 @@ def test_a_loop_gets_the_seconds_of_a_frame_and_none_while_time_stands(player):
     for _ in range(20):
         player.key(pygame.K_PLUS)
     assert view.speed == 8.0
+    for wrong in ("a", None, True, -1, math.nan, math.inf):
+        with pytest.raises(ValueError, match="View: speed must be a finite number of at least 0"):
+            view.speed = wrong
+    view.speed = 0.5
+    assert player.frame() == pytest.approx(1 / 120)
 
 
 def test_back_in_time_and_forth(player):
