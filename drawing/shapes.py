@@ -16,7 +16,7 @@ from .outline_cache import Kind, OutlineCache, Rows
 from .outlines import fields_of
 
 PLAIN = -1  # neither a sensor nor one-way
-ALL = "offset", "sensor", "one_way"  # columns of every collider that tell where it is, and its style
+ALL = "offset", "sensor", "one_way", "enabled"  # columns of every collider that tell where it is, and its style
 
 
 class Colliders(NamedTuple):
@@ -68,9 +68,9 @@ def watched_of(world: Any, rows: slice) -> dict[str, bytes]:
     found = {"entity": table.column("entity")[rows].tobytes()}
     for component, shape in world.registry.shapes.items():
         mask = table.mask_names.get(component)
-        if mask:
+        if mask and table.arrays[mask][rows].any():
             keys = (mask, *(component.columns[name].key for name in (*shape.columns, *ALL)))
-            found |= {key: table.arrays[key][rows].tobytes() for key in keys if key in table.arrays}
+            found |= {key: table.column(key)[rows].tobytes() for key in keys}
             if hasattr(component, "turned"):
                 found[mask + " turned"] = table.column("rotation")[rows][table.arrays[mask][rows]].tobytes()
     return found
@@ -95,7 +95,7 @@ def colliders_of(world: Any, cache: OutlineCache, rows: slice) -> Colliders:
         row = np.flatnonzero(table.arrays[mask][rows]) + rows.start if mask else none
         if len(row):
             own = {name: table.values(component.columns[name].key, row) for name in shape.columns}
-            offset, sensor, one_way = (table.values(component.columns[name].key, row) for name in ALL)
+            offset, sensor, one_way, enabled = (table.values(component.columns[name].key, row) for name in ALL)
             if component is SphereCollider:  # often thousands, each of another size, which grow and shrink
                 radius = own["radius"]
                 outline = np.repeat(cache.numbers_of(shape, {"radius": np.zeros(1)}, 1), len(row))
@@ -103,7 +103,7 @@ def colliders_of(world: Any, cache: OutlineCache, rows: slice) -> Colliders:
                 radius, outline = np.full(len(row), np.nan), cache.numbers_of(shape, own, len(row))
             if hasattr(component, "turned"):
                 _follow_turns(table, cache, shape, row, own, outline)
-            special = np.where(sensor, Style.SENSOR, np.where(one_way.any(axis=1), Style.ONE_WAY, PLAIN))
+            special = np.where(sensor | ~enabled, Style.SENSOR, np.where(one_way.any(axis=1), Style.ONE_WAY, PLAIN))
             found.append((row, outline, offset, np.full(len(row), component.rotates), special.astype(np.int8), radius))
     return Colliders(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
 

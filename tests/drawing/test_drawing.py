@@ -233,10 +233,35 @@ def test_styles_tell_what_bodies_are():
             Style.SENSOR: world.create_entity(Transform((6, 0)), RigidBody(), SphereCollider(0.5, sensor=True)),
             Style.ONE_WAY: world.create_entity(Transform((8, 0)), AABBCollider((1, 0), one_way=(0, 1))),
         }
-        shown = Drawing(world).update()
-        found = {e: s for g in groups_of(shown) for e, s in zip(g.entity.tolist(), g.style.tolist(), strict=True)}
-        assert found == {entity: style for style, entity in kinds.items()}
+        drawing = Drawing(world)
+        shown = drawing.update()
+        assert styles_of(shown) == {entity: style for style, entity in kinds.items()}
         assert np.isnan(shown.circles.angle).all()
+        for style in (Style.STATIC, Style.KINEMATIC):  # what is off is not solid, whatever moves
+            world.component_for_entity(kinds[style], SphereCollider).enabled = False
+            assert styles_of(drawing.update())[kinds[style]] == Style.SENSOR
+
+
+def styles_of(shown):
+    return {e: s for g in groups_of(shown) for e, s in zip(g.entity.tolist(), g.style.tolist(), strict=True)}
+
+
+@both
+def test_what_is_static_is_made_once(d):
+    """Whatever columns the first steps make, and whatever comes, moves, sleeps and goes."""
+    with World(Physics(d, gravity=(0, -10, 0)[:d]), Rotation(), settings=Settings(sleeping=True)) as world:
+        world.create_entity(Transform((0, -1, 0)[:d]), BoxCollider((10, 1, 1)[:d]))
+        drawing = Drawing(world)
+        first = drawing.update()
+        for k in range(60):
+            if k in (1, 50):
+                falling = world.create_entity(Transform((0, 0.5, 0)[:d]), RigidBody(), SphereCollider(0.5), Spin())
+            world.step()
+            shown = drawing.update()
+            assert (shown.fixed_version, shown.fixed is first.fixed) == (first.fixed_version, True)
+        world.delete_entity(falling)
+        world.step()
+        assert drawing.update().fixed is first.fixed
 
 
 @pytest.mark.compiled
