@@ -115,6 +115,19 @@ def test_impacts_name_those_that_bounce_when_a_body_falls_asleep_in_that_step(mo
     assert world.component_for_entity(crate, RigidBody).asleep
 
 
+def test_contacts_of_the_narrow_phase_alone_name_those_that_touch_when_others_fall_asleep():
+    """The pairs of what drifts side by side, in a world without a response."""
+    world = make_world(sleeping=True)
+    drifting = [ball(world, (0.9 * k, 5), (1, 0), sensor=True) for k in range(4)]
+    resting = [ball(world, (0.9 * k, 0), sensor=True) for k in range(12)]
+    for system in world.systems[-2:]:
+        world.remove_system(system)
+    for _ in range(60):
+        world.step()
+        assert {pair for pair in pairs(world.contacts) if pair[0] < resting[0]} == set(itertools.pairwise(drifting))
+    assert world.bodies.asleep.sum() == len(resting)
+
+
 def test_impacts_are_told_without_the_system_of_events():
     """As they are with it, of all steps of a frame."""
     told = []
