@@ -22,7 +22,7 @@ from ...systems.joints.records import SPRING as SPRING
 from ...systems.shapes.rotation import axes_of
 from .arms import arm_of as arm_of
 from .arms import moment as moment
-from .joint import WORLD, Joint, Place, whole_body
+from .joint import WORLD, Joint, Place
 from .joint import Driven as Driven
 from .joint import Row as Row
 from .kinds import KINDS as KINDS
@@ -247,7 +247,7 @@ class Joints(Plugin):
             for entity, joint in self._present().items():
                 joint.check_apart(self._contents, entity)
                 if entity in self._joints:  # what is a part of another body by now
-                    self._rows.keep_apart(joint, self._ends_of(joint))
+                    self._rows.keep_apart(joint, joint.whole_ends(self._contents))
         self._parts_changes = PartChanges.count
         if not (touched or self._set or self._released or self._table_version != table.version):
             return
@@ -294,7 +294,7 @@ class Joints(Plugin):
         joint._taken = self._anchors = None
         rows = joint.rows(self._physics.dimensions)
         bodies, other = self._rows.put(joint, rows, fresh)
-        self._rows.keep_apart(joint, self._ends_of(joint))
+        self._rows.keep_apart(joint, joint.whole_ends(self._contents))
         self._made_of[entity] = _fields_of(joint)
         joint._taken = self
         self._breaking = self._breaking or not (joint.breaking_force is joint.breaking_torque is None)
@@ -307,13 +307,9 @@ class Joints(Plugin):
             self._tell_if_nothing_turns(joint)
         return bodies
 
-    def _ends_of(self, joint: Joint) -> list[int]:
-        """The bodies that a joint holds, of which its own may be parts; ``WORLD`` is itself."""
-        return [body if body == WORLD else whole_body(self._contents, body) for body in (joint.a, joint.b)]
-
     def _tell_if_nothing_turns(self, joint: Joint) -> None:
         entities, name = self._contents.entities, type(joint).__name__
-        ends = [body for body in self._ends_of(joint) if body != WORLD]
+        ends = [body for body in joint.whole_ends(self._contents) if body != WORLD]
         if any(Spin in entities.types_of(e) and entities.handle(e, RigidBody).kind == "dynamic" for e in ends):
             return
         ends = ", ".join(f"entity {e}" for e in ends)

@@ -269,9 +269,14 @@ class Joint(Component, abstract=True):
 
     def check_apart(self, contents: Any, entity: int | None) -> None:
         """ValueError if in ``contents`` both are parts of one body, or one is a part of the other."""
-        if WORLD not in (self.a, self.b) and whole_body(contents, self.a) == (body := whole_body(contents, self.b)):
+        whole, body = self.whole_ends(contents)
+        if WORLD != whole == body:
             name = f"{'' if entity is None else f'entity {entity}: '}{type(self).__name__}"
             raise ValueError(f"{name} joins entity {self.a} and entity {self.b}, which are both of one body, {body}")
+
+    def whole_ends(self, contents: Any) -> list[Any]:
+        """The two bodies of ``contents`` of which its own may be parts; ``WORLD`` is itself."""
+        return [body if body == WORLD else whole_body(contents, body) for body in (self.a, self.b)]
 
     def in_order(self, name: str, low: float | None, high: float | None) -> tuple[float, float]:
         """The limits ``low`` and ``high``, in the unit of field ``name``; None: no limit. ValueError if ``low`` is the

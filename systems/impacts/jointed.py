@@ -48,7 +48,7 @@ def last_impact_of(state, group):
 
 @part
 def settle_group(state, i, t):
-    """The group of body i."""
+    """``settled`` of the bodies of the group of body i, to an impact at time t; see :func:`settle`."""
     impacts, joints, zero, group = state.impacts, state.solver.joints, zero_of(state), group_of(state, i)
     impacts.since = max(0.0, last_impact_of(state, group)) if group >= 0 else 0.0
     impacts.now = 0.5 * (impacts.since + t)
