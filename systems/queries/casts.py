@@ -135,8 +135,8 @@ def keep_hit(state, batch, q, i, path, touch):
 def cast_at(state, batch, q, path, i, box, between):
     """Test row i if the path enters its box in the slice from between[0] to between[1]: each has its turn in one."""
     reach = batch.search_limit[q] * SLICE_SLACK
-    enter, leave = box_interval(box[0], box[1], path, reach)
-    if enter <= leave and between[0] <= enter < between[1] and is_wanted(state, batch, q, i):
+    enter, leave = box_interval(box[0], box[1], path, batch.limit[q] * SLICE_SLACK)  # whatever it has met before
+    if enter <= min(leave, reach) and between[0] <= enter < between[1] and is_wanted(state, batch, q, i):
         touch = first_touch_of_cast(state, batch, q, i, path, leave, reach)
         if batch.against:
             touch = touch_in_the_way(state, batch, q, i, path, leave, reach, touch)
@@ -151,7 +151,7 @@ def cast_in_grid(state, batch, grid, q):
     lowest, highest = frame_of(grid)
     path = cast_path(state, batch, q, box_rounding(batch.centre[q], lowest, highest))
     enter, leave = box_interval(lowest, highest, path, math.inf)
-    meets, first, batch.span = enter <= leave and enter <= batch.search_limit[q] * SLICE_SLACK, -1, 0.0
+    meets, first = enter <= leave and enter <= batch.search_limit[q] * SLICE_SLACK, -1
     enter, leave = (enter, leave) if meets else (0.0, 0.0)
     begin = enter
     while True:
@@ -180,7 +180,6 @@ def cast_in_tree(state, batch, tree, q):
     path = cast_path(state, batch, q, uncertainty(tree, batch.centre[q]))
     enter, leave = box_interval(tree.origin[0], add(tree.origin[0], tree.extent[0]), path, math.inf)
     used = begin_slices(batch, tree)
-    batch.span = 0.0
     while used > 0:
         turn = earliest_slice(batch, used)
         level, begin = batch.slice_level[turn], batch.slice_begin[turn]

@@ -12,7 +12,7 @@ from typing import Any
 
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.jit.records.schema import Schema, integer, ints, number, vectors
+from ...framework.jit.records.schema import Schema, integer, ints, vectors
 from ...framework.vectors import negative
 from ..narrow_phase.one_way import front_of as front_of
 from ..narrow_phase.one_way import is_from_front as is_from_front
@@ -37,7 +37,6 @@ NEAR = Schema(
     low=vectors(unit="m"),
     high=vectors(unit="m"),
     end=ints(),
-    span=number(unit="m"),
 )
 
 

@@ -27,7 +27,6 @@ CAST_STEPS = 100  # a graze takes about 30; what still approaches after that cou
 LAST_STEP = 1e-9  # of the way: the most that rounding is made up for
 BEYOND_ROUNDING = 1e-12  # of a distance: more than all rounding
 LONGEST_SPAN = 1e200  # m; on the way past bodies without end
-SPAN_RATIO = 1e6  # the way that a sweep is given may be so many times longer than needed
 MOST_SHIFTS = 8  # off what is left, before the shape counts as wedged in
 LOOK_AHEAD, MOST_STRIDES_AHEAD = 0.2, 1000  # of the size of a shape that is wedged in; at most so many
 
@@ -38,7 +37,7 @@ Path = collections.namedtuple("Path", "start direction inverse half")
 
 @inlined
 def power_above(distance):
-    """A power of two that is larger. With such spans a sweep finds the same digits, however long the way is."""
+    """A power of two that is larger, so that the digits of a time of a sweep are those of the distance."""
     return two_to(exponent_of(distance)) if distance > 0.0 else 1.0
 
 
@@ -106,9 +105,7 @@ def make_first_touch(evaluate_at: Callable[..., Any], sweep_at: Callable[..., An
     def first_touch(state, batch, q, i, path, leave, reach):
         """(touches, distance, normal, point) of query q on its path and row i, whose box it leaves at ``leave``."""
         away = to_collider(state, path.start, i)
-        if not leave <= batch.span < SPAN_RATIO * leave:
-            batch.span = power_above(min(leave, LONGEST_SPAN))
-        span = batch.span
+        span = power_above(min(leave, LONGEST_SPAN))
         known, touches, time = sweep_at(state, batch, q, i, away, scale(path.direction, span))
         if not known:
             return search_touch(state, batch, q, i, path, away, reach)
@@ -185,7 +182,7 @@ def touch_in_the_way(state, batch, q, i, path, leave, reach, touch):
         start = add_scaled(start, here, -max(depth, -slack) - 2.0 * slack)
         shifted = Path(start, path.direction, path.inverse, path.half)
         touch = first_touch_of_cast(state, batch, q, i, shifted, leave, reach)
-    return touch_of_wedged(state, batch, q, i, path, reach)
+    return touch_of_wedged(state, batch, q, i, path, leave)
 
 
 @part

@@ -45,5 +45,4 @@ QUERY_BATCH = Schema(
     hit_count=integer(),
     slice_level=ints(),  # levels of the tree in use
     slice_begin=floats(unit="m"),  # and where the next slice of each begins, m
-    span=number(unit="m"),  # length of the way that sweeps are given
 )

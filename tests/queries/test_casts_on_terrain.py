@@ -11,13 +11,14 @@ import itertools
 import numpy as np
 import pytest
 
-from carom.components import AABBCollider, SphereCollider
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import World
-from carom.plugins import Physics, capsule, convex_polygon, terrain
+from carom.plugins import Physics, capsule, convex_polygon, terrain, tile_grid
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider
 from carom.plugins.rotation import Rotation
 from carom.plugins.terrain import create_chain, create_height_field
+from carom.plugins.tile_grid import TileGridCollider
 
 pytestmark = pytest.mark.slow  # its shapes take long to compile
 
@@ -88,7 +89,7 @@ def random_shape(random, d):
 
 def random_ground(random, d):
     """(world, its pieces, their unit normals)."""
-    plugins = Rotation(), terrain.plugin, capsule.plugin, *([convex_polygon.plugin] if d == 2 else [])
+    plugins = Rotation(), terrain.plugin, capsule.plugin, *([convex_polygon.plugin, tile_grid.plugin] if d == 2 else [])
     world, height = World(Physics(dimensions=d), *plugins), random.choice((0.05, 0.3, 1.0))
     if d == 2:
         points = np.zeros((7, 3))
@@ -151,3 +152,30 @@ def test_what_falls_on_edges_corners_and_ends_is_found_where_it_touches(d):
         world.close()
     assert met > 150
     assert beyond > 15
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_cast_finds_each_body_as_if_it_were_alone(d):
+    """To the last digit: what else lies on its way, and what was cast before, has no part in it."""
+    random, met = np.random.default_rng(50 + d), 0
+    for _ in range(3):
+        world, _, _ = random_ground(random, d)
+        for k in range(12):
+            body = [RigidBody()] if k % 2 else []
+            world.create_entity(Transform(random.uniform(-2, 9, d)), *body, random_shape(random, d)[0])
+        for share in (0.1, 0.5, 0.9) if d == 2 else ():
+            cells = TileGridCollider(random.random((30, 70)) < share, random.uniform(0.1, 0.3))
+            world.create_entity(Transform(random.uniform(-4, 12, d)), cells)
+        everyone = [entity for entity, _ in world.get_component(Transform)]
+        for _ in range(60):
+            shape, start, against = random_shape(random, d)[0], random.uniform(-9, 15, d), random.random() < 0.5
+            way = (random.uniform(0, 6, d) - start) * 10 ** random.uniform(0, 4)
+            hits = world.shape_cast(shape, start, way, against=against)
+            hits += world.shape_cast(shape, start, way, against=against, only_nearest=True)
+            for hit in hits:
+                others = [entity for entity in everyone if entity != hit.entity]
+                (alone,) = world.shape_cast(shape, start, way, against=against, exclude=others)
+                assert (hit.distance, *hit.normal, *hit.point) == (alone.distance, *alone.normal, *alone.point)
+                met += 1
+        world.close()
+    assert met > 150

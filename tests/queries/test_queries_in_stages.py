@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers_character import FIGURES, plugins_of
 
 from carom import (
     AABBCollider,
@@ -15,8 +16,11 @@ from carom import (
     RigidBody,
     SphereCollider,
     System,
+    TileGridCollider,
     Transform,
     World,
+    create_chain,
+    create_height_field,
 )
 from carom.framework import column
 from carom.framework.errors import PluginError
@@ -108,6 +112,42 @@ def test_stages_find_what_queries_find(dimensions, count):
             assert probe.first == (casts[0].entity if casts else -1) or len(hits) > 1  # ties at 0
             found += len(hits) + len(casts)
         assert found > count / 10
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("d", [2, 3])
+def test_what_a_stage_casts_does_not_hang_on_what_was_cast_before(d):
+    """To the last digit, whether that went a hair's breadth or to the horizon: on tiles, terrain and other shapes."""
+    for seed in range(4):
+        found = []
+        for before in (1e-3, 3e4):
+            rng = np.random.default_rng(seed)
+            with World(*plugins_of(d, 0.0), probes) as world:
+                figure = FIGURES["capsule 2D" if d == 2 else "capsule 3D"]
+
+                def look_from(at, way, figure=figure, world=world):
+                    body = RigidBody(kind="kinematic"), figure.collider(sensor=True, layer=2, mask=1)
+                    return world.create_entity(Transform(at), *body, Probe(way=way))
+
+                look_from((-1e5,) * d, (before,) * d)
+                world.create_entity(Transform((-1e5,) * d), SphereCollider(1.0))
+                if d == 2:
+                    heights = 8 + np.cumsum(rng.integers(-1, 2, 60)).clip(-6, 6)
+                    cells = np.arange(30)[::-1, None] < heights
+                    world.create_entity(Transform((0, 0)), TileGridCollider(cells, 1.0, lower=(0, 0)))
+                    create_chain(world, np.stack((np.arange(60.0), 10 + rng.uniform(0, 3, 60)), axis=1))
+                else:
+                    create_height_field(world, rng.uniform(8, 10, (20, 20)), 3.0)
+                for n in range(40):
+                    shape = (SphereCollider, AABBCollider)[n % 2](rng.uniform(0.3, 1.0))
+                    world.create_entity(Transform(rng.uniform(8, (56, 14, 56)[:d])), shape)
+                probing = [look_from(rng.uniform(4, 56, d) * (1, 0.1, 1)[:d] + (0, 8, 0)[:d], rng.normal(size=d))
+                           for _ in range(80)]  # fmt: skip
+                world.step()
+                probed = [world.component_for_entity(entity, Probe) for entity in probing]
+                found.append([(probe.first, probe.distance) for probe in probed])
+        assert found[0] == found[1]
+        assert sum(first >= 0 for first, _ in found[0]) > 15
 
 
 def test_elsewhere_in_the_step_a_stage_does_not_know_where_bodies_are():
