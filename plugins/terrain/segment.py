@@ -71,10 +71,13 @@ class ChainSegmentCollider(Collider):
 
     @staticmethod
     def bounds(shape, dimensions):
-        """At least half as thick as long: tolerances follow the extent."""
+        """At least half as thick as long: tolerances follow the extent. With what is behind it, see thickness."""
+        way = sub(shape.end, shape.start)
         x = max(abs(shape.start[0]), abs(shape.end[0]))
         y = max(abs(shape.start[1]), abs(shape.end[1]))
-        return (1.0 + BESIDE) * max(x, 0.5 * y), (1.0 + BESIDE) * max(y, 0.5 * x)
+        behind = shape.thickness / length(way)
+        behind_x, behind_y = behind * abs(way[1]), behind * abs(way[0])
+        return (1.0 + BESIDE) * max(x, 0.5 * y) + behind_x, (1.0 + BESIDE) * max(y, 0.5 * x) + behind_y
 
     @staticmethod
     def support(shape, direction):

@@ -26,6 +26,11 @@ from .segment import BEHIND, BESIDE, NEAR, NONE, PART, STRAIGHT, TILT, WHOLE, pl
 Edge = collections.namedtuple("Edge", "at outward through falls room")
 
 
+@plugin.kernel
+def cross3(u, v):
+    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+
+
 @plugin.shape(cost=5)
 class TerrainTriangleCollider(Collider):
     """A static triangle in a 3D world, solid behind its front.
@@ -63,12 +68,17 @@ class TerrainTriangleCollider(Collider):
 
     @staticmethod
     def bounds(shape, dimensions):
-        """At least a quarter as thick as long: tolerances follow the extent."""
+        """At least a quarter as thick as long: tolerances follow the extent. With what is behind it, see thickness."""
         x = max(abs(shape.a[0]), max(abs(shape.b[0]), abs(shape.c[0])))
         y = max(abs(shape.a[1]), max(abs(shape.b[1]), abs(shape.c[1])))
         z = max(abs(shape.a[2]), max(abs(shape.b[2]), abs(shape.c[2])))
-        least = 0.25 * max(x, max(y, z))
-        return (1.0 + BESIDE) * max(x, least), (1.0 + BESIDE) * max(y, least), (1.0 + BESIDE) * max(z, least)
+        least, front = 0.25 * max(x, max(y, z)), cross3(sub(shape.b, shape.a), sub(shape.c, shape.a))
+        behind = shape.thickness / length(front)
+        return (
+            (1.0 + BESIDE) * max(x, least) + behind * abs(front[0]),
+            (1.0 + BESIDE) * max(y, least) + behind * abs(front[1]),
+            (1.0 + BESIDE) * max(z, least) + behind * abs(front[2]),
+        )
 
     @staticmethod
     def support(shape, direction):
@@ -83,11 +93,6 @@ class TerrainTriangleCollider(Collider):
 
 
 triangle_support = plugin.kernel(TerrainTriangleCollider.support)
-
-
-@plugin.kernel
-def cross3(u, v):
-    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
 
 
 @part

@@ -237,6 +237,27 @@ def test_one_side_is_solid():
     assert position(world, inside)[1] > 0.39
 
 
+@each_mode
+@pytest.mark.parametrize("seed", range(3))
+def test_thickness_is_how_far_behind_straight_ground_bodies_are_pushed_out(mode, seed):
+    """Of any length of segments, thinner than the balls and thicker; farther behind they fall."""
+    random = np.random.default_rng(seed)
+    tilt, thickness = random.uniform(-0.5, 0.5), random.uniform(0.3, 2.0)
+    along, up = np.array((math.cos(tilt), math.sin(tilt))), np.array((-math.sin(tilt), math.cos(tilt)))
+    world = make_world(tuple(-G * up), collision=mode)
+    create_chain(world, np.cumsum(random.uniform(0.2, 3.0, 40))[:, None] * along, thickness=thickness)
+    behind = random.uniform(0.05, 2.0, 30) * thickness
+    behind[np.abs(behind - thickness) < 0.1] = 0.5 * thickness
+    balls = [world.create_entity(Transform(x * along - far * up), RigidBody(),
+                                 SphereCollider(random.uniform(0.1, 0.6), layer=2, mask=1))
+             for x, far in zip(random.uniform(5, 40, 30), behind, strict=True)]  # fmt: skip
+    for _ in range(30):
+        world.step()
+    rises = [position(world, ball) @ up > -far for ball, far in zip(balls, behind, strict=True)]
+    assert rises == (behind < thickness).tolist()
+    world.close()
+
+
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("lean", [0.0, 0.012, -0.012])
 def test_a_box_that_overhangs_a_sharp_peak_stands_on_it(mode, lean):

@@ -203,6 +203,29 @@ def test_a_mesh_of_a_bowl_holds_balls(mode):
         assert (np.abs(world.bodies.dynamic.position).sum(axis=1) < 4.0).all()
 
 
+@each_mode
+@pytest.mark.parametrize("seed", range(3))
+def test_thickness_is_how_far_behind_straight_ground_bodies_are_pushed_out(mode, seed):
+    random = np.random.default_rng(seed)
+    slope, cell, thickness = random.uniform(-0.5, 0.5), random.uniform(0.3, 2.0), random.uniform(0.3, 3.0)
+    up = np.array((-slope, 1.0, 0.0)) / math.hypot(slope, 1.0)
+    world = make_world(-G * up, collision=mode)
+    i, j = np.meshgrid(np.arange(31.0), np.arange(31.0), indexing="ij")
+    create_height_field(world, slope * cell * i + 0.0 * j, cell, thickness=thickness)
+    behind = random.uniform(0.05, 2.0, 30) * thickness
+    behind[np.abs(behind - thickness) < 0.1 * max(cell, 1.0)] = 0.5 * thickness
+    balls = []
+    for far in behind:
+        x, z = random.uniform(12, 18, 2) * cell
+        ball = SphereCollider(random.uniform(0.1, 0.6), layer=2, mask=1)
+        balls.append(world.create_entity(Transform(np.array((x, slope * x, z)) - far * up), RigidBody(), ball))
+    for _ in range(30):
+        world.step()
+    rises = [position(world, ball) @ up > -far for ball, far in zip(balls, behind, strict=True)]
+    assert rises == (behind < thickness).tolist()
+    world.close()
+
+
 def test_rays_see_fronts_only():
     world = make_world()
     ground = create_height_field(world, [[0.0, 0.0], [0.0, 0.0]], 2.0)
