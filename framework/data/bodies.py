@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..names import did_you_mean
 from ..typing import BodiesColumn, Integers
-from .columns import Column
+from .columns import Column, or_no_rows
 from .component import Component
 from .driven import drive
 from .interpolation import interpolated
@@ -106,7 +106,7 @@ class Bodies:
         table, n, d = self._table, len(self), self._table.dimensions
         if self._kind != KINEMATIC:
             raise ValueError("move_to moves kinematic bodies: bodies.kinematic.move_to(positions)")
-        places = np.array(positions, float)
+        places = np.array(or_no_rows(positions, d), float)
         if places.shape != (n, d):
             raise ValueError(f"move_to takes positions of shape {(n, d)}, got shape {places.shape}")
         chosen = np.flatnonzero(~np.isnan(places).all(axis=1))

@@ -24,6 +24,12 @@ LENGTHS: dict[str, tuple[tuple[int, ...], str]] = {
 REQUIRED: Any = type("Required", (), {"__repr__": lambda self: "<required>"})()
 
 
+def or_no_rows(given: Any, *shape: int) -> Any:
+    """What is given; an empty list as no rows of that shape, which numpy cannot know."""
+    empty = not given if isinstance(given, (list, tuple)) else getattr(given, "shape", None) == (0,)
+    return np.empty((0, *shape), np.int64) if empty else given
+
+
 @dataclass(frozen=True, eq=False)
 class Column:
     """One field of a component type; as a class attribute, the access to that field of a handle.
@@ -170,7 +176,7 @@ class Column:
         elif self.optional and (isinstance(values, (list, tuple)) or getattr(values, "dtype", "") == "O"):
             absent = np.array([value is None for value in values])
             values = [some if value is None else value for value in values] if absent.any() else values
-        array = self._as_numbers(values, None, given)
+        array = self._as_numbers(values if count else or_no_rows(values, *shape), None, given)
         if array.ndim == 0 and self.item == "rotation" and dimensions == 3 and array == 0:
             array = self.empty_value(3)
         full = self._full(array, count, shape)

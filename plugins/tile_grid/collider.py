@@ -10,7 +10,7 @@ import numpy as np
 from ...components.colliders import Collider, ColliderFields
 from ...framework import array_column, column
 from ...framework.data.arrays.column import ArrayColumn
-from ...framework.data.columns import Column
+from ...framework.data.columns import Column, or_no_rows
 from ...framework.outlines import runs_outline
 from ...framework.typing import ArrayField, Vector
 from .cells import (
@@ -210,7 +210,8 @@ class TileGridCollider(Collider):
             TileShape; one for all cells, or k of them. Another one than FULL needs a map that was made with
             ``materials`` or ``shapes``
         """
-        places, values, shapes = array_of(cell), array_of(value), array_of(shape)
+        places, values = array_of(or_no_rows(cell, 2)), array_of(or_no_rows(value))
+        shapes = array_of(or_no_rows(shape))
         if places.shape == (2,):
             places = places[None]
         if places.ndim != 2 or places.shape[1] != 2 or places.dtype.kind not in "iu":

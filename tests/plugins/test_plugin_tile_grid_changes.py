@@ -75,6 +75,9 @@ def test_many_cells_take_one_value():
     expected[0, 0] = expected[5, 6] = True
     expected[[39, 38], 0] = False
     np.testing.assert_array_equal(drawn.cells, expected)
+    for none, value in (([], True), ((), False), (np.array([]), 1), ([], []), (np.zeros((0, 2), int), True)):
+        drawn.set(none, value)
+        np.testing.assert_array_equal(drawn.cells, expected)
     drawn.set(np.argwhere(~expected), True)
     assert drawn.cells.all()
 

@@ -182,6 +182,24 @@ def test_what_is_deleted_and_what_is_written(d):
     assert world.ray_casts(np.empty((0, d)), way).entity.shape == (0,)
 
 
+@both_dimensions
+def test_empty_lists_are_no_queries_and_no_entities(d):
+    world, shape, radii = make_world(d), SphereCollider(0.3), SphereCollider.many(radius=[])
+    ball(world, np.zeros(d))
+    for none in ([], (), np.array([])):
+        found = [world.ray_casts(none, none), world.ray_casts(none, none, none), world.query_nearests(none),
+                 world.shape_casts(shape, none, none), world.shape_casts(radii, none, none)]  # fmt: skip
+        assert [len(each.entity) for each in found] == [0] * len(found)
+        found = world.shape_overlaps(shape, none), world.query_spheres(none, 1.0), world.query_aabbs(none, none)
+        assert [len(each) for each in found] == [0] * len(found)
+        bodies = Transform.many(none), RigidBody.many(linear_velocity=none, mass=none, kind=list(none)), radii
+        assert len(world.create_entities(0, *bodies)) == 0
+        world.delete_entities(none)
+        world.bodies.kinematic.move_to(none)
+    with pytest.raises(ValueError, match=r"Transform\.position must be one value or one per row"):
+        world.create_entities(2, Transform.many([]))
+
+
 def test_a_query_between_a_shape_that_came_and_went_changes_no_step():
     """The query links the functions of other shapes than the steps before and after it."""
 

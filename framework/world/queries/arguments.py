@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...data.columns import or_no_rows
+
 NONE_EXCLUDED = np.empty((1, 0), np.int64)
 
 
@@ -49,7 +51,7 @@ def point(value: Any, name: str, dimensions: int) -> tuple[float, ...]:
 def points(value: Any, name: str, dimensions: int, count: int | None = None) -> np.ndarray:
     """(m, d) finite floats; one point stands for ``count`` of them."""
     try:
-        made = np.asarray(value, float)
+        made = np.asarray(or_no_rows(value, dimensions), float)
     except (TypeError, ValueError):
         raise ValueError(f"{name} must be numbers, got {value!r}") from None
     if count is not None and made.shape == (dimensions,):
