@@ -20,7 +20,8 @@ BEHIND = 1e-9  # of the radius: what is nearer by less than that is at the same 
 def explode(
     world: World, point: Vector, radius: float, impulse: float, *, shielded: bool = False, mask: int = -1
 ) -> list[int]:
-    """Push all dynamic bodies away from ``point``, (d,) m, each where it is nearest; what has a Spin turns.
+    """Push all dynamic bodies with a collider away from ``point``, (d,) m, each where it is nearest; what has a Spin
+    turns. Sensors are pushed too; those among the parts of a body do not count.
 
     radius
         m, above 0
@@ -45,7 +46,7 @@ def explode(
     nearest: dict[int, tuple[float, Any]] = {}
     for hit in hits:
         body = _body_of(world, hit.entity)
-        if body is None or _is_sensor(world, hit.entity):
+        if body is None or (hit.entity != body and _is_sensor(world, hit.entity)):  # a zone that it carries
             continue
         ray = world.ray_cast(point, -hit.normal, radius, mask)
         found = next((each for each in ray if each.entity == hit.entity), None)

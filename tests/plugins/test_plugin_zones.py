@@ -350,6 +350,18 @@ def test_what_a_ray_meets_shields_but_sensors_and_what_holds_the_bomb():
     assert explode(world, (0.0, 0.1), 4.0, 5.0, mask=2) == []
 
 
+@both_dimensions
+def test_an_explosion_pushes_sensors_too_but_no_zone_that_a_body_carries(d):
+    world = world_of(d, Parts(), gravity=0.0)
+    gem, solid = (world.create_entity(Transform(flat(d, x)), RigidBody(), SphereCollider(0.5, sensor=x > 0))
+                  for x in (2.0, -2.0))  # fmt: skip
+    guard = ball(world, flat(d, 0.0, 6.0))
+    world.create_entity(PartOf(guard), SphereCollider(8.0, sensor=True))
+    world.create_entity(Transform(flat(d, 0.0, -2.0)), RigidBody())  # nothing that could be hit
+    assert explode(world, flat(d, 0.0), 4.0, 5.0) == sorted([gem, solid])
+    np.testing.assert_array_equal(velocity(world, gem), -velocity(world, solid))
+
+
 def test_an_explosion_wakes():
     world = world_of(sleeping=True)
     box(world, (0.0, -1.0), half=(50.0, 1.0), kind="static")
