@@ -22,11 +22,11 @@ class Profiler:
         self._sums = Totals()  # of what is Python
         self._before: dict[str, np.ndarray] = {}  # what the stages had taken when measuring began, by name
         self._profiled = Totals()  # inside profiles that have ended
-        self._profile_start: Totals | None = None
+        self._profile_start: tuple[Totals, dict[str, np.ndarray]] | None = None
 
     def add(self, system: str, seconds: float) -> None:
         """A Python system has run."""
-        self._sums.seconds[system] = self._sums.seconds.get(system, 0.0) + seconds
+        self._sums.seconds[system] = self._sums.seconds.get(system, 0.0) + max(seconds, 0.0)
 
     def wait(self, seconds: float) -> None:
         """Kernels were compiled or loaded in a step."""
@@ -37,7 +37,7 @@ class Profiler:
         """Count calls and time of stages and kernels; CaromError if that is going on already, in any world."""
         if compilation.timing():
             raise CaromError("a profile is on already: kernels can be timed for one world at a time")
-        self._profile_start, program = self.totals(), self._pipeline.physics.program
+        self._profile_start, program = self._now(), self._pipeline.physics.program
         compilation.time_calls(self._record)
         program.time_apart(True)
         try:
@@ -60,11 +60,12 @@ class Profiler:
         program = self._pipeline.physics.program
         return dict(zip((stage.name for stage in program.stages), program.counts().T, strict=True))
 
-    def _stages(self) -> Totals:
-        """What all stages have taken since measuring began."""
+    def _stages(self, before: dict[str, np.ndarray]) -> Totals:
+        """What all stages have taken since they had those counts. Ticks are made seconds only then: how long one is
+        becomes known better with time."""
         physics, totals = self._pipeline.physics, Totals()
         program = physics.program
-        taken = [count - self._before.get(name, 0) for name, count in self._counts().items()]
+        taken = [count - before.get(name, 0) for name, count in self._counts().items()]
         counts = np.array(taken).reshape(-1, 3).T
         seconds = program.seconds_of(counts).tolist()
         for k, (stage, count) in enumerate(zip(program.stages, counts[0].astype(int).tolist(), strict=True)):
@@ -76,17 +77,22 @@ class Profiler:
                     totals.seconds[system] = totals.seconds.get(system, 0.0) + seconds[k]
         return totals
 
-    def totals(self) -> Totals:
-        """The sums so far."""
+    def _now(self) -> tuple[Totals, dict[str, np.ndarray]]:
+        """The sums so far but for the stages, and the counts of these."""
         counters = self._pipeline.physics.counters()
         kept = Totals(self.steps, counters={**counters, "dropped_steps": self._pipeline.clock.dropped_steps})
-        return self._sums + self._stages() + kept
+        return self._sums + kept, self._counts()
+
+    def totals(self) -> Totals:
+        """The sums so far."""
+        return self._now()[0] + self._stages(self._before)
 
     def profiled(self) -> Totals:
         """The part of them that profiles have seen."""
         if self._profile_start is None:
             return self._profiled
-        return self._profiled + (self.totals() - self._profile_start)
+        sums, counts = self._profile_start
+        return self._profiled + (self._now()[0] - sums) + self._stages(counts)
 
     def stats(self) -> Stats:
         """Means of it all."""
@@ -98,4 +104,4 @@ class Profiler:
         self._profiled = Totals()
         self._pipeline.physics.reset_counters()
         if self._profile_start is not None:
-            self._profile_start = self.totals()
+            self._profile_start = self._now()

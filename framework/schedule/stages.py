@@ -254,7 +254,7 @@ class Program:
         inside, waited, began = self.inside, log.waited, time.perf_counter()
         self.handlers[code](dt)
         passed = time.perf_counter() - began - (log.waited - waited)
-        self._python_seconds[stage] += passed - (self.inside - inside)
+        self._python_seconds[stage] += max(passed - (self.inside - inside), 0.0)
 
     def run_inside(self, start: int, stop: int, dt: float) -> None:
         """The same as :meth:`run`, for Python code that is a part of a step itself."""
