@@ -9,8 +9,11 @@ import pytest
 from rotation.helpers_turning import G, ball, box, part, pose, turning_world
 from worlds import MODES, run
 
-from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.plugins.rotation import BoxCollider, Spin
+from carom.components import AABBCollider, Collider, RigidBody, SphereCollider, Transform
+from carom.framework import Plugin, Settings, World, column
+from carom.framework.vectors import add_scaled, dot, length, scale
+from carom.plugins import Physics
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 SHARE = {2: 1 / 2, 3: 2 / 5}  # inertia of a disc and a ball, over m r^2
 
@@ -264,3 +267,51 @@ def test_a_box_within_a_sphere_that_only_sorts_out_pairs_does_not_roll():
             run(world, 20)
             found.append((*motion(world, entity)[0], *motion(world, entity)[1]))
     assert found[0] == found[1]
+
+
+rocking = Plugin("rocking")
+
+
+@rocking.shape(cost=4)
+class EllipseCollider(Collider):
+    """A smooth shape that is not round, with these half axes."""
+
+    rotates = True
+    dimensions = (2,)
+    semi = column(item="vector", positive=True)
+
+    @staticmethod
+    def support(shape, direction):
+        x, y = shape.semi[0] * dot(shape.axes[0], direction), shape.semi[1] * dot(shape.axes[1], direction)
+        size = length((x, y))
+        return add_scaled(scale(shape.axes[0], shape.semi[0] * x / size), shape.axes[1], shape.semi[1] * y / size)
+
+    @staticmethod
+    def bounds(shape, dimensions):
+        (a, b), (u, v) = (shape.semi[0], shape.semi[1]), (shape.axes[0], shape.axes[1])
+        return length((a * u[0], b * v[0])), length((a * u[1], b * v[1]))
+
+    @staticmethod
+    def second_moments(shape, dimensions):
+        a, b = shape.semi[0], shape.semi[1]
+        return math.pi * a * b, 0.0, 0.0, a * a / 4.0, 0.0, b * b / 4.0
+
+
+@pytest.mark.slow
+def test_an_ellipse_that_rocks_loses_what_the_page_says():
+    """Of first order in dt, and never more than it had: docs/plugins/rotation.md."""
+    shares = []
+    for rate in (60, 120, 240, 960):
+        settings = Settings(integrator="velocity_verlet", dt=1 / rate)
+        with World(Physics(2, gravity=(0, -10)), Rotation(), rocking, settings=settings) as world:
+            ground = BoxCollider((50, 1), friction=1.0)
+            world.create_entity(Transform((0, -1)), RigidBody(kind="static"), ground)
+            height = math.hypot(math.sin(0.4), 0.5 * math.cos(0.4))
+            world.create_entity(Transform((0, height), 0.4), RigidBody(), Spin(), EllipseCollider((1.0, 0.5)))
+            energy = [world.kinetic_energy() + world.potential_energy() - 5.0]
+            for _ in range(5 * rate):
+                world.step()
+                energy.append(world.kinetic_energy() + world.potential_energy() - 5.0)
+            shares.append(energy[-1] / energy[0])
+            assert max(energy) <= 1.001 * energy[0]
+    assert shares == pytest.approx((0.32, 0.57, 0.76, 0.94), abs=0.02)
