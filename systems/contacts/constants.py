@@ -53,8 +53,6 @@ GAIN_WEIGHT = 2.5  # of the energy that forces give from rest: towers that are p
 GAIN_ROUNDING = 1e-12  # of an energy: less is none
 
 # Hard contacts of bodies that nothing presses on.
-ALIGNED = 0.5  # cosine: a hard contact lies along the sum of the normals of its body, and a normal is that of the step
-# before: else its impulses say nothing
 NEGLIGIBLE = 1e-9  # of an extent: a smaller gap, overlap or way in a step is none, and hard islands agree where passes
 # change no way in a substep by more; of an impulse, or of the one that forces give in a step
 UNREACHED = 1e6  # extents: a row that is left to the next step

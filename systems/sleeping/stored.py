@@ -17,7 +17,7 @@ from ...framework.jit.records.schema import Section
 Columns = dict[str, np.ndarray]
 
 CONTACT_COLUMNS = ("entity_a", "entity_b", "point", "normal", "depth", "impulse", "enabled", "rested")
-IMPULSE_COLUMNS = ("entity_a", "entity_b", "place", "normal", "impulse", "tangent", "total")
+IMPULSE_COLUMNS = ("entity_a", "entity_b", "place", "impulse", "tangent", "total")
 
 
 def merged(one: Columns, other: Columns) -> tuple[Columns, np.ndarray]:

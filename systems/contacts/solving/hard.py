@@ -7,11 +7,11 @@ rise and sink at each seam, and meet the next floor's corner below its own under
 from __future__ import annotations
 
 from ....framework.compilation import part
-from ....framework.vectors import add, dot, sub
+from ....framework.vectors import dot, sub
 from ...ccd.search_bounds import turns_far
 from ...integration.turning import is_turned
 from ..approach import centre_offset, centre_offset_at_start
-from ..constants import ALIGNED, NEGLIGIBLE, UNREACHED
+from ..constants import NEGLIGIBLE, UNREACHED
 from .rows import closing_speed, separation_from_rotation
 
 
@@ -37,30 +37,25 @@ def is_loaded(solver, k, dt):
 def select_rigid(state, dt, nothing, arms):
     """Contacts with what cannot be moved are hard if their body has rested until now, and nothing presses on it.
 
-    Not those that push against the sum of its normals: no impulse is high enough for what is squeezed. Nor one that
-    stands for several faces: how much it overlaps each of them says which way it pushes.
+    Not one that stands for several faces: how much it overlaps each of them says which way it pushes.
     """
     solver, warm_started = state.solver, state.bodies.warm_started
-    inverse_mass, way, pressed = solver.inverse_mass, solver.way, solver.held
+    inverse_mass, pressed = solver.inverse_mass, solver.held
     for q in range(solver.bodies):
-        way[q], pressed[q] = nothing, 0.0
+        pressed[q] = 0.0
     for k in range(solver.contacts):
         a, b = solver.first[k], solver.second[k]
-        if inverse_mass[a] == 0.0:
-            way[b] = add(way[b], solver.normal[k])
-        elif inverse_mass[b] == 0.0:
-            way[a] = sub(way[a], solver.normal[k])
-        elif not (pressed[a] > 0.0 and pressed[b] > 0.0) and is_loaded(solver, k, dt):
+        move = inverse_mass[a] > 0.0 and inverse_mass[b] > 0.0
+        if move and not (pressed[a] > 0.0 and pressed[b] > 0.0) and is_loaded(solver, k, dt):
             pressed[a] = pressed[b] = 1.0
     any_apart = False
     for k in range(solver.contacts):
-        a, b, n = solver.first[k], solver.second[k], solver.normal[k]
+        a, b = solver.first[k], solver.second[k]
         solver.hard[k] = False
         if inverse_mass[a] == 0.0 or inverse_mass[b] == 0.0:
             body = moved_body(solver, k)
-            along = dot(way[body], n) if body == b else -dot(way[body], n)
             rested = state.any_warm_started and warm_started[solver.body_row[body]]
-            hard = rested and along > ALIGNED and not (pressed[body] > 0.0 or solver.varies[k])
+            hard = rested and not (pressed[body] > 0.0 or solver.varies[k])
             solver.hard[k] = hard
             any_apart |= hard and solver.apart[k]
             if hard and solver.apart[k]:

@@ -105,7 +105,6 @@ SOLVER = Schema(
     opened=integer(),
     mover=ints("int32"),  # bodies that move by themselves
     movers=integer(),
-    way=vectors(unit="1"),  # sum of the normals of what holds it
     held=floats(unit="N s"),  # by its strongest hard contact; above 0 before that: something presses on it
     # islands
     islands=integer(),
@@ -161,7 +160,6 @@ WARM_START_ROWS = Section(
     entity_a=ints(stacked=True),
     entity_b=ints(stacked=True),
     place=vectors(stacked=True, unit="m"),  # of the point; nan where no body spun
-    normal=vectors(stacked=True, unit="1"),
     impulse=floats(stacked=True, unit="N s"),  # of the last substep, as if the step were one,
     tangent=vectors(stacked=True, unit="N s"),  # and along the surface
     total=floats(stacked=True, unit="N s"),  # what it gave in the step

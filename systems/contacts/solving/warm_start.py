@@ -14,7 +14,7 @@ from ....framework.jit.records.record_type import zero_of
 from ....framework.schedule.stages import Rows
 from ....framework.vectors import add_scaled, dot, scale, sub
 from ...codes import OK
-from ..constants import ALIGNED, NEGLIGIBLE, SAME_PLACE_EXTENTS, WARM_START_MAX
+from ..constants import NEGLIGIBLE, SAME_PLACE_EXTENTS, WARM_START_MAX
 from .guard import island_of
 from .records import WARM_START_ROWS
 
@@ -80,11 +80,9 @@ def start_with(solver, memory, k, several, span):
         if m < 0:
             return
         memory.off[m] = True  # each once
-    n = solver.normal[k]
-    if dot(memory.normal[now, m], n) > ALIGNED:
-        pull = memory.tangent[now, m]
-        solver.impulse[k] = memory.impulse[now, m]
-        solver.tangent[k] = add_scaled(pull, n, -dot(pull, n))
+    n, pull = solver.normal[k], memory.tangent[now, m]
+    solver.impulse[k] = memory.impulse[now, m]
+    solver.tangent[k] = add_scaled(pull, n, -dot(pull, n))
 
 
 @inlined
@@ -99,8 +97,8 @@ def skip_before(memory, m, a, b):
 
 
 def match_warm_start(state, dt):
-    """Start each contact with the impulses that its pair had, if its normal has not turned far; else with none. The
-    memory is that of a step of this length already, see ``predict_rest``. Both lists are in canonical order."""
+    """Start each contact with the impulses that its pair had, along the normal of now. The memory is that of a step of
+    this length already, see ``predict_rest``. Both lists are in canonical order."""
     solver, memory, pairs, entity = state.solver, state.warm_start, state.pairs, state.bodies.entity
     now, zero, r, m = memory.now, zero_of(state), 0, 0
     while r < solver.contacts:
@@ -141,7 +139,6 @@ def store_warm_start(state, dt):
         most = WARM_START_MAX * solver.force_of[island_of(solver, k)]
         kept = most / last if last > most else 1.0
         memory.impulse[new, count], memory.tangent[new, count] = kept * last, scale(solver.tangent[k], kept)
-        memory.normal[new, count] = solver.normal[k]
         memory.place[new, count] = solver.place[k] if state.spinning else nowhere
         count += 1
     memory.counts[new], memory.rows_version[new] = count, state.version
