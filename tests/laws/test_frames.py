@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from carom.components import RigidBody, Transform
+from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
 from carom.plugins import Physics
 from carom.plugins.joints import Ball, Distance, Hinge, Joints, MousePull, Slider, Weld
@@ -219,6 +219,24 @@ def test_chains_swing_with_what_is_a_thousand_times_as_heavy(d, size):
                 world.step()
                 assert worst_gap(joints) < 0.01 * size
                 assert world.kinetic_energy() + world.potential_energy() < total + most
+
+
+@pytest.mark.parametrize(("d", "load"), [(2, 1e9), (2, 1e12), (3, 1e12)])
+def test_chains_under_what_no_chain_bears_stay_finite_and_are_told(d, load):
+    """Links of 1 kg: more stiffness than numbers have digits gave nan."""
+    world, joints = world_of(d, 0, on_fault="ignore")
+    with world:
+        before = None
+        for k in range(4):
+            parts = RigidBody(1.0 if k < 3 else load), SphereCollider(0.1), Spin()
+            link = world.create_entity(Transform(vector(d, 0.5 * (k + 1))), *parts)
+            world.create_entity((Ball if d == 3 else Hinge)(before, link, anchor=vector(d, 0.5 * k)))
+            before = link
+        for _ in range(300):
+            world.step()
+        assert np.isfinite(world.bodies.position).all()
+        assert np.isfinite(world.bodies.linear_velocity).all()
+        assert worst_gap(joints) < 0.01 or any("torn open" in fault for fault in world.faults)
 
 
 @pytest.mark.parametrize("d", [2, 3])
