@@ -362,7 +362,7 @@ class Adoption:
                 handle._entity = entity
                 handle._row = row
                 handle._version = version
-                handle._values = None
+                handle._values = handle._saved = None
 
     def _adopt_arrival(self, arrival: Arrival, ids: np.ndarray) -> None:
         """Write the values of an arrival into the table; handles are made when somebody asks for them."""

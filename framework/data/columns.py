@@ -314,6 +314,7 @@ class Column:
             if handle._version < -1:  # it is given to a world
                 self.check_dimensions(value, -handle._version, handle._entity)
             handle._values[self.name] = value
+            handle._saved = None
             return
         self.check_dimensions(value, store.dimensions, handle._entity)
         if type(value) is Unresolved:

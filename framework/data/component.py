@@ -27,9 +27,10 @@ class Component:
     final, because esper looks components up by their exact type.
     """
 
-    __slots__ = ("__weakref__", "_entity", "_row", "_store", "_values", "_version")
+    __slots__ = ("__weakref__", "_entity", "_row", "_saved", "_store", "_values", "_version")
 
     _values: dict[str, Any] | None  # that it holds itself; what is missing has its default
+    _saved: dict[str, Any] | None  # what snapshots have of these, while none has been set since
 
     columns: ClassVar[dict[str, Column]] = {}
     prefix: ClassVar[str] = ""  # of the columns' names in a table
@@ -44,6 +45,7 @@ class Component:
     _abstract: ClassVar[bool] = True
     _largest: ClassVar[float] = LARGEST  # magnitude of the numbers in its fields
     _shaped: ClassVar[tuple[Column, ...]] = ()  # columns whose shape depends on the world's dimensions
+    _lends: ClassVar[bool] = False  # whether a game may write into its vectors, and nobody is told
     _held: ClassVar[tuple[str, ...]] = ()  # those whose default does not fit worlds of 2 and of 3 dimensions
     _arguments: ClassVar[dict[str, Column]] = {}  # of the constructor
     _positional: ClassVar[tuple[str, ...]] = ()  # those that need no name
@@ -84,6 +86,7 @@ class Component:
         if "__slots__" not in vars(cls) and cls.__setattr__ is object.__setattr__:
             cls.__setattr__ = _set_field  # type: ignore[method-assign]
         cls._shaped = tuple(field for field in fields.values() if field.item != "scalar")
+        cls._lends = any(field.item_shape(3) for field in cls._shaped)
         cls._arguments = {name: field for name, field in fields.items() if field.constructor}
         cls._positional = tuple(name for name, field in cls._arguments.items() if not field.kw_only)
         cls._required = tuple(name for name, field in cls._arguments.items() if field.default is REQUIRED)
@@ -142,6 +145,7 @@ class Component:
         self._entity = None
         self._row = -1
         self._version = -1
+        self._saved = None
         arguments, stored = self._arguments, {}
         for name in self._held:
             stored[name] = copy.copy(self._defaults[name])
@@ -175,13 +179,30 @@ class Component:
         self._entity = entity
         self._row = row
         self._version = version
-        self._values = None
+        self._values = self._saved = None
 
     def _hold(self, values: Mapping[str, Any]) -> None:
         """Belong to no entity, and have these values, as they are read from a handle."""
         self._bind(None, None)
         self._values = {name: column.unshared(values[name]) for name, column in self.columns.items()}
         hold_arrays(self, self._pooled)
+
+    def _as_saved(self) -> dict[str, Any] | None:
+        """What :meth:`_to_save` or :meth:`_go_back` has left; None if a value may be another one since."""
+        return self._saved
+
+    def _to_save(self) -> dict[str, Any]:
+        """A copy of its values, for :meth:`_go_back`, of this component or another one."""
+        values = {name: v.copy() if isinstance(v, np.ndarray) else v for name, v in self._read().items()}
+        self._saved = values if self._store is None and not self._lends else None
+        return values
+
+    def _go_back(self, values: dict[str, Any]) -> None:
+        """Hold these values, which nobody else changes."""
+        known = self._entity  # to a joint, for its messages
+        self._hold(values)
+        self._entity = known
+        self._saved = None if self._lends else values
 
     def check_dimensions(self, dimensions: int, entity: int | None = None) -> None:
         """ValueError if a vector of this component does not fit a world of that many dimensions."""
@@ -222,6 +243,7 @@ class Component:
         """Have bits of layers in place of names."""
         if bits and self._values is not None:
             self._values.update(bits)
+            self._saved = None
 
     def copy(self) -> Self:
         """An unbound component with the same values, for another entity (prefabs)."""

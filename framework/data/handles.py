@@ -62,4 +62,4 @@ def bind_handles(table: Table, entities: list[int], handles: list[Component]) ->
         handle._store = table
         handle._entity = entity
         handle._version = -1
-        handle._values = None
+        handle._values = handle._saved = None

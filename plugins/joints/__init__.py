@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -78,15 +78,15 @@ class Joints(Plugin):
         self._record: Any = self._physics.record(JOINTS)
         self._contents = world._contents()
         self._rows = JointRows(self._record, self._physics.dimensions, world.registry)
-        self._joints: dict[int, Joint] = {}  # those that have rows, by entity, which ascend,
-        self._made_of: dict[int, tuple[Any, ...]] = {}  # and the fields of which these were made
+        self._joints: dict[int, Joint] = {}  # those that have rows, by entity, which ascend
         self._holds: list[Holds] | None = None  # what columns() measures, once they are asked for
         self._anchors: np.ndarray | None = None  # (n, 2, d) along the axes of both bodies, the same of anchors()
         # Entities that came, went or changed, and joints of which a field was set, since the last step.
         self._touched: set[int] = set()
         self._set: set[int] = set()
         self._released: set[int] = set()  # bodies that were held otherwise before the world went back
-        self._given_away: dict[tuple[int, str], tuple[np.ndarray, bytes]] = {}  # vectors that the game may write into
+        # By joint and field, vectors that the game may write into.
+        self._given_away: dict[int, dict[str, tuple[np.ndarray, bytes]]] = {}
         self._table_version = -1  # at which all bodies of joints were there
         self._parts_changes = PartChanges.count
         self._breaking = False
@@ -195,27 +195,30 @@ class Joints(Plugin):
     def take_back(self, world: Any, saved: Any) -> None:
         """The rows are those of the joints that there are now, with that; what no step has taken waits for the next."""
         contents, dimensions = self._contents, self._physics.dimensions
-        for joint in self._joints.values():
-            joint._taken = None
-        self._holds, self._anchors, self._given_away, self._table_version = None, None, {}, -1
+        found = {e: contents.entities[e][c] for c in (*KINDS, *self._own) for e in contents.members.get(c, ())}
+        as_they_were = {e for e, joint in self._joints.items() if found.get(e) is joint and joint._taken is self}
+        as_they_were -= self._set
+        others = {entity: joint for entity, joint in found.items() if entity not in as_they_were}
+        for entity in self._joints.keys() - as_they_were:
+            self._joints[entity]._taken = None
+        self._holds, self._anchors, self._table_version = None, None, -1
+        self._given_away = {entity: own for entity, own in self._given_away.items() if entity in as_they_were}
         self._touched.clear()
         self._set.clear()
-        found = {e: contents.components_of(e)[c] for c in (*KINDS, *self._own) for e in contents.members.get(c, ())}
-        kept = {*saved["joint"].tolist(), *(entity for entity, joint in found.items() if joint.attached)}
+        attached = (entity for entity, joint in others.items() if joint.attached)
+        kept = {*saved["joint"].tolist(), *as_they_were, *attached}
         self._drop({entity for entity in self._joints if entity not in found or entity not in kept})
-        for entity, joint in sorted(found.items()):
+        for entity, joint in sorted(others.items()):
             joint._contents = contents
-            if joint.attached and self._made_of.get(entity) == _fields_of(joint):  # most are as they were
-                joint._version, joint._entity, joint._taken = -dimensions, entity, self
-                self._joints[entity] = joint
-            elif joint.attached:
+            as_saved = joint._saved
+            if joint.attached:
                 joint.fit(dimensions, entity)
                 self._take(entity, joint)
             elif entity in kept:  # it takes hold anew with the next step
                 joint.fit(dimensions, entity)
                 self._rows.lay(joint, [key[1:5] for key in by_row(saved) if key[0] == entity])
-                self._made_of.pop(entity, None)
                 self._joints[entity], joint._taken = joint, self
+            joint._saved = as_saved  # nobody else has looked at its vectors
             if joint.changed:
                 self._touched.add(entity)
                 self._set.add(entity)
@@ -234,7 +237,8 @@ class Joints(Plugin):
 
     def _follow(self, world: World) -> None:
         """Which joints there are, and their fields, as far as anything has changed."""
-        for (entity, name), (array, known) in list(self._given_away.items()):
+        given = [(entity, name, *one) for entity, own in self._given_away.items() for name, one in own.items()]
+        for entity, name, array, known in given:
             if array.tobytes() != known:
                 now = array.copy()
                 array[:] = np.frombuffer(known)
@@ -295,10 +299,11 @@ class Joints(Plugin):
         rows = joint.rows(self._physics.dimensions)
         bodies, other = self._rows.put(joint, rows, fresh)
         self._rows.keep_apart(joint, joint.whole_ends(self._contents))
-        self._made_of[entity] = _fields_of(joint)
         joint._taken = self
         self._breaking = self._breaking or not (joint.breaking_force is joint.breaking_torque is None)
         if entity not in self._joints:
+            own = {name: value.copy() for name, value in joint._values.items() if isinstance(value, np.ndarray)}
+            joint._values.update(own)  # only vectors that are asked for from now on are watched
             last = next(reversed(self._joints), 0)
             self._joints[entity], self._holds = joint, None
             if entity < last:
@@ -324,11 +329,9 @@ class Joints(Plugin):
             return set()
         self._rows.remove(sorted(entities))
         joints = [self._joints.pop(entity) for entity in sorted(entities)]
-        for entity in entities:
-            self._made_of.pop(entity, None)
         for joint in joints:
             joint._taken = None
-        self._given_away = {key: value for key, value in self._given_away.items() if key[0] not in entities}
+        self._given_away = {entity: own for entity, own in self._given_away.items() if entity not in entities}
         self._holds = self._anchors = None
         return {body for joint in joints for body in (joint.a, joint.b)}
 
@@ -338,7 +341,7 @@ class Joints(Plugin):
         kind = next((kind for kind in types if isinstance(kind, type) and issubclass(kind, Joint)), None)
         return None if kind is None else self._contents.components_of(entity)[kind]
 
-    def note(self, joint: Joint, names: Iterable[str]) -> None:
+    def note(self, joint: Joint, names: Mapping[str, Any]) -> None:
         """The fields ``names`` of a joint were set: its rows follow at once, unless a step runs or bodies have to wake.
         Vectors that the game has got show it."""
         if joint.attached and type(joint) in KINDS and not (self._physics.table.in_step or self._physics.sleepers.on):
@@ -347,17 +350,20 @@ class Joints(Plugin):
         else:
             self._set.add(joint.entity)
             self._anchors = None
-        for name in names if self._given_away else ():
-            if (joint.entity, name) in self._given_away:
-                array, _ = self._given_away[joint.entity, name]
-                array[:] = getattr(joint, name)
-                joint.keep(**{name: array})
-                self._given_away[joint.entity, name] = array, array.tobytes()
+        given = self._given_away.get(joint.entity, {})
+        for name in given.keys() & names.keys():
+            array, _ = given[name]
+            array[:] = getattr(joint, name)
+            joint.keep(**{name: array})
+            given[name] = array, array.tobytes()
 
     def watch(self, joint: Joint, name: str, array: np.ndarray) -> None:
         """The game has got ``array``, the vector ``name`` of a joint, and may write into it."""
-        if (joint.entity, name) not in self._given_away:
-            self._given_away[joint.entity, name] = array, array.tobytes()
+        self._given_away.setdefault(joint.entity, {}).setdefault(name, (array, array.tobytes()))
+
+    def is_written(self, entity: int | None) -> bool:
+        """Whether the game has written into a vector of that joint since the last step."""
+        return any(array.tobytes() != known for array, known in self._given_away.get(entity, {}).values())
 
     def _lost(self) -> dict[int, Joint]:
         """The joints with rows of which a body is gone."""
@@ -437,13 +443,6 @@ class Joints(Plugin):
             for entity, joint in joints:
                 self.world.events.dispatch(event, entity, joint)
             self._contents.delete([entity for entity, _ in joints])
-
-
-def _fields_of(joint: Joint) -> tuple[Any, ...]:
-    """What tells whether rows would be the same."""
-    values = (joint._values.get(name) for name in joint.columns if name not in ("attached", "changed"))
-    plain = (value.tobytes() if type(value) is np.ndarray else value for value in values)
-    return type(joint), *(value if value == value else None for value in plain)  # one that is not given is NaN
 
 
 __all__ = [

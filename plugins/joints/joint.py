@@ -82,15 +82,17 @@ class Watched(Column):
             return value
         if self.optional and np.isnan(value[0]):
             return None
-        if handle._taken is not None:
+        if handle._taken is None:
+            handle._saved = None  # the game may write into it at any time
+        else:
             handle._taken.watch(handle, self.name, value)
         return value
 
     def value_of(self, handle: Any) -> Any:
         """The same for reading only."""
-        taken, handle._taken = handle._taken, None
+        taken, saved, handle._taken = handle._taken, handle._saved, None
         value = self.__get__(handle)
-        handle._taken = taken
+        handle._taken, handle._saved = taken, saved
         return value
 
 
@@ -139,6 +141,7 @@ class Joint(Component, abstract=True):
             if isinstance(column, Column) and column.item == "vector" and column.constructor:
                 setattr(cls, name, Watched(**vars(column)))
         super().__init_subclass__(**options)
+        cls._lends = False  # as they are watched
 
     def __new__(cls, *args: Any, **values: Any) -> Self:
         self = super().__new__(cls)
@@ -164,6 +167,19 @@ class Joint(Component, abstract=True):
         """TypeError: each joint is created by itself."""
         raise TypeError(f"joints are created one by one: world.create_entity({cls.__name__}(...))")
 
+    def _as_saved(self) -> dict[str, Any] | None:
+        return None if self._taken is not None and self._taken.is_written(self._entity) else self._saved
+
+    def _to_save(self) -> dict[str, Any]:
+        values = super()._to_save()
+        if self._taken is None or self._taken.is_written(self._entity):
+            self._saved = None
+        return values
+
+    def _hold(self, values: Mapping[str, Any]) -> None:
+        super()._hold(values)
+        self._taken = None  # its rows are of other values
+
     def __setattr__(self, name: str, value: Any) -> None:
         if name in self.columns and self._values is not None:
             self.set_together(**{name: value})
@@ -172,7 +188,7 @@ class Joint(Component, abstract=True):
 
     def set_together(self, **values: Any) -> None:
         """Set fields that only fit each other; ValueError, with all as it was, if they do not."""
-        held, version, taken = self._values or {}, self._version, self._taken
+        held, version, taken, saved = self._values or {}, self._version, self._taken, self._saved
         before, ends = {name: held.get(name) for name in values}, not values.keys().isdisjoint(("a", "b"))
         self._taken = None  # what looks at vectors here does not write into them
         try:
@@ -199,6 +215,7 @@ class Joint(Component, abstract=True):
             self.let_go(values.keys())
         elif all(_same(before[name], held[name]) for name in values):  # a game may set its motors in each step
             held.update(before)
+            self._saved = saved
             return
         held["changed"] = True
         if taken is not None:
@@ -338,6 +355,7 @@ class Joint(Component, abstract=True):
     def keep(self, **values: Any) -> None:
         """Set what is hidden."""
         self._values.update(values)  # type: ignore[union-attr]
+        self._saved = None
 
 
 def _same(one: Any, other: Any) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import pickle
 
 import numpy as np
@@ -207,6 +208,68 @@ def test_vectors_of_joints_can_be_written_into():
     run(world, 240)
     assert at(world, body).position == pytest.approx((1, 1), abs=1e-6)
     assert joints.anchors()[0].tolist() == [[1, 1], [5, 2]]
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_snapshots_share_the_values_of_joints_that_were_not_set_between(d):
+    """However many there are: a training that begins anew a thousand times copies nothing."""
+    world, _ = joint_world(gravity=(0.0,) * d, d=d)
+    bodies = [disc(world, np.eye(d)[0] * 3.0 * k, inertia=(0.01,) * 3 if d == 3 else 0.01) for k in range(12)]
+    balls = [world.create_entity(Ball(None, body, anchor=at(world, body).position)) for body in bodies]
+    run(world, 2)
+    first = world.snapshot()
+    handles = [world.component_for_entity(ball, Ball) for ball in balls]
+    lent = handles[5].anchor, handles[6].anchor
+    run(world, 3)
+    world.restore(first)
+    assert all(map(operator.is_, first.loose.handles, world.snapshot().loose.handles))
+    lent[0][1], handles[8].breaking_force = 1.0, 10.0
+    then = world.snapshot()
+    assert [k for k in range(12) if first.loose.handles[k] is not then.loose.handles[k]] == [5, 8]
+    world.restore(first)
+    assert handles[5].anchor.tolist() == (15.0 * np.eye(d)[0]).tolist()
+    assert handles[8].breaking_force is None
+    world.restore(then)
+    assert (handles[5].anchor[1], handles[8].breaking_force) == (1.0, 10.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_going_back_repeats_what_followed_whatever_was_set_or_written_into(seed):
+    random = np.random.default_rng(seed)
+    world, _ = joint_world(dt=1 / 60)
+    bodies = [disc(world, (2.0 * k, 0)) for k in range(6)]
+    for k, body in enumerate(bodies):
+        kind = (MousePull(body, grip=(2 * k, 0), target=(2 * k, 1)), Distance(None, body, point_a=(2 * k, 1)))[k % 2]
+        world.create_entity(kind)
+    joints = [joint for kind in (MousePull, Distance) for _, joint in world.get_component(kind)]
+    known, held = [], [getattr(joint, "target" if hasattr(joint, "target") else "point_a") for joint in joints]
+
+    def followed(snapshot):
+        world.restore(snapshot)
+        shown = list(map(repr, joints))
+        run(world, 3)
+        return shown, world.state_hash(), list(map(repr, joints))
+
+    for _ in range(40):
+        what, k = int(random.integers(0, 7)), int(random.integers(0, 6))
+        field = "target" if hasattr(joints[k], "target") else "point_a"
+        if what == 0:
+            held[k] = getattr(joints[k], field)
+        elif what == 1:
+            held[k][:] = random.normal(size=2)
+        elif what == 2:
+            setattr(joints[k], field, random.normal(size=2))
+        elif what == 3:
+            world.step()
+        elif what == 4 or not known:
+            snapshot = world.snapshot()
+            known.append((snapshot, followed(snapshot)))
+            world.restore(snapshot)
+        else:
+            snapshot, after = known[int(random.integers(0, len(known)))]
+            assert followed(snapshot) == after
+            if what == 5:
+                world.restore(snapshot)
 
 
 def test_points_of_a_distance_are_places_of_the_world_and_its_ends_move_one_by_one():

@@ -64,6 +64,7 @@ class ArrayColumn(Column):
         store = handle._store
         if store is None:
             handle._values[self.name] = self.pool.changed(handle._values[self.name], write)
+            handle._saved = None
             return
         row = handle._row if handle._version == store.version else handle._locate()
         before = int(store.values(self.key, row))

@@ -11,8 +11,6 @@ import operator
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from ..adoption import Adoption
 from ..component import Component
 from ..contents.entities import Entities, among
@@ -78,26 +76,21 @@ def is_ours(component: Any) -> bool:
 
 @dataclass
 class LooseValues:
-    """The values that no table has, of the loose handles by field."""
+    """The values that no table has, of the loose handles by field; snapshots share those that were not set between."""
 
     handles: list[dict[str, Any]]
 
     @classmethod
     def of(cls, population: Population, entities: Entities) -> LooseValues:
-        return cls([_values_of(entities[entity][component]) for entity, component in population.loose])
+        handles = (entities[entity][component] for entity, component in population.loose)
+        return cls([handle._as_saved() or handle._to_save() for handle in handles])
 
     def put_into_handles(self, population: Population, entities: Entities) -> None:
         """Write them into the handles of that population, which the world has."""
         for (entity, component), values in zip(population.loose, self.handles, strict=True):
             handle = entities[entity][component]
-            known = handle._entity  # to a joint, for its messages
-            handle._hold(values)
-            handle._entity = known
-
-
-def _values_of(handle: Component) -> dict[str, Any]:
-    values = {name: column.value_of(handle) for name, column in handle.columns.items()}
-    return {name: value.copy() if isinstance(value, np.ndarray) else value for name, value in values.items()}
+            if handle._as_saved() is not values:  # something was set since
+                handle._go_back(values)
 
 
 class PopulationRestore:
