@@ -346,6 +346,24 @@ def test_ellipsoids_at_one_place_leave_each_other_on_the_shortest_way(seed):
     assert (meet(a, b, offsets).depth - least_depth(axes, offsets)).max() <= 2e-6
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_ball_leaves_a_cylinder_through_its_side_or_a_face_whichever_is_nearer(seed):
+    """The depth has a kink all around the side, in which it changes little."""
+    random, count = np.random.default_rng(seed), 2000
+    radius, height, ball = np.exp(random.uniform(np.log(0.1), 0.0, (3, count)))
+    centres = random.normal(size=(count, 3)) * 10 ** random.uniform(-9, -1, (count, 1))
+    centres *= random.integers(0, 2, (count, 3))
+    ends = np.array([[0, -1, 0], [0, 1, 0]]) * height[:, None, None]
+    cylinder = shapes(ends, semi_axes=np.stack((radius, 0 * radius, radius), axis=1))
+    met = meet(cylinder, shapes(np.zeros((count, 1, 3)), radii=ball), centres)
+    inside = np.minimum(radius - np.hypot(centres[:, 0], centres[:, 2]), height - np.abs(centres[:, 1]))
+    off = np.abs(met.depth - ball - inside) / (radius + height + ball)
+    assert (inside > 0).sum() > 1500
+    assert (off[inside > 0] > 2e-6).mean() <= 1 / 200  # of depths that round shapes seldom have
+    assert off[inside > 0].max() < 1e-4
+    assert (np.linalg.norm(met.point - centres, axis=1) <= np.abs(met.depth) + 2e-6)[inside > 0].all()
+
+
 @both_dimensions
 def test_a_smooth_ball_around_a_box_leaves_it_along_an_axis(d):
     """Half an edge and the radius, less how far its middle is off along that axis: the depth has a kink there, and such

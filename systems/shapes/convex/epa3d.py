@@ -14,7 +14,7 @@ from ....framework.vectors import add_scaled, divided, dot, negative, row, scale
 from .gjk import GJK_ROUNDING, corner, corner_of, cross, edge, face_normal, norm, refine_direction, support_points
 
 POLYTOPE_CORNERS = 64
-POLYTOPE_FACES = 128  # a closed surface of triangles has twice as many faces as corners, less 4
+POLYTOPE_FACES = 256  # a closed surface has twice as many as corners, less 4; rounding leaves folds in it
 POLYTOPE_EDGES = 192
 WIDEST, NARROWER, NARROWEST = 0.1, -0.5, 1e-8  # rad; the other way round each time
 THIRDS = ((1.0, 0.0), (-0.5, 0.8660254037844386), (-0.5, -0.8660254037844386))  # of a circle
@@ -102,14 +102,15 @@ def witness_point(of_a, of_b, faces, heights, count, outward, depth, d):
 
 @part
 def refine_kink(pair, d, best, depth, size):
-    """(outward, depth) at a minimum where the depth has a kink, as at a flat face of a round whole: the normal of the
-    face through the farthest points in three directions around the best one, nearer each time."""
+    """(outward, depth) at a minimum where the depth may have a kink, as at a flat face of a round whole or along its
+    rim: the normal of the face through the farthest points in three directions around the best one, or a step along the
+    kink, against the least mean of their slopes; nearer each time that no step leads down."""
     spread = WIDEST
-    while abs(spread) > NARROWEST:
+    for _ in range(8 * POLYTOPE_CORNERS):
         point_a, point_b = support_points(pair, negative(best))
         found = corner_of(point_a, point_b, d)
         slope = add_scaled(found, best, -dot(found, best))
-        if not norm(slope) > NARROWEST * size:
+        if not (norm(slope) > NARROWEST * size and abs(spread) > NARROWEST):
             break
         one = divided(slope, norm(slope))
         other, corners = cross(best, one), (found, found, found)
@@ -117,15 +118,26 @@ def refine_kink(pair, d, best, depth, size):
             way = add_scaled(scale(one, THIRDS[k][0]), other, THIRDS[k][1])
             point_a, point_b = support_points(pair, negative(add_scaled(best, way, spread)))
             corners = (corners[1], corners[2], corner_of(point_a, point_b, d))
-        normal = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]))
-        height = norm(normal)
-        if height > 0.0:
-            normal = divided(normal, height if dot(normal, best) > 0.0 else -height)
-            point_a, point_b = support_points(pair, negative(normal))
-            reach = dot(normal, corner_of(point_a, point_b, d))
-            if reach < depth:
-                best, depth = normal, reach
-        spread *= NARROWER
+        normal, before = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0])), best
+        for k in range(3):
+            start, way = corners[k], sub(corners[k - 1], corners[k])
+            start, way = add_scaled(start, before, -dot(start, before)), add_scaled(way, before, -dot(way, before))
+            share, square = -dot(start, way), dot(way, way)
+            if share > 0.0:
+                start = add_scaled(start, way, min(share / square, 1.0))
+            if dot(start, start) < dot(slope, slope):
+                slope = start
+        for k in range(2):
+            height = norm(normal)
+            if height > 0.0:
+                normal = divided(normal, height if dot(normal, before) > 0.0 else -height)
+                point_a, point_b = support_points(pair, negative(normal))
+                reach = dot(normal, corner_of(point_a, point_b, d))
+                if reach < depth:
+                    best, depth = normal, reach
+                elif k == 1:
+                    spread *= NARROWER
+            normal = add_scaled(best, slope, -abs(spread) / max(norm(slope), NARROWEST * size))
     return best, depth
 
 
@@ -157,7 +169,7 @@ def polytope_depth(pair, d, of_a, of_b, size):
 
     The face nearest to the origin is a lower bound, how far the difference reaches in the direction of any face an
     upper one. They meet for polytopes; for smooth shapes the answer is the best upper bound, refined if
-    there are more corners to find than there is room for.
+    there are more corners or faces than there is room for.
     """
     faces, edges = stack_array(POLYTOPE_FACES, (0, 0, 0)), stack_array(POLYTOPE_EDGES, (0, 0))
     normals = stack_array(POLYTOPE_FACES, (0.0, 0.0, 0.0))
@@ -177,12 +189,12 @@ def polytope_depth(pair, d, of_a, of_b, size):
         for f in range(1, count):
             if waiting[f] < waiting[top]:
                 top = f
-        if not waiting[top] < depth - GJK_ROUNDING * size:
-            break
-        outward = row(normals, top, d)
         if used == POLYTOPE_CORNERS:
             best, depth = refine_smooth(pair, d, surface, count, best, depth, size)
             break
+        if not waiting[top] < depth - GJK_ROUNDING * size:
+            break
+        outward = row(normals, top, d)
         point_a, point_b = support_points(pair, negative(outward))
         store(of_a, used, point_a)
         store(of_b, used, point_b)
@@ -202,9 +214,10 @@ def polytope_depth(pair, d, of_a, of_b, size):
             continue
         count, rim = remove_visible_faces(surface, count, edges, top, found, GJK_ROUNDING * size, d)
         if rim < 0 or count + rim > POLYTOPE_FACES:
-            break
+            rim, used = 0, POLYTOPE_CORNERS  # no room for the new ones
+            continue
         for e in range(rim):
             faces[count + e, 0], faces[count + e, 1], faces[count + e, 2] = edges[e, 0], edges[e, 1], used
         used += 1
-    witness = witness_point(of_a, of_b, faces, heights, count, best, depth + GJK_ROUNDING * size, d)
+    witness = witness_point(of_a, of_b, faces, heights, count, best, depth + NARROWEST * size, d)
     return negative(best), depth, witness
