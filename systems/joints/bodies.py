@@ -39,7 +39,7 @@ def row_near(state, entity, row):
 
 
 @inlined
-def takes_part(state, j):
+def is_active(state, j):
     """Whether a row of joints has its bodies, and one of them may move."""
     joints = state.solver.joints
     a, b = joints.row_a[j], joints.row_b[j]
@@ -66,7 +66,7 @@ def find_active(state):
     for turning in (True, False):
         for j in range(joints.count):
             turns = TURN <= joints.kind[first_of(joints, j)] < CUSTOM
-            if turns == turning and takes_part(state, j):
+            if turns == turning and is_active(state, j):
                 joints.order[found] = j
                 found += 1
     joints.active, joints.kept_in = found, state.step_number + 1
