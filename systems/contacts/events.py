@@ -272,19 +272,20 @@ class ContactEvents(StagedSystem):
     def _may_meet_any(self, row: int) -> bool:
         """Whether layers, groups and joints let a body meet any other one."""
         state, bodies, joints, there = self._state, self._state.bodies, self._state.solver.joints, self._state.count
-        near, kept = bodies.shape[:there] >= 0, {name: getattr(state.colliders, name) for name in MEETING}
-        if not (state.has_parts or any(map(len, kept.values()))) and near.sum() > joints.apart + 1:
-            return True  # most worlds, and this is asked in each step
-        slot, rows = bodies.collider_slot[:there], np.arange(there)
-        layers, masks, groups = (
-            column[slot, rows] if len(column) else np.full(there, COLLIDERS.fields[name].default)
-            for name, column in kept.items()
-        )
-        near &= (layers & masks[row] != 0) & (masks & layers[row] != 0) & ((groups != groups[row]) | (groups == 0))
+        near, slot, rows = bodies.shape[:there] >= 0, bodies.collider_slot[:there], np.arange(there)
+        kept = {name: getattr(state.colliders, name) for name in MEETING}
+        if any(map(len, kept.values())):
+            layers, masks, groups = (
+                column[slot, rows] if len(column) else np.full(there, COLLIDERS.fields[name].default)
+                for name, column in kept.items()
+            )
+            near &= (layers & masks[row] != 0) & (masks & layers[row] != 0) & ((groups != groups[row]) | (groups == 0))
         owner = bodies.owner[:there] if state.has_parts else rows
-        others = bodies.entity[owner[near & (owner != owner[row])]]
         a, b, own = joints.apart_a[: joints.apart], joints.apart_b[: joints.apart], bodies.entity[owner[row]]
-        return not np.isin(others, np.concatenate((b[a == own], a[b == own]))).all()
+        apart = np.concatenate((b[a == own], a[b == own]))
+        if not state.has_parts and np.count_nonzero(near) > len(apart) + 1:
+            return True  # most worlds, and this is asked in each step
+        return not np.isin(bodies.entity[owner[near & (owner != owner[row])]], apart).all()
 
     def report_faults(self, dt: float) -> None:
         """Note what has gone wrong in the step of ``dt``, s."""

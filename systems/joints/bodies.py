@@ -53,7 +53,7 @@ def is_active(state, j):
 def find_active(state):
     """The rows of joints that hold a body which may move, in their order: motors and what else turns alone come first,
     as what they let open would give energy."""
-    joints, found = state.solver.joints, 0
+    joints, found, alone = state.solver.joints, 0, False
     if joints.rows_version != state.version:
         for j in range(joints.count):
             joints.row_a[j] = row_near(state, joints.entity_a[j], joints.row_a[j])
@@ -63,9 +63,10 @@ def find_active(state):
         joints.old_load[j], joints.old_pull[j], joints.old_value[j] = joints.load[j], joints.pull[j], joints.value[j]
         joints.old_normal[j], joints.old_along_a[j] = joints.normal[j], joints.along_a[j]
         joints.total[j], joints.thrust[j] = 0.0, zero_of(state)
+        alone |= TURN <= joints.kind[j] < CUSTOM and first_of(joints, j) == j
     for turning in (True, False):
-        for j in range(joints.count):
-            turns = TURN <= joints.kind[first_of(joints, j)] < CUSTOM
+        for j in range(joints.count if alone or not turning else 0):
+            turns = alone and TURN <= joints.kind[first_of(joints, j)] < CUSTOM
             if turns == turning and is_active(state, j):
                 joints.order[found] = j
                 found += 1
