@@ -1,4 +1,4 @@
-"""How boxes that turn meet balls and other boxes: in a plane from their faces and corners, without a search."""
+"""How boxes that turn meet balls and other boxes: from their faces and corners, mostly without a search."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from ..capsule import CapsuleCollider, capsule_box
 from ..corners import along_axes, in_world
 from ..standard_shapes import sharp, sphere_box
 from .box import BoxCollider, boxes
+from .boxes_in_space import boxes_in_space
 
 CLOSE = 1e-14  # of the coordinates: nearer than that a distance has no direction, as for any two convex shapes
 
@@ -84,8 +85,12 @@ def apart_in_plane(a, b, d, normal, distance):
 
 @boxes.kernel
 def two_boxes(a, b, d):
-    """In a plane the way out is across a face of one of them; apart, a face or two corners are nearest."""
+    """In a plane the way out is across a face of one of them; apart, a face or two corners are nearest. In space a
+    search finds ends of edges that are nearest."""
     if len(d) == 3:
+        found, distance, normal, point = boxes_in_space(a, b, d)
+        if found:
+            return distance <= 0.0, -distance, normal, point
         return convex_convex(a, b, d, support, support, sharp, sharp)
     turn, from_b = (dot(a.axes[0], b.axes[0]), dot(a.axes[1], b.axes[0])), False
     axes, half, other, at = a.axes, a.half_extents, b.half_extents, along_axes(a, d)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from rotation.helpers_pair import Pair, rotation
+from rotation.helpers_pair import Pair, matrix, product, rotation
 
 from carom.components import AABBCollider, SphereCollider
 from carom.plugins.capsule import CapsuleCollider
@@ -66,3 +66,35 @@ def test_a_ball_meets_a_turned_box_as_a_capsule_of_no_height_does(seed, d):
     ):
         for way in ways(random, d, size):
             same(ball.met(way), capsule.met(way), size)
+
+
+def separation(half, axes, other, other_axes, way, normal):
+    """The gap between two boxes along a direction, from their farthest points."""
+    return way @ normal - abs(axes.T @ normal) @ half - abs(other_axes.T @ normal) @ other
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("seed", range(8))
+def test_boxes_in_space_meet_at_their_distance(seed):
+    """No direction parts them by more than the distance of two of their points: the normal and the point show that.
+    Overlapping they part soonest across a face of one, or edges of both. Parallel ones too, and of any size."""
+    random = np.random.default_rng(seed)
+    size = (1.0, 1e-6, 1e6, 1.0)[seed % 4]
+    half, other = random.uniform(0.2, 1.0, (2, 3)) * size
+    turn = rotation(*random.normal(size=3))
+    between = random.normal(size=3) if seed < 5 else (0.0, 0.0, (0.0, 0.7, 1e-5)[seed - 5])
+    turns = (turn, product(turn, rotation(*between)))
+    one, two = (matrix(turn) for turn in turns)
+    edges = (np.cross(a, b) for a in one.T for b in two.T)
+    normals = [*one.T, *two.T, *(edge / np.linalg.norm(edge) for edge in edges if np.linalg.norm(edge) > 1e-9)]
+    with Pair(BoxCollider(half), BoxCollider(other), 3, turns) as boxes:
+        for way in (way * stretch for stretch in (1.0, 1.2) for way in ways(random, 3, size)):
+            depth, normal, point = boxes.met(way)
+            widest = max(separation(half, one, other, two, way, side * n) for n in normals for side in (1, -1))
+            assert separation(half, one, other, two, way, normal) == pytest.approx(-depth, abs=1e-11 * size)
+            assert -depth >= widest - 1e-11 * size
+            if depth > 0:
+                assert -depth == pytest.approx(widest, abs=1e-9 * size)
+            on_one, on_two = point + 0.5 * depth * normal, point - 0.5 * depth * normal - way
+            assert np.all(abs(one.T @ on_one) <= half + 1e-9 * size)
+            assert np.all(abs(two.T @ on_two) <= other + 2e-6 * size)
