@@ -19,13 +19,7 @@ from ....framework.plugins.registry import Convex, Pair, Shape
 from .batches import batch_by_address, checked, in_given_order, in_order_of_shapes, make_batch
 from .convex_by_address import convex_at, rounding_argument, support_argument
 from .parameters import array_of, parameter_schema, parameter_tuple, parameters_source
-from .signatures import (
-    OUT_OF_TIME,
-    batch_signature,
-    corner_signature,
-    evaluate_signature,
-    sweep_signature,
-)
+from .signatures import OUT_OF_TIME, linked_signature
 from .user_functions import as_argument, is_long, user_function
 
 
@@ -72,40 +66,37 @@ class LinkedPair:
     def __init__(self, first: Shape | None, second: Shape | None, pair: Pair, dimensions: int) -> None:
         self.first, self.second, self.pair, self.dimensions = first, second, pair, dimensions
 
-    @property
-    def _what(self) -> str:
-        return f"plugin {self.pair.plugin}: pair {self.pair.names}, {self.dimensions}D,"
-
     @cached_property
     def evaluate(self) -> Linked:
-        return Linked(make_evaluate(self._contact, *self._records), evaluate_signature(self.dimensions), self._what)
+        return self._linked(make_evaluate(self._contact, *self._records))
 
     @cached_property
     def batch(self) -> Linked:
         if is_long(self.pair.function):
             return _batch_by_address(self.dimensions)
         order = in_given_order if self.first is self.second else in_order_of_shapes
-        made = make_batch(self._contact, order, *self._records)
-        return Linked(made, batch_signature(self.dimensions), self._what)
+        return self._linked(make_batch(self._contact, order, *self._records))
 
     @cached_property
     def sweep(self) -> Linked | None:
         if self.pair.sweep is None:
             return None
-        swept = self._registered("swept", self.pair.sweep, "d, v")
-        return Linked(make_sweep(swept, *self._records), sweep_signature(self.dimensions), self._what)
+        return self._linked(make_sweep(self._registered("swept", self.pair.sweep, "d, v"), *self._records))
 
     @cached_property
     def corner(self) -> Linked | None:
         if self.pair.corner is None:
             return None
-        touches = self._registered("touches", self.pair.corner, "d, slop")
-        return Linked(make_corner(touches, *self._records), corner_signature(self.dimensions), self._what)
+        return self._linked(make_corner(self._registered("touches", self.pair.corner, "d, slop"), *self._records))
 
     def functions(self, sweeps: bool) -> Iterator[Linked]:
         """Those that there are; sweeps: also that of swept bodies and casts."""
         yield from (self.evaluate, self.batch)
         yield from (linked for linked in (self.corner, self.sweep if sweeps else None) if linked is not None)
+
+    def _linked(self, function: Any) -> Linked:
+        what = f"plugin {self.pair.plugin}: pair {self.pair.names}, {self.dimensions}D,"
+        return Linked(function, linked_signature(function.__name__, self.dimensions), what)
 
     @cached_property
     def _contact(self) -> Any:
@@ -180,4 +171,4 @@ def convex_sides(first: Shape, second: Shape, pair: Pair) -> tuple[bool, bool]:
 
 @lru_cache(maxsize=CACHE_SIZE)
 def _batch_by_address(dimensions: int) -> Linked:
-    return Linked(batch_by_address, batch_signature(dimensions))
+    return Linked(batch_by_address, linked_signature("batch", dimensions))

@@ -10,7 +10,6 @@ import numpy as np
 
 from ....framework.compilation import kernel
 from ....framework.data.arrays.column import ArrayColumn
-from ....framework.jit.kinds import Signature
 from ....framework.jit.linking import CACHE_SIZE, Linked
 from ....framework.jit.records.record import make_record
 from ....framework.jit.records.record_type import record_at, rows_of
@@ -27,18 +26,7 @@ from .parameters import (
     parameter_tuple,
     parameters_source,
 )
-from .signatures import (
-    ALONE,
-    NOT_FINITE,
-    bounds_signature,
-    call_bounds,
-    edge_signature,
-    material_signature,
-    moments_signature,
-    rotated_signature,
-    rounding_signature,
-    support_signature,
-)
+from .signatures import ALONE, NOT_FINITE, call_bounds, linked_signature
 from .user_functions import user_function
 
 
@@ -52,8 +40,8 @@ class LinkedShape:
     def bounds(self) -> Linked:
         """Half extents; notes the row in the state, also if they are no numbers from 0."""
         wrong = " and ".join(f"half[{k}] >= 0.0" for k in range(self.dimensions))
-        made = self._function(
-            "def bounds(state, p, i):",
+        return self._linked(
+            "bounds(state, p, i)",
             "state.row_a, state.row_b = i, ALONE",
             f"half = function({self._parameters('p')}, {self.dimensions})",
             f"if not ({wrong}):",
@@ -61,21 +49,18 @@ class LinkedShape:
             "return half",
             function=self.shape.bounds,
         )
-        return self._linked(made.bounds, bounds_signature(self.dimensions))
 
     @cached_property
     def rotated(self) -> Linked | None:
         """Writes the parameters of a row as rotated, copies them if no body is; None if rotation changes nothing."""
-        if self.shape.turned is None:
-            return None
         names = [f"column_{name}" for name in self.shape.columns]
         arrays = [isinstance(self.shape.component.columns[name], ArrayColumn) for name in self.shape.columns]
         writes = [
             f"    at(p).{name}[i] = {f'at(own).{name}[i]' if array else f'new[{place}]'}"
             for place, (name, array) in enumerate(zip(names, arrays, strict=True))
         ]
-        made = self._function(
-            "def rotated(state, own, p, i, is_rotated):",
+        return self._linked(
+            "rotated(state, own, p, i, is_rotated)",
             "if is_rotated:",
             f"    matrix = rows_of(at(own).matrices, i * {self.dimensions}, i * {self.dimensions} + {self.dimensions})",
             f"    new = function({self._parameters('own')}, matrix)",
@@ -85,54 +70,41 @@ class LinkedShape:
             "return 0",
             function=self.shape.turned,
         )
-        return self._linked(made.rotated, rotated_signature(self.dimensions))
 
     @cached_property
-    def support(self) -> Linked:
+    def support(self) -> Linked | None:
         source = f"return function({self._parameters('p')}, direction)"
-        made = self._function("def support(p, i, direction):", source, function=self.shape.support)
-        return self._linked(made.support, support_signature(self.dimensions))
+        return self._linked("support(p, i, direction)", source, function=self.shape.support)
 
     @cached_property
     def rounding(self) -> Linked | None:
-        """None if it has none."""
-        if self.shape.rounding is None:
-            return None
         source = f"return function({self._parameters('p')})"
-        made = self._function("def rounding(p, i):", source, function=self.shape.rounding)
-        return self._linked(made.rounding, rounding_signature())
+        return self._linked("rounding(p, i)", source, function=self.shape.rounding)
 
     @cached_property
     def edge(self) -> Linked | None:
         """In a plane both ends of an edge, by the support if the shape does not tell them; None in space, and of what
         has neither."""
         told, parameters = self.shape.edge or self.shape.support, self._parameters("p")
-        if self.dimensions == 3 or told is None:
-            return None
         call = f"function({parameters}, normal{'' if self.shape.support else ', point'})"
         if not self.shape.edge:
             call = f"edge_towards({parameters}, function, normal, tilt)"
         lines = f"one, two = {call}", "return one[0], one[1], two[0], two[1]"
-        made = self._function("def edge(p, i, normal, point, tilt):", *lines, function=told)
-        return self._linked(made.edge, edge_signature(2))
+        return self._linked(
+            "edge(p, i, normal, point, tilt)", *lines, function=told if self.dimensions == 2 else None
+        )
 
     @cached_property
     def moments(self) -> Linked | None:
-        """Measure, centre and second moments; None if the shape does not tell them."""
-        if self.shape.second_moments is None:
-            return None
+        """Measure, centre and second moments."""
         source = f"return function({self._parameters('p')}, {self.dimensions})"
-        made = self._function("def moments(state, p, i):", source, function=self.shape.second_moments)
-        return self._linked(made.moments, moments_signature(self.dimensions))
+        return self._linked("moments(state, p, i)", source, function=self.shape.second_moments)
 
     @cached_property
     def material(self) -> Linked | None:
-        """What it is made of where it is touched; None if it is the same everywhere."""
-        if self.shape.material is None:
-            return None
+        """What it is made of where it is touched."""
         source = f"return function({self._parameters('p')}, point, normal)"
-        made = self._function("def material(p, i, point, normal):", source, function=self.shape.material)
-        return self._linked(made.material, material_signature(self.dimensions))
+        return self._linked("material(p, i, point, normal)", source, function=self.shape.material)
 
     def all_functions(self, by_address: bool, touched: bool = False) -> Iterator[Linked]:
         """by_address: whether some pair takes the shape by the addresses of support and rounding; touched: whether what
@@ -147,19 +119,20 @@ class LinkedShape:
     def _parameters(self, address: str) -> str:
         return parameters_source(self.shape, f"at({address})", "i", "Parameters")
 
-    def _linked(self, function: Any, signature: Signature) -> Linked:
-        shape = self.shape
-        what = f"plugin {shape.plugin}: {function.__name__} of {shape.component.__name__}, {self.dimensions}D,"
-        return Linked(function, signature, what)
-
-    def _function(self, header: str, *lines: str, function: Any) -> Any:
+    def _linked(self, header: str, *lines: str, function: Any) -> Any:
+        """A function around one of the shape; None if it has not that."""
+        if function is None:
+            return None
         scope = {
             "function": user_function(function), "Parameters": parameter_tuple(self.shape), "array_of": array_of,
             "at": record_at(parameter_schema(self.shape), self.dimensions), "rows_of": rows_of,
             "edge_towards": edge_towards, "ALONE": ALONE, "NOT_FINITE": NOT_FINITE,
         }  # fmt: skip
-        title = f'"""{self.shape.component.__name__}, {self.dimensions}D."""\n\n'
-        return source_module(title + "\n    ".join([header, *lines]) + "\n", scope)
+        shape, name = self.shape, header.partition("(")[0]
+        title = f'"""{shape.component.__name__}, {self.dimensions}D."""\n\n'
+        made = source_module(title + "\n    ".join([f"def {header}:", *lines]) + "\n", scope)
+        what = f"plugin {shape.plugin}: {name} of {shape.component.__name__}, {self.dimensions}D,"
+        return Linked(getattr(made, name), linked_signature(name, self.dimensions), what)
 
 
 @lru_cache(maxsize=CACHE_SIZE)

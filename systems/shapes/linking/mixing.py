@@ -13,7 +13,7 @@ from ....framework.jit.linking import CACHE_SIZE, Linked
 from ....framework.plugins.registry import Registry
 from ....framework.settings import MIXING_RULES
 from ....framework.vectors import negative, sub
-from .signatures import call_material, call_mixing, mixing_signature
+from .signatures import call_material, call_mixing, linked_signature
 from .user_functions import user_function
 
 AVERAGE, GEOMETRIC_MEAN, MAX, MIN, MULTIPLY = range(len(MIXING_RULES))  # in their order
@@ -113,7 +113,7 @@ def linked_rule(function: Any) -> Linked:
             raise ValueError("a mixing rule of a plugin returned no number from 0")
         return value
 
-    return Linked(mixed, mixing_signature(), f"mixing rule {getattr(function, '__name__', mixed.__name__)}")
+    return Linked(mixed, linked_signature("mixed", 2), f"mixing rule {getattr(function, '__name__', mixed.__name__)}")
 
 
 def rule_number(registry: Registry, name: str) -> int:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import cache, partial
 from typing import Any
 
-from ....framework.jit.kinds import BOOL, FLOAT, INT, Kind, Signature, floats, record_kind, tuple_of
+from ....framework.jit.kinds import BOOL, FLOAT, INT, Signature, floats, record_kind, tuple_of
 from ....framework.jit.lazy import JIT, LazyIntrinsic, operation, types
 from ....framework.jit.linking import linked_call
 from ....framework.jit.records.record_type import record_code
@@ -18,83 +18,32 @@ OUT_OF_TIME = 2  # a sweep's time is not from 0 to 1
 ALONE = -1  # in place of a second row: the bounds of the first
 
 
-TWO_ROWS: tuple[Kind, ...] = (INT,) * 4  # parameters of a, row a, parameters of b, row b
-
-
 @cache
-def evaluate_signature(dimensions: int) -> Signature:
-    """(state, parameters of a, row a, parameters of b, row b, d) -> (hit, depth, normal, point)."""
+def signatures(dimensions: int) -> dict[str, Signature]:
+    """By the names of the functions. Of a shape they take the address of its parameters and a row; of a pair those of
+    a, then those of b."""
     state, vector = record_kind(STATE, dimensions), floats(dimensions)
-    contact = tuple_of(BOOL, FLOAT, vector, vector)
-    return contact(state, *TWO_ROWS, vector)
+    row, rows, moments = (INT,) * 2, (INT,) * 4, 1 + dimensions + dimensions * (dimensions + 1) // 2
+    return {
+        "evaluate": tuple_of(BOOL, FLOAT, vector, vector)(state, *rows, vector),  # (d): hit, depth, normal, point
+        "batch": INT(state, INT, INT),  # (start, stop): whether all answers were sound, see batches
+        "sweep": tuple_of(BOOL, FLOAT)(state, *rows, vector, vector),  # (d, v): hit, time
+        "corner": BOOL(state, *rows, vector, FLOAT),  # (d, slop)
+        "bounds": vector(state, *row),  # half extents
+        "moments": floats(moments)(state, *row),  # of its own: measure, centre, means of products of coordinates
+        # (point, normal): friction, restitution, surface velocity
+        "material": tuple_of(FLOAT, FLOAT, vector)(*row, vector, vector),
+        "rotated": INT(state, INT, INT, INT, BOOL),  # (own parameters, as rotated, row, whether bodies are rotated): 0
+        "support": vector(*row, vector),  # (direction): farthest point of the core
+        "edge": floats(2 * dimensions)(*row, vector, vector, FLOAT),  # (normal, point, tilt): both ends of an edge
+        "rounding": FLOAT(*row),
+        "mixed": FLOAT(FLOAT, FLOAT),  # (a's value, b's value): that of the pair
+    }
 
 
-@cache
-def batch_signature(dimensions: int) -> Signature:
-    """(state, start, stop) -> whether all answers were sound, see batches."""
-    return INT(record_kind(STATE, dimensions), INT, INT)
-
-
-@cache
-def sweep_signature(dimensions: int) -> Signature:
-    """(state, parameters of a, row a, parameters of b, row b, d, v) -> (hit, time)."""
-    state, vector = record_kind(STATE, dimensions), floats(dimensions)
-    return tuple_of(BOOL, FLOAT)(state, *TWO_ROWS, vector, vector)
-
-
-@cache
-def corner_signature(dimensions: int) -> Signature:
-    """(state, parameters of a, row a, parameters of b, row b, d, slop) -> bool."""
-    state, vector = record_kind(STATE, dimensions), floats(dimensions)
-    return BOOL(state, *TWO_ROWS, vector, FLOAT)
-
-
-@cache
-def bounds_signature(dimensions: int) -> Signature:
-    """(state, parameters, row) -> half extents."""
-    return floats(dimensions)(record_kind(STATE, dimensions), INT, INT)
-
-
-@cache
-def moments_signature(dimensions: int) -> Signature:
-    """(state, own parameters, row) -> measure, centre, means of products of coordinates."""
-    count = 1 + dimensions + dimensions * (dimensions + 1) // 2
-    return floats(count)(record_kind(STATE, dimensions), INT, INT)
-
-
-@cache
-def material_signature(dimensions: int) -> Signature:
-    """(parameters, row, point, normal) -> (friction, restitution, surface velocity)."""
-    vector = floats(dimensions)
-    return tuple_of(FLOAT, FLOAT, vector)(INT, INT, vector, vector)
-
-
-@cache
-def rotated_signature(dimensions: int) -> Signature:
-    """(state, own parameters, parameters as rotated, row, whether bodies are rotated) -> 0."""
-    return INT(record_kind(STATE, dimensions), INT, INT, INT, BOOL)
-
-
-@cache
-def support_signature(dimensions: int) -> Signature:
-    """(parameters, row, direction) -> farthest point of the core."""
-    return floats(dimensions)(INT, INT, floats(dimensions))
-
-
-@cache
-def edge_signature(dimensions: int) -> Signature:
-    """(parameters, row, normal, point, tilt) -> both ends of an edge, one after the other."""
-    return floats(2 * dimensions)(INT, INT, floats(dimensions), floats(dimensions), FLOAT)
-
-
-def rounding_signature() -> Signature:
-    """(parameters, row) -> rounding."""
-    return FLOAT(INT, INT)
-
-
-def mixing_signature() -> Signature:
-    """(a's value, b's value) -> that of the pair."""
-    return FLOAT(FLOAT, FLOAT)
+def linked_signature(name: str, dimensions: int) -> Signature:
+    """That of a function."""
+    return signatures(dimensions)[name]
 
 
 def call_in_dimension(signature_of: Callable[[int], Any]) -> Any:
@@ -117,15 +66,13 @@ def call_in_dimension(signature_of: Callable[[int], Any]) -> Any:
     )
 
 
-call_evaluate = call_in_dimension(evaluate_signature)
-call_batch = call_in_dimension(batch_signature)
-call_sweep = call_in_dimension(sweep_signature)
-call_corner = call_in_dimension(corner_signature)
-call_bounds = call_in_dimension(bounds_signature)
-call_moments = call_in_dimension(moments_signature)
-call_material = call_in_dimension(material_signature)
-call_rotated = call_in_dimension(rotated_signature)
-call_support = call_in_dimension(support_signature)
-call_edge = call_in_dimension(edge_signature)
-call_rounding = linked_call(rounding_signature)
-call_mixing = linked_call(mixing_signature)
+(
+    call_evaluate, call_batch, call_sweep, call_corner, call_bounds, call_moments, call_material, call_rotated,
+    call_support, call_edge,
+) = (
+    call_in_dimension(partial(linked_signature, name))
+    for name in (
+        "evaluate", "batch", "sweep", "corner", "bounds", "moments", "material", "rotated", "support", "edge",
+    )
+)  # fmt: skip
+call_rounding, call_mixing = (linked_call(partial(linked_signature, name, 2)) for name in ("rounding", "mixed"))
