@@ -8,6 +8,7 @@ take numba and LLVM many times as long to compile.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from typing import Any
@@ -100,6 +101,38 @@ def negative(a):
     return tuple(-x for x in a)
 
 
+@_emitted(*_elementwise(lambda b, x, s: b.fadd(x, s), 1, 1))
+def shifted(a, by):
+    """The sum of each component and a number."""
+    return tuple(x + by for x in a)
+
+
+@_emitted(*_elementwise(lambda b, x, s: s, 1, 1))
+def filled(like, value):
+    """A vector whose components are all that number."""
+    return (value,) * len(like)
+
+
+def _least(builder: Any, x: Any, y: Any) -> Any:
+    return builder.select(builder.fcmp_ordered("<", y, x), y, x)
+
+
+def _most(builder: Any, x: Any, y: Any) -> Any:
+    return builder.select(builder.fcmp_ordered(">", y, x), y, x)
+
+
+@_emitted(*_elementwise(_least, 2, 0))
+def smaller(a, b):
+    """The smaller of each two components; that of a where one is nan."""
+    return tuple(min(x, y) for x, y in zip(a, b, strict=True))
+
+
+@_emitted(*_elementwise(_most, 2, 0))
+def larger(a, b):
+    """The larger of each two components; that of a where one is nan."""
+    return tuple(max(x, y) for x, y in zip(a, b, strict=True))
+
+
 def _magnitude(builder: Any, x: Any) -> Any:
     return builder.call(builder.module.declare_intrinsic("llvm.fabs", [x.type]), [x])
 
@@ -122,29 +155,47 @@ def clamped(a, limits):
     return tuple(max(-limit, min(limit, x)) for x, limit in zip(a, limits, strict=True))
 
 
-def _emit_dot(context: Any, builder: Any, arguments: Any, values: Any) -> Any:
-    products = [
-        builder.fmul(builder.extract_value(values[0], k), builder.extract_value(values[1], k))
-        for k in range(arguments[0].count)
-    ]
-    total = products[0]
-    for product in products[1:]:
-        total = builder.fadd(total, product)
-    return total
+def _folded(each: Callable[..., Any], join: Callable[..., Any], result: str = "float64") -> tuple[Any, Any]:
+    """(emit, signature) of one number made of what ``each`` gives for the components of some vectors."""
+
+    def emit(context: Any, builder: Any, arguments: Any, values: Any) -> Any:
+        found = [
+            each(builder, *(builder.extract_value(value, k) for value in values)) for k in range(arguments[0].count)
+        ]
+        return functools.reduce(functools.partial(join, builder), found)
+
+    def signature(*arguments: Any) -> Any:
+        kind = _vector(arguments[0])
+        return None if kind is None else getattr(types, result)(*(kind,) * len(arguments))
+
+    return emit, signature
 
 
-def _sign_dot(a: Any, b: Any) -> Any:
-    kind = _vector(a)
-    return None if kind is None else types.float64(kind, kind)
-
-
-@_emitted(_emit_dot, _sign_dot)
+@_emitted(*_folded(lambda b, x, y: b.fmul(x, y), lambda b, x, y: b.fadd(x, y)))
 def dot(a, b):
     """Scalar product."""
     total = a[0] * b[0]
     for x, y in zip(a[1:], b[1:], strict=True):
         total += x * y
     return total
+
+
+@_emitted(*_folded(lambda b, x: x, _least))
+def smallest(a):
+    """The smallest component."""
+    return min(a)
+
+
+@_emitted(*_folded(lambda b, x: x, _most))
+def largest(a):
+    """The largest component."""
+    return max(a)
+
+
+@_emitted(*_folded(lambda b, x, y: b.fcmp_ordered("<=", x, y), lambda b, x, y: b.and_(x, y), "boolean"))
+def at_most(a, b):
+    """Whether each component of a is at most that of b; not if one is nan."""
+    return all(x <= y for x, y in zip(a, b, strict=True))
 
 
 def _in_memory(builder: Any, vector: Any, index: Any) -> tuple[Any, Any]:
@@ -241,13 +292,17 @@ def length(a):
         return math.sqrt(square)
     if math.isnan(square):  # which max passes over
         return square
-    largest = 0.0
-    for k in range(len(a)):
-        largest = max(largest, abs(item(a, k)))
-    if largest == 0.0 or not math.isfinite(largest):
-        return largest
-    part = divided(a, largest)
-    return largest * math.sqrt(dot(part, part))
+    most = largest(absolute(a))
+    if most == 0.0 or not math.isfinite(most):
+        return most
+    part = divided(a, most)
+    return most * math.sqrt(dot(part, part))
+
+
+@inlined
+def cross(a, b):
+    """Vector product, of vectors in space."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @inlined

@@ -6,7 +6,7 @@ import math
 
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, item, replace, scale
+from ...framework.vectors import add, at_most, filled, item, larger, shifted, smaller, smallest, sub
 from ..ccd.search_bounds import GIVE, find_margins, place_at
 from ..codes import OK
 from ..integration.turning import size_of_turn
@@ -35,15 +35,6 @@ def fixed_row(state, k):
 
 
 @part
-def smallest_of(vector):
-    """Its smallest component."""
-    smallest = vector[0]
-    for k in range(1, len(vector)):
-        smallest = min(smallest, item(vector, k))
-    return smallest
-
-
-@part
 def find_extents(state, level, start, stop):
     """Half extents of one level of rows start..stop-1 and where it stands from the body's position; nan without one.
 
@@ -51,7 +42,7 @@ def find_extents(state, level, start, stop):
     """
     bodies, offset, slots, thinnest = state.bodies, state.colliders.offset, state.shapes.slots, math.inf
     for i in range(start, stop):
-        shape, half = bodies.levels[level, i], scale(zero_of(state), math.nan)
+        shape, half = bodies.levels[level, i], filled(zero_of(state), math.nan)
         if shape >= 0:
             at = offset[slots[shape], i]
             if state.rotated:
@@ -59,8 +50,8 @@ def find_extents(state, level, start, stop):
                 write_rotated(state, shape, i, state.rotated)
             bodies.level_offsets[level, i] = at
             half = half_extents(state, shape, i)
-        smallest = smallest_of(half)
-        extent = 2.0 * smallest if smallest < math.inf else 0.0  # what has no end is to others as a point
+        least = smallest(half)
+        extent = 2.0 * least if least < math.inf else 0.0  # what has no end is to others as a point
         bodies.half_extents[i], bodies.min_extent[i] = half, extent
         if state.spinning:
             bodies.reach[i] = reach_of(half, bodies.level_offsets[level, i])
@@ -72,22 +63,8 @@ def find_extents(state, level, start, stop):
 def box_level(state, level, i, before, after):
     """The box of one level of a body that moves from ``before`` to ``after``; of nan if it has no shape."""
     at, half = state.bodies.level_offsets[level, i], state.bodies.half_extents[i]
-    margin = BOX_MARGIN * smallest_of(half)
-    first, last, low, high = add(before, at), add(after, at), at, at
-    for k in range(len(at)):
-        low = replace(low, k, min(item(first, k), item(last, k)) - item(half, k) - margin)
-        high = replace(high, k, max(item(first, k), item(last, k)) + item(half, k) + margin)
-    return low, high
-
-
-@part
-def add_level(state, i, low, high):
-    """Let the box of a body hold that of a further level."""
-    lower, upper = state.bodies.lower[i], state.bodies.upper[i]
-    for k in range(len(low)):
-        lower = replace(lower, k, min(item(lower, k), item(low, k)))
-        upper = replace(upper, k, max(item(upper, k), item(high, k)))
-    state.bodies.lower[i], state.bodies.upper[i] = lower, upper
+    margin, first, last = BOX_MARGIN * smallest(half), add(before, at), add(after, at)
+    return shifted(sub(smaller(first, last), half), -margin), shifted(add(larger(first, last), half), margin)
 
 
 @part
@@ -101,16 +78,14 @@ def grid_stop(state):
 @part
 def measure_frame(state):
     """The frame holds the boxes of what may be in the grid of what moves; those of nan count for nothing."""
-    frame, bodies, lowest, highest, largest = state.frame, state.bodies, zero_of(state), zero_of(state), 0.0
-    for k in range(len(lowest)):
-        lowest, highest = replace(lowest, k, math.inf), replace(highest, k, -math.inf)
+    frame, bodies, zero, largest = state.frame, state.bodies, zero_of(state), 0.0
+    lowest, highest = filled(zero, math.inf), filled(zero, -math.inf)
     for i in range(state.first, grid_stop(state)):
         low, high, longest = bodies.lower[i], bodies.upper[i], 0.0
-        for k in range(len(low)):  # comparisons with nan are false
-            lowest = replace(lowest, k, item(low, k) if item(low, k) < item(lowest, k) else item(lowest, k))
-            highest = replace(highest, k, item(high, k) if item(high, k) > item(highest, k) else item(highest, k))
+        lowest, highest = smaller(lowest, low), larger(highest, high)
+        for k in range(len(low)):
             edge = item(high, k) - item(low, k)
-            longest = edge if edge > longest else longest
+            longest = edge if edge > longest else longest  # comparisons with nan are false
         largest = longest if longest > largest else largest  # one comparison a body waits for the one before
     for k in range(len(lowest)):
         frame[LOWEST + k], frame[HIGHEST + k] = item(lowest, k), item(highest, k)
@@ -151,10 +126,7 @@ def hold_turns(state, start, stop):
         turned = angle > 0.0 and bodies.rolling_radius[i] == 0.0
         if turned or driven > 0.0:
             way = (min(angle, 2.0) * bodies.reach[i] if turned else 0.0) + driven
-            lower, upper = bodies.lower[i], bodies.upper[i]
-            for k in range(len(lower)):
-                lower, upper = replace(lower, k, item(lower, k) - way), replace(upper, k, item(upper, k) + way)
-            bodies.lower[i], bodies.upper[i] = lower, upper
+            bodies.lower[i], bodies.upper[i] = shifted(bodies.lower[i], -way), shifted(bodies.upper[i], way)
 
 
 # Where the motion of a box begins and ends. STAYING: where the body is, and the box may be one of the uniform grid.
@@ -183,7 +155,7 @@ def box_rows(state, start, stop, motion):
         thinnest = find_extents(state, level, start, stop)
         for i in range(start, stop):
             low, high = box_level(state, level, i, starts[i], ends[i])
-            add_level(state, i, low, high)
+            bodies.lower[i], bodies.upper[i] = smaller(bodies.lower[i], low), larger(bodies.upper[i], high)
     if state.spinning and motion in (MOVING, SEARCHING):
         hold_turns(state, start, stop)
     if motion == STANDING:
@@ -196,10 +168,7 @@ def box_rows(state, start, stop, motion):
 @part
 def contains_box(lower, upper, low, high):
     """Whether lower..upper holds the box low..high, or this is of nan."""
-    held = True
-    for k in range(len(low)):
-        held &= (item(lower, k) <= item(low, k)) & (item(high, k) <= item(upper, k))
-    return held or low[0] != low[0]
+    return (at_most(lower, low) and at_most(high, upper)) or low[0] != low[0]
 
 
 def box_statics(state, dt):
@@ -258,15 +227,10 @@ def bound_searches(state, now, dt):
     for i in range(state.first, state.moving):
         margin = bodies.search_margin[i]
         give = margin + GIVE * bodies.min_extent[i]
-        before, after, lower, upper = bodies.search_lower[i], bodies.search_upper[i], bodies.lower[i], bodies.upper[i]
-        low, high = before, after
-        for k in range(len(before)):
-            lower = replace(lower, k, item(lower, k) - margin)
-            upper = replace(upper, k, item(upper, k) + margin)
-            low = replace(low, k, min(item(before, k), item(after, k)) - give)
-            high = replace(high, k, max(item(before, k), item(after, k)) + give)
-        bodies.lower[i], bodies.upper[i] = lower, upper
-        bodies.search_lower[i], bodies.search_upper[i] = low, high
+        before, after = bodies.search_lower[i], bodies.search_upper[i]
+        bodies.lower[i], bodies.upper[i] = shifted(bodies.lower[i], -margin), shifted(bodies.upper[i], margin)
+        bodies.search_lower[i] = shifted(smaller(before, after), -give)
+        bodies.search_upper[i] = shifted(larger(before, after), give)
     measure_frame(state)
     return 0
 

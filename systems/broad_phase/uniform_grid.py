@@ -23,7 +23,7 @@ import numpy as np
 
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import item, replace
+from ...framework.vectors import at_most, item, replace
 from ..bits import lowest_bit
 from .brute_force import boxes_overlap
 from .lanes import eight_at, four_at
@@ -45,6 +45,15 @@ LANES = 8  # codes that may be read past the last one
 NOTE = 12  # pairs that one note may stand for: 4 and 8 lanes
 
 FULL = -1  # in place of a number of pairs: there may not be room for all
+
+
+@inlined
+def frame_of(grid):
+    """(lower, upper) corner of what holds all boxes in the grid."""
+    low = high = zero_of(grid)
+    for k in range(len(low)):
+        low, high = replace(low, k, grid.frame[LOWEST + k]), replace(high, k, grid.frame[HIGHEST + k])
+    return low, high
 
 
 @part
@@ -79,11 +88,9 @@ def find_cells(grid, lower, upper, start, count):
     Returns whether the boxes are spread evenly enough.
     """
     inverse, row, layer, total = grid.inverse_cell, grid.row, grid.layer, grid.total
-    keys, directory, frame, origin = grid.keys, grid.directory, grid.frame, zero_of(grid)
+    keys, directory, (origin, _) = grid.keys, grid.directory, frame_of(grid)
     for k in range(total + 3):
         directory[k] = 0
-    for q in range(len(origin)):
-        origin = replace(origin, q, frame[LOWEST + q])
     for i in range(count):
         key, valid = 0, True
         low, high = lower[start + i], upper[start + i]
@@ -303,10 +310,8 @@ def look_near(state, grid, start, stop, found):
     order, directory, codes = grid.order, grid.directory, grid.codes
     lower, upper, first = state.bodies.lower, state.bodies.upper, state.candidates.first
     second, row, layer, inverse = state.candidates.second, grid.row, grid.layer, grid.inverse_cell
-    origin, end, d, one = zero_of(grid), zero_of(grid), len(zero_of(grid)), np.int64(1)
+    (origin, end), d, one = frame_of(grid), len(zero_of(grid)), np.int64(1)
     guards = guard_bits(d)
-    for q in range(d):
-        origin, end = replace(origin, q, grid.frame[LOWEST + q]), replace(end, q, grid.frame[HIGHEST + q])
     width = 8 if d == 2 else 7  # boxes of a line that bits stand for
     for i in range(start, stop):
         low, high, fits = lower[i], upper[i], found + 64 <= len(first)
@@ -373,9 +378,8 @@ def look_inside(state, grid, i, low, high, found):
     ``test_notes``."""
     lower, upper, order, codes, one = state.bodies.lower, state.bodies.upper, grid.order, grid.codes, np.int64(1)
     first, second, room = state.candidates.first, state.candidates.second, len(state.candidates.first)
-    for q in range(len(low)):
-        if not item(low, q) <= item(high, q):
-            return found
+    if not at_most(low, high):
+        return found
     code, guards = outline(grid, low, high)
     cells = cells_around(grid, low, high)
     for n in range(cells[1]):

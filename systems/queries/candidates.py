@@ -10,10 +10,10 @@ import numpy as np
 
 from ...framework.compilation import inlined, part, pasted
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, add_scaled, item, replace, sub
+from ...framework.vectors import absolute, add, filled, item, larger, replace, scale, sub
 from ..bits import lowest_bit
+from ..broad_phase.brute_force import boxes_overlap
 from ..broad_phase.lanes import eight_at
-from ..broad_phase.records import HIGHEST, LOWEST
 from ..broad_phase.tree.cells import REACH, cells_of, cover, parts_of
 from ..broad_phase.uniform_grid import LANES, cells_around, line_of, outline
 
@@ -32,10 +32,7 @@ def overlaps_tree_box(tree, place, low, high):
 @inlined
 def is_box_near(state, i, low, high):
     """The same for the box of row i."""
-    lower, upper, hit = state.bodies.lower[i], state.bodies.upper[i], True
-    for k in range(len(low)):
-        hit &= (item(low, k) <= item(upper, k)) & (item(lower, k) <= item(high, k))
-    return hit
+    return boxes_overlap(low, high, state.bodies.lower[i], state.bodies.upper[i])
 
 
 @inlined
@@ -61,22 +58,9 @@ def row_at(grid, n, place):
 
 
 @inlined
-def frame_of(grid):
-    """(lower, upper) corner of what holds all boxes in the grid."""
-    low = high = zero_of(grid)
-    for k in range(len(low)):
-        low, high = replace(low, k, grid.frame[LOWEST + k]), replace(high, k, grid.frame[HIGHEST + k])
-    return low, high
-
-
-@inlined
 def box_rounding(point, low, high):
     """Per axis more than all rounding errors of distances between the point and boxes inside of low..high."""
-    result = point
-    for k in range(len(point)):
-        farthest = max(abs(item(low, k)), abs(item(high, k)))
-        result = replace(result, k, REACH * (abs(item(point, k)) + farthest))
-    return result
+    return scale(add(absolute(point), larger(absolute(low), absolute(high))), REACH)
 
 
 @inlined
@@ -122,7 +106,7 @@ def to_collider(state, point, i):
 @inlined
 def nan_vector(zero):
     """A vector of nan, in place of what is not found."""
-    return add_scaled(zero, zero, math.nan)
+    return filled(zero, math.nan)
 
 
 @part

@@ -10,13 +10,13 @@ import math
 
 from ...framework.compilation import inlined, pasted
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, add_scaled, divided, item, length, replace, sub
+from ...framework.vectors import add, add_scaled, divided, item, larger, length, replace, smaller, sub
 from ..bits import lowest_bit
 from ..broad_phase.tree.cells import cells_of, cover, parts_of, uncertainty
-from ..broad_phase.uniform_grid import LANES, cells_around, outline
+from ..broad_phase.uniform_grid import LANES, cells_around, frame_of, outline
 from ..shapes.query import query_half_extents
 from ..shapes.tolerances import ENDLESS
-from .candidates import box_at, box_rounding, frame_of, is_wanted, may_be_near_at, nan_vector, places_of, row_at
+from .candidates import box_at, box_rounding, is_wanted, may_be_near_at, nan_vector, places_of, row_at
 from .first_touch import LAST_STEP, Path, first_touch_of_cast, is_met, touch_in_the_way
 
 SLICE_SLACK = 1.0 + 4.0 * LAST_STEP  # so that bodies at the nearest distance are all tested, in whatever order
@@ -63,12 +63,8 @@ def box_interval(lower, upper, path, reach):
 @inlined
 def slice_box(path, begin, end):
     """(low, high) of the box around the query's shape on the path from begin to end."""
-    low, high = add_scaled(path.start, path.direction, begin), add_scaled(path.start, path.direction, end)
-    for k in range(len(low)):
-        one, two = item(low, k), item(high, k)
-        low = replace(low, k, min(one, two) - item(path.half, k))
-        high = replace(high, k, max(one, two) + item(path.half, k))
-    return low, high
+    one, two = add_scaled(path.start, path.direction, begin), add_scaled(path.start, path.direction, end)
+    return sub(smaller(one, two), path.half), add(larger(one, two), path.half)
 
 
 # -- slices --------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ from typing import Any
 
 from ...framework.compilation import inlined, part, pasted
 from ...framework.elementary import exponent_of, two_to
-from ...framework.vectors import add, add_scaled, dot, item, length, negative, scale, sub
+from ...framework.vectors import add, add_scaled, dot, length, negative, scale, smallest, sub
 from ..integration.trajectory import ROUNDING
 from ..narrow_phase.one_way import SLACK, front_of, is_from_front, is_one_way
 from ..shapes.query import evaluate_against, sweep_against
@@ -145,9 +145,7 @@ def is_met(state, batch, q, i, path, distance, normal):
         return True
     if not dot(front, path.direction) < 0.0:
         return False
-    away, extent = to_collider(state, path.start, i), math.inf
-    for k in range(len(away)):
-        extent = min(extent, 2.0 * item(path.half, k))
+    away, extent = to_collider(state, path.start, i), 2.0 * smallest(path.half)
     return evaluate_against(state, batch.query, q, state.bodies.shape[i], i, away)[1] <= SLACK * extent
 
 
@@ -189,9 +187,7 @@ def touch_in_the_way(state, batch, q, i, path, leave, reach, touch):
 def touch_of_wedged(state, batch, q, i, path, reach):
     """The same of a shape between two sides of a body, both of which it touches all the way: by looks in strides, and
     bisection between the first that finds what is in the way and the one before."""
-    away, shape, size = to_collider(state, path.start, i), state.bodies.shape[i], math.inf
-    for k in range(len(away)):
-        size = min(size, 2.0 * item(path.half, k))
+    away, shape, size = to_collider(state, path.start, i), state.bodies.shape[i], 2.0 * smallest(path.half)
     stride = max(LOOK_AHEAD * size, reach / MOST_STRIDES_AHEAD)
     low, high, t, looks, inside, normal, point = 0.0, math.inf, 0.0, 0, 0.0, away, away
     while low < t < high or looks == 0:

@@ -6,23 +6,13 @@ import math
 
 from ...framework.compilation import inlined, pasted
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add_scaled, item, replace, sub
+from ...framework.vectors import add, add_scaled, at_most, dot, filled, larger, largest, shifted, sub
 from ..bits import lowest_bit
 from ..broad_phase.tree.cells import cells_of, cover, parts_of, uncertainty
-from ..broad_phase.uniform_grid import LANES, cells_around, outline
+from ..broad_phase.uniform_grid import LANES, cells_around, frame_of, outline
 from ..shapes.query import evaluate_against
 from ..shapes.tolerances import ENDLESS
-from .candidates import (
-    box_at,
-    box_rounding,
-    frame_of,
-    is_wanted,
-    may_be_near_at,
-    nan_vector,
-    places_of,
-    row_at,
-    to_collider,
-)
+from .candidates import box_at, box_rounding, is_wanted, may_be_near_at, nan_vector, places_of, row_at, to_collider
 
 FIRST_BOX = 0.5  # half the size of the first box, in cells of the finest level; measured: 1 takes longer, as does 0.2
 
@@ -30,12 +20,8 @@ FIRST_BOX = 0.5  # half the size of the first box, in cells of the finest level;
 @inlined
 def squared_gap(low, high, point, slack):
     """Square of the distance from a point to the box low..high, at most: less the uncertainty of both."""
-    square = 0.0
-    for k in range(len(point)):
-        gap = max(item(low, k) - item(point, k), item(point, k) - item(high, k))
-        gap = max(gap - item(slack, k), 0.0)
-        square += gap * gap
-    return square
+    gap = larger(sub(larger(sub(low, point), sub(point, high)), slack), filled(point, 0.0))
+    return dot(gap, gap)
 
 
 @pasted
@@ -56,34 +42,24 @@ def improve_nearest(state, batch, q, i, gap):
 @inlined
 def box_around(point, reach, slack):
     """The box that reaches so far from the point, and its uncertainty farther."""
-    low, high = point, point
-    for k in range(len(point)):
-        low = replace(low, k, item(point, k) - reach - item(slack, k))
-        high = replace(high, k, item(point, k) + reach + item(slack, k))
-    return low, high
+    return sub(shifted(point, -reach), slack), add(shifted(point, reach), slack)
 
 
 @inlined
 def first_reach(tree, point):
     """Half the size of the first box around the point: it reaches what is there."""
-    cell, origin, lowest, highest = tree.finest_cell, tree.origin[0], tree.lowest[0], tree.highest[0]
-    reach = FIRST_BOX * cell
-    for k in range(len(point)):
-        below = item(origin, k) + item(lowest, k) * cell - item(point, k)
-        above = item(point, k) - item(origin, k) - item(highest, k) * cell
-        reach = max(reach, max(below, above) + FIRST_BOX * cell)
-    return reach
+    cell, origin = tree.finest_cell, tree.origin[0]
+    below = sub(add_scaled(origin, tree.lowest[0], cell), point)
+    above = add_scaled(sub(point, origin), tree.highest[0], -cell)
+    return max(largest(larger(below, above)), 0.0) + FIRST_BOX * cell
 
 
 @inlined
 def covers_all(tree, low, high):
     """Whether the box low..high holds everything that is in cells."""
-    cell, origin, lowest, highest = tree.finest_cell, tree.origin[0], tree.lowest[0], tree.highest[0]
-    covers = True
-    for k in range(len(low)):
-        covers &= item(low, k) <= item(origin, k) + item(lowest, k) * cell
-        covers &= item(high, k) >= item(origin, k) + item(highest, k) * cell
-    return covers
+    cell, origin = tree.finest_cell, tree.origin[0]
+    lowest, highest = add_scaled(origin, tree.lowest[0], cell), add_scaled(origin, tree.highest[0], cell)
+    return at_most(low, lowest) and at_most(highest, high)
 
 
 @pasted
@@ -124,10 +100,8 @@ def improve_from_grid(state, batch, grid, q):
     """The same with a grid: first what is outside of it, then boxes around the point that grow."""
     point, bodies = batch.centre[q], state.bodies
     lowest, highest = frame_of(grid)
-    slack, first = box_rounding(point, lowest, highest), FIRST_BOX / grid.inverse_cell
-    reach, begin = first, -1
-    for k in range(len(point)):
-        reach = max(reach, max(item(lowest, k) - item(point, k), item(point, k) - item(highest, k)) + first)
+    slack, begin = box_rounding(point, lowest, highest), -1
+    reach = max(largest(larger(sub(lowest, point), sub(point, highest))), 0.0) + FIRST_BOX / grid.inverse_cell
     while True:
         reach = min(reach, max(batch.distance[q], 0.0))
         low, high = box_around(point, reach, slack)
@@ -140,10 +114,8 @@ def improve_from_grid(state, batch, grid, q):
                     i = row_at(grid, n, start + lowest_bit(bits))
                     bits &= bits - 1
                     improve_nearest(state, batch, q, i, squared_gap(bodies.lower[i], bodies.upper[i], point, slack))
-        best, covers = batch.distance[q], True
-        for k in range(len(point)):
-            covers &= (item(low, k) <= item(lowest, k)) & (item(high, k) >= item(highest, k))
-        if best <= reach or covers:
+        best = batch.distance[q]
+        if best <= reach or (at_most(low, lowest) and at_most(highest, high)):
             return
         reach, begin = (best if batch.row[q] >= 0 else 2.0 * reach), 0
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...framework.compilation import inlined
-from ...framework.vectors import add, item, length, replace, sub
+from ...framework.vectors import absolute, add, length, scale, shifted, sub
 from ..broad_phase.tree.cells import REACH
 from .candidates import has_layer, make_find_all
 
@@ -14,9 +14,7 @@ ALL_LAYERS = -1
 def box_of_body(state, batch, q):
     """(centre, low, high) of the box around the sphere about the body of the query, with room for rounding."""
     centre, radius = state.bodies.position[batch.body[q]], batch.radius
-    reach = centre
-    for k in range(len(centre)):
-        reach = replace(reach, k, radius * (1.0 + REACH) + REACH * abs(item(centre, k)))
+    reach = shifted(scale(absolute(centre), REACH), radius * (1.0 + REACH))
     return centre, sub(centre, reach), add(centre, reach)
 
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from ....framework.compilation import part
 from ....framework.jit.records.record_type import zero_of
-from ....framework.vectors import item, replace
+from ....framework.vectors import item, replace, scale, shifted
 from .cells import REACH
 
 MAX_LEVELS = 60
@@ -134,7 +134,7 @@ def choose_tree_cells(tree):
     """Origin, trimmed extent per axis, finest cell and number of levels, from a sample of the boxes."""
     extremes, d = tree.extremes, len(zero_of(tree))
     trim = min(sample_extremes(tree) // 85, TRIMMED - 1)
-    longest, origin, extents, width = SMALLEST_CELL, zero_of(tree), zero_of(tree), zero_of(tree)
+    longest, origin, extents = SMALLEST_CELL, zero_of(tree), zero_of(tree)
     for q in range(d):
         extent = -extremes[2 * q + 1, trim] - extremes[2 * q, trim]
         origin = replace(origin, q, extremes[2 * q, trim] - CELL_MARGIN * extent)
@@ -144,9 +144,7 @@ def choose_tree_cells(tree):
     tree.smallest_box = extremes[2 * d, trim]
     tree.finest_cell = choose_finest_cell(tree, longest, tree.smallest_box, -extremes[2 * d + 1, trim])
     tree.inverse_cell = 1.0 / tree.finest_cell
-    for q in range(d):
-        width = replace(width, q, item(extents, q) * tree.inverse_cell)
-    tree.width[0] = width
+    tree.width[0] = scale(extents, tree.inverse_cell)
     levels = 1
     longest *= tree.inverse_cell
     while longest >= 1.0:
@@ -158,20 +156,20 @@ def choose_tree_cells(tree):
 @part
 def build_levels(tree):
     """Number the cells of all levels; returns how many there are, with the one for invalid boxes."""
-    levels, width, base, scale = tree.levels, tree.width[0], 0, 1.0
+    levels, width, base, shrink = tree.levels, tree.width[0], 0, 1.0
     for level in range(levels + 2):
         cells, outer = 1, 1
         tree.level_base[level] = base
-        tree.level_scale[level] = scale if level < levels else 0.0
+        tree.level_scale[level] = shrink if level < levels else 0.0
         for q in range(len(width)):
             tree.level_stride[level, q] = cells if level < levels else 0
             outer = cells
-            cells *= max(3, int(item(width, q) * scale) + 1)
+            cells *= max(3, int(item(width, q) * shrink) + 1)
         # Two rows of guard cells: what is inside the bounds then has its neighbours without wrapping round.
         tree.level_cells[level] = cells + 2 * outer if level < levels else 1
         tree.level_shift[level] = outer + 1 if level < levels else 0
         base += tree.level_cells[level]
-        scale *= 0.5
+        shrink *= 0.5
     return base
 
 
@@ -180,7 +178,7 @@ def find_tree_cells(tree, used):
     """The cell of each box; directory[k + 2] counts those in cell k. Notes the bounds of the centres."""
     lower, upper, keys, directory, levels = tree.lower, tree.upper, tree.keys, tree.directory, tree.levels
     start, origin, inverse, zero = tree.start, tree.origin[0], tree.inverse_cell, zero_of(tree)
-    base, cells, shift, scale = tree.level_base, tree.level_cells, tree.level_shift, tree.level_scale
+    base, cells, shift, shrink = tree.level_base, tree.level_cells, tree.level_shift, tree.level_scale
     stride, lowest, highest = tree.level_stride, zero, zero
     for row in range(start, tree.stop):
         size, valid, tame, middle = 0.0, True, True, zero
@@ -202,7 +200,7 @@ def find_tree_cells(tree, used):
             at = item(middle, q) if level < levels else 0.0
             lowest = replace(lowest, q, at if at < item(lowest, q) else item(lowest, q))
             highest = replace(highest, q, at if at > item(highest, q) else item(highest, q))
-            number += np.int64(math.floor(at * scale[level])) * stride[level, q]
+            number += np.int64(math.floor(at * shrink[level])) * stride[level, q]
         if number < 0 or number >= cells[level]:
             number %= cells[level]
         key = number + base[level] if valid else used - 1
@@ -247,12 +245,11 @@ def place_in_tree(tree):
     largest integer minus the upper corners. Rounding down and clamping keep order: the codes of boxes that overlap do.
     """
     keys, directory, order, cells, boxes = tree.keys, tree.directory, tree.order, tree.cells, tree.boxes
-    scale, offset, d = zero_of(tree), zero_of(tree), len(zero_of(tree))
+    units, offset, d = zero_of(tree), shifted(tree.origin[0], -0.5 * tree.finest_cell), len(zero_of(tree))
     start, field = tree.start, TREE_CODE_BITS // (2 * d)
     largest = (1 << (field - 1)) - 1
     for q in range(d):
-        scale = replace(scale, q, largest / (item(tree.extent[0], q) + tree.finest_cell))
-        offset = replace(offset, q, item(tree.origin[0], q) - 0.5 * tree.finest_cell)
+        units = replace(units, q, largest / (item(tree.extent[0], q) + tree.finest_cell))
     for row in range(start, tree.stop):
         key = keys[row - start]
         at = directory[key + 1]
@@ -262,8 +259,8 @@ def place_in_tree(tree):
         for q in range(d):
             low, high = item(low_corner, q), item(high_corner, q)
             boxes[at, q], boxes[at, d + q] = low, high
-            low = min(max((low - item(offset, q)) * item(scale, q), 0.0), float(largest))
-            high = min(max((high - item(offset, q)) * item(scale, q), 0.0), float(largest))
+            low = min(max((low - item(offset, q)) * item(units, q), 0.0), float(largest))
+            high = min(max((high - item(offset, q)) * item(units, q), 0.0), float(largest))
             code |= np.int64(low if low == low else 0.0) << (q * field)
             code |= (largest - np.int64(high if high == high else 0.0)) << ((d + q) * field)
         tree.codes[at] = code

@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from ....framework.compilation import inlined
-from ....framework.vectors import item, replace
+from ....framework.vectors import absolute, add, add_scaled, item, larger, scale, shifted
 
 HALF_CELL = 0.5 + 2.0**-30  # how far a box reaches over its cell, in cells, rounding included
 TREE_FARTHEST = 2.0**39  # no box of a level is in a cell beyond this number (see REACH)
@@ -97,10 +97,6 @@ def cells_of(tree, level, runs, part, wraps):
 @inlined
 def uncertainty(tree, point):
     """Per axis more than all rounding errors of distances between the point and the boxes that are in cells."""
-    origin, low, high, fine = tree.origin[0], tree.lowest[0], tree.highest[0], tree.finest_cell
-    result = point
-    for k in range(len(point)):
-        lowest = abs(item(origin, k) + item(low, k) * fine)
-        highest = abs(item(origin, k) + item(high, k) * fine)
-        result = replace(result, k, REACH * (abs(item(point, k)) + max(lowest, highest) + fine))
-    return result
+    origin, fine = tree.origin[0], tree.finest_cell
+    lowest, highest = add_scaled(origin, tree.lowest[0], fine), add_scaled(origin, tree.highest[0], fine)
+    return scale(shifted(add(absolute(point), larger(absolute(lowest), absolute(highest))), fine), REACH)
