@@ -15,6 +15,8 @@ import math
 from ...framework.compilation import part
 from ...framework.elementary import atan2, cos, sin
 from ...framework.jit.stack_arrays import stack_array
+from ...framework.vectors import add_scaled, cross, dot, item, replace, scale
+from .convex.gjk import norm
 from .quaternions import product
 
 JACOBI_SWEEPS = 16  # of Jacobi rotations: each squares what is off the diagonal
@@ -45,18 +47,6 @@ def turned_about(q, m, k, angle):
 
 
 @part
-def of_axis(v, k):
-    """The k-th of three."""
-    return v[0] if k == 0 else (v[1] if k == 1 else v[2])
-
-
-@part
-def replaced(v, k, value):
-    """Three numbers with another k-th one."""
-    return value if k == 0 else v[0], value if k == 1 else v[1], value if k == 2 else v[2]
-
-
-@part
 def energy_of(m, inverse):
     """Twice the kinetic energy."""
     return m[0] * m[0] * inverse[0] + m[1] * m[1] * inverse[1] + m[2] * m[2] * inverse[2]
@@ -66,24 +56,23 @@ def energy_of(m, inverse):
 def turn_to_energy(q, m, inverse, gained):
     """(rotation, momentum in its frame) of a body that has gained so much of :func:`energy_of` by splitting: the
     momentum is turned in the body towards its angular velocity, and the body back, so that it stays where it is."""
-    square = m[0] * m[0] + m[1] * m[1] + m[2] * m[2]
+    square = dot(m, m)
     if gained == 0.0 or not square > 0.0:
         return q, m
     mean = energy_of(m, inverse) / square  # of the inverse moments, along the momentum
-    x, y, z = m[0] * (inverse[0] - mean), m[1] * (inverse[1] - mean), m[2] * (inverse[2] - mean)
-    steep = x * x + y * y + z * z
+    way = m[0] * (inverse[0] - mean), m[1] * (inverse[1] - mean), m[2] * (inverse[2] - mean)
+    steep = dot(way, way)
     if not steep > SPHERICAL * mean * mean * square:
         return q, m
-    along, lacks = energy_of((x, y, z), inverse) / steep, -gained / square
+    along, lacks = energy_of(way, inverse) / steep, -gained / square
     steep = math.sqrt(steep / square)
     left = steep * steep + (along - mean - lacks) * lacks
     tangent = lacks / (steep + math.sqrt(left)) if left >= 0.0 else steep / (mean + lacks - along)  # of the angle
     cosine = 1.0 / math.sqrt(1.0 + tangent * tangent)
     share, half = tangent * cosine / steep, math.sqrt(0.5 + 0.5 * cosine)
     back = -share / (2.0 * half * square)
-    axis = back * (m[1] * z - m[2] * y), back * (m[2] * x - m[0] * z), back * (m[0] * y - m[1] * x)
-    m = m[0] * cosine + x * share, m[1] * cosine + y * share, m[2] * cosine + z * share
-    return product(q, (half, axis[0], axis[1], axis[2])), m
+    axis = scale(cross(m, way), back)
+    return product(q, (half, axis[0], axis[1], axis[2])), add_scaled(scale(m, cosine), way, share)
 
 
 @part
@@ -93,12 +82,6 @@ def most_similar(inverse):
     if x <= y and x <= z:
         return 1, 2, 0
     return (2, 0, 1) if y <= z else (0, 1, 2)
-
-
-@part
-def tensor_size(v, factor):
-    x, y, z = factor * v[0], factor * v[1], factor * v[2]
-    return math.sqrt(x * x + y * y + z * z)
 
 
 @part
@@ -165,8 +148,8 @@ def axes_of_way(m, inverse):
     x, y, z = inverse
     middle = 0 if y <= x <= z or z <= x <= y else (1 if x <= y <= z or z <= y <= x else 2)
     p, o = (middle + 1) % 3, (middle + 2) % 3
-    steep, gentle = of_axis(inverse, middle) - of_axis(inverse, p), of_axis(inverse, o) - of_axis(inverse, middle)
-    if abs(steep) * of_axis(m, p) * of_axis(m, p) < abs(gentle) * of_axis(m, o) * of_axis(m, o):
+    steep, gentle = item(inverse, middle) - item(inverse, p), item(inverse, o) - item(inverse, middle)
+    if abs(steep) * item(m, p) * item(m, p) < abs(gentle) * item(m, o) * item(m, o):
         return o, middle, p
     return p, middle, o
 
@@ -177,16 +160,16 @@ def turn_far(q, m, inverse, h):
     it by the integral of the third kind (E. T. Whittaker, "Analytical dynamics", 69; R. van Zon and J. Schofield,
     "Numerical implementation of the exact dynamics of free rigid bodies", 2007)."""
     p, y, o = axes_of_way(m, inverse)
-    steep, gentle = of_axis(inverse, y) - of_axis(inverse, p), of_axis(inverse, o) - of_axis(inverse, y)
-    a, b, c = of_axis(m, p), of_axis(m, y), of_axis(m, o)
+    steep, gentle = item(inverse, y) - item(inverse, p), item(inverse, o) - item(inverse, y)
+    a, b, c = item(m, p), item(m, y), item(m, o)
     both, size = steep + gentle, math.sqrt(a * a + b * b + c * c)
     around, along = b * b * steep + c * c * both, a * a * both + b * b * gentle
     if not around / both > 0.0:
-        return turned_about(q, m, p, of_axis(inverse, p) * a * h)
+        return turned_about(q, m, p, item(inverse, p) * a * h)
     most_p, most_y, most_o = math.sqrt(along / both), math.sqrt(around / steep), math.sqrt(around / both)
     complement = max(SEPARATRIX, both * (steep * a * a - gentle * c * c) / (steep * along))
     nu, rate = gentle / steep, math.sqrt(along * steep)
-    if (a < 0.0) == (of_axis(inverse, (y + 2) % 3) > of_axis(inverse, (y + 1) % 3)):
+    if (a < 0.0) == (item(inverse, (y + 2) % 3) > item(inverse, (y + 1) % 3)):
         rate = -rate
     u, s0, c0 = rate * h, b / most_y, c / most_o
     sn, cn, dn = elliptic_functions(u, complement)
@@ -194,7 +177,7 @@ def turn_far(q, m, inverse, h):
     unit = math.sqrt(s1 * s1 + c1 * c1)
     s1, c1 = s1 / unit, c1 / unit
     a1 = math.copysign(most_p * math.sqrt(c1 * c1 + complement * s1 * s1), a)
-    to = replaced(replaced(replaced(m, p, a1), y, most_y * s1), o, most_o * c1)
+    to = replace(replace(replace(m, p, a1), y, most_y * s1), o, most_o * c1)
     begun, angle_begun = elliptic_integrals(math.copysign(s0, s0 * c0), abs(c0), complement, nu)
     ended, angle_ended = elliptic_integrals(math.copysign(s1, s1 * c1), abs(c1), complement, nu)
     angle, left = angle_ended - angle_begun, begun + u - ended
@@ -203,7 +186,7 @@ def turn_far(q, m, inverse, h):
         halves = 2.0 * math.floor(0.5 * left / half + 0.5)
         angle, left = angle + halves * angle_half, left - halves * half
     angle += left / (1.0 + nu * s1 * s1)  # near the axis of the middle moment sn and cn do not tell where u is
-    angle = size * (of_axis(inverse, p) * h + both / rate * angle)
+    angle = size * (item(inverse, p) * h + both / rate * angle)
     from_pole, azimuth = angles_from(m, p)
     q, _ = turned_about(q, m, p, azimuth)
     q, _ = turned_about(q, m, (p + 2) % 3, from_pole)
@@ -217,8 +200,8 @@ def turn_far(q, m, inverse, h):
 @part
 def angles_from(m, p):
     """(angle from the axis p, angle about it) of a momentum."""
-    x, y = of_axis(m, (p + 1) % 3), of_axis(m, (p + 2) % 3)
-    return atan2(math.sqrt(x * x + y * y), of_axis(m, p)), atan2(y, x)
+    x, y = item(m, (p + 1) % 3), item(m, (p + 2) % 3)
+    return atan2(math.sqrt(x * x + y * y), item(m, p)), atan2(y, x)
 
 
 @part
@@ -226,17 +209,17 @@ def turn_freely(q, m, inverse, h):
     """(rotation, momentum in its frame, what splitting has added to :func:`energy_of`) after h seconds. q: unit
     quaternion of the principal axes; m: angular momentum along them; inverse: 1 / principal moments."""
     energy, (j, k, other) = energy_of(m, inverse), most_similar(inverse)
-    about_j, about_other = of_axis(inverse, j) - of_axis(inverse, k), of_axis(inverse, other) - of_axis(inverse, k)
-    if tensor_size(m, about_j * h) > NO_TURN and tensor_size(m, about_other * h) > SMALL_TURN:
+    about_j, about_other = item(inverse, j) - item(inverse, k), item(inverse, other) - item(inverse, k)
+    if norm(scale(m, about_j * h)) > NO_TURN and norm(scale(m, about_other * h)) > SMALL_TURN:
         q, m = turn_far(q, m, inverse, h)
         return q, m, 0.0
-    half = 0.5 * of_axis(inverse, k) * h
-    size = tensor_size(m, half)
+    half = 0.5 * item(inverse, k) * h
+    size = norm(scale(m, half))
     sine = sin(size) / size * half if size > 0.0 else 0.0
     q = product(q, (cos(size), sine * m[0], sine * m[1], sine * m[2]))
-    q, m = turned_about(q, m, j, 0.5 * h * about_j * of_axis(m, j))
-    q, m = turned_about(q, m, other, h * about_other * of_axis(m, other))
-    q, m = turned_about(q, m, j, 0.5 * h * about_j * of_axis(m, j))
+    q, m = turned_about(q, m, j, 0.5 * h * about_j * item(m, j))
+    q, m = turned_about(q, m, other, h * about_other * item(m, other))
+    q, m = turned_about(q, m, j, 0.5 * h * about_j * item(m, j))
     return q, m, energy_of(m, inverse) - energy
 
 

@@ -7,6 +7,7 @@ import math
 from ...framework.compilation import part
 from ...framework.elementary import cos, sin
 from ...framework.jit.records.record_type import zero_of
+from ...framework.vectors import dot
 
 
 @part
@@ -89,12 +90,6 @@ def read_axes(state, i):
 
 
 @part
-def product_of(u, v):
-    """The scalar product of two triples."""
-    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
-
-
-@part
 def turned_tensor(q, tensor):
     """A symmetric matrix (xx, yy, zz, xy, xz, yz) along the axes of a body, along those of the world."""
     xx, yy, zz, xy, xz, yz = tensor
@@ -103,6 +98,6 @@ def turned_tensor(q, tensor):
     along_y = xx * y[0] + xy * y[1] + xz * y[2], xy * y[0] + yy * y[1] + yz * y[2], xz * y[0] + yz * y[1] + zz * y[2]
     along_z = xx * z[0] + xy * z[1] + xz * z[2], xy * z[0] + yy * z[1] + yz * z[2], xz * z[0] + yz * z[1] + zz * z[2]
     return (
-        product_of(along_x, x), product_of(along_y, y), product_of(along_z, z),
-        product_of(along_x, y), product_of(along_x, z), product_of(along_y, z),
+        dot(along_x, x), dot(along_y, y), dot(along_z, z),
+        dot(along_x, y), dot(along_x, z), dot(along_y, z),
     )  # fmt: skip

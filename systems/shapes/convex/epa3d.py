@@ -10,8 +10,8 @@ import math
 
 from ....framework.compilation import inlined, part
 from ....framework.jit.stack_arrays import stack_array
-from ....framework.vectors import add_scaled, divided, dot, negative, row, scale, store, sub
-from .gjk import GJK_ROUNDING, corner, corner_of, cross, edge, face_normal, norm, refine_direction, support_points
+from ....framework.vectors import add_scaled, cross, divided, dot, negative, row, scale, store, sub
+from .gjk import GJK_ROUNDING, corner, corner_of, edge, face_normal, norm, refine_direction, support_points
 
 POLYTOPE_CORNERS = 64
 POLYTOPE_FACES = 256  # a closed surface has twice as many as corners, less 4; rounding leaves folds in it

@@ -17,7 +17,7 @@ import math
 
 from ....framework.compilation import inlined, part
 from ....framework.jit.stack_arrays import stack_array
-from ....framework.vectors import add, add_scaled, divided, dot, item, negative, replace, row, scale, store, sub
+from ....framework.vectors import add, add_scaled, cross, divided, dot, item, negative, replace, row, scale, store, sub
 
 GJK_ROUNDING = 2e-15  # of the coordinates: a few times what one support point may be off
 FLAT_SIMPLEX = 1e-14  # of the coordinates: a thinner difference has no inside, a smaller distance no direction
@@ -50,12 +50,6 @@ def corner(of_a, of_b, i, d):
 def edge(of_a, of_b, i, k, d):
     """The vector from corner i to corner k."""
     return sub(sub(row(of_b, k, d), row(of_b, i, d)), sub(row(of_a, k, d), row(of_a, i, d)))
-
-
-@inlined
-def cross(a, b):
-    """Vector product, in 3D."""
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @inlined

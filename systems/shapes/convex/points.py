@@ -15,10 +15,9 @@ import math
 from ....framework.compilation import inlined, part
 from ....framework.elementary import cos, sin
 from ....framework.jit.stack_arrays import stack_array
-from ....framework.vectors import add, add_scaled, dot, item, negative, replace, row, scale, store, sub
+from ....framework.vectors import add, add_scaled, cross, dot, negative, replace, row, scale, smallest, store, sub
 from ..linking.convex_by_address import convex_at, edge_by_address, rounding_by_address, support_by_address, tells_edge
 from .edges import FACE_LOOKS, FINER, FLAT_FACE, SAME_POINT
-from .gjk import cross
 
 MOST_POINTS = 4  # of a pair in 3D; 2 in 2D
 DIRECTIONS = 8  # around the normal, in 3D: a face of more corners shows so many of them
@@ -72,10 +71,8 @@ def may_have_face(state, shape, like):
             rounding_by_address(shape) > 0.0
             and is_same(support_by_address(shape, way), support_by_address(shape, negative(way)))
         )
-    half, endless = state.bodies.half_extents[shape[3]], not state.shapes.concave[state.bodies.shape[shape[3]]]
-    for k in range(len(half)):
-        endless = endless and item(half, k) == math.inf
-    return endless
+    i = shape[3]
+    return not state.shapes.concave[state.bodies.shape[i]] and smallest(state.bodies.half_extents[i]) == math.inf
 
 
 @inlined
