@@ -1,16 +1,47 @@
-"""One code against several neighbours at once: LLVM's vectors, which become whatever the processor has.
+"""Codes: boxes in small integers, all in one number, see :mod:`.uniform_grid`; one against several neighbours at once.
 
-The plain functions say what the compiled ones do.
+That is LLVM's vectors, which become whatever the processor has. The plain functions say what the compiled ones do.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from ...framework.compilation import CHECKED
+import numpy as np
+
+from ...framework.compilation import CHECKED, inlined
 from ...framework.jit.lazy import cgutils, ir, types
 from ...framework.jit.records.record_type import record_code
 from ...framework.vectors import _emitted
+
+CODE_BITS = 60
+
+
+@inlined
+def code_bits(d):
+    """(bits from one coordinate in a code to the next, the largest integer of a coordinate)."""
+    field = CODE_BITS // (2 * d)
+    return field, (1 << (field - 1)) - 1
+
+
+@inlined
+def guard_bits(d):
+    """The free bit above each coordinate of a code."""
+    field, largest = code_bits(d)
+    guards = np.int64(0)
+    for _ in range(2 * d):
+        guards = (guards << field) | (largest + 1)
+    return guards
+
+
+@inlined
+def outline_of_code(code, d):
+    """What codes are subtracted from to see whether their boxes may overlap that of this code: a guard bit stays above
+    each coordinate if they do. Lower corners are compared with upper ones, which are stored from the largest down."""
+    field, _ = code_bits(d)
+    half, guards = np.int64(field * d), guard_bits(d)
+    swapped = (code >> half) | ((code & ((np.int64(1) << half) - 1)) << half)
+    return ((guards - (guards >> (field - 1))) - swapped) | guards
 
 
 def _compared(width: int) -> tuple[Any, Any]:

@@ -80,8 +80,11 @@ def leave_to_trees(state):
 
 
 @part
-def need_more_room(state):
-    """Twice the room for candidates, while that is allowed."""
+def note_found(state, found):
+    """So many candidates; or, where there was no room for all, twice as much room, while that is allowed."""
+    if found != FULL:
+        state.candidates.count = found
+        return OK
     room = len(state.candidates.first)
     if room >= CANDIDATE_LIMIT:
         return leave_to_trees(state)
@@ -214,30 +217,23 @@ def look_from_outside(state, found):
     return found
 
 
-@part
-def search_moving_grid(state):
-    """Pairs of what is in the grid, and those with static bodies that are in none; returns a code."""
+@packed
+def search_uniform_grid(state, dt):
+    """Many bodies move: pairs of what is in the grid, and those with static bodies that are in none."""
+    if state.pair_search != UNIFORM_GRID:
+        return OK
     grid, at, found, count = state.grid, 0, 0, state.grid.directory[state.grid.total]  # without invalid boxes
     while at < count and found != FULL:
         held, at = look_around(grid, at, count)
         found = test_notes(state, held, found)
     if found != FULL:
         found = look_from_outside(state, found)
-    if found == FULL:
-        return need_more_room(state)
-    state.candidates.count = found
-    return OK
-
-
-@packed
-def search_uniform_grid(state, dt):
-    """Many bodies move."""
-    return search_moving_grid(state) if state.pair_search == UNIFORM_GRID else OK
+    return note_found(state, found)
 
 
 def test_few(state, dt):
     """Few bodies move, or none that meet: every pair of them, and they with all static bodies that are in no grid."""
-    first, moving, candidates, grid = state.first, state.moving, state.candidates, state.static_grid
+    first, moving, grid = state.first, state.moving, state.static_grid
     all_static = not looks_into_statics(state)
     if state.pair_search != BRUTE_FORCE:
         return OK
@@ -249,10 +245,7 @@ def test_few(state, dt):
     for k in range(0 if all_static else grid.outside_count):
         if found != FULL:
             found = test_row(state, grid.outside[k], first, moving, found)
-    if found == FULL:
-        return need_more_room(state)
-    candidates.count = found
-    return OK
+    return note_found(state, found)
 
 
 @part
@@ -273,11 +266,9 @@ def test_blocks(state, i, start, stop, found):
 @part
 def look_into_statics(state):
     """Pairs of what moves with what is in the static grid; returns a code."""
-    found = look_near(state, state.static_grid, state.first, state.moving, state.candidates.count)
-    if found == FULL:
-        return need_more_room(state)
-    state.candidates.count = found
-    return OK
+    return note_found(
+        state, look_near(state, state.static_grid, state.first, state.moving, state.candidates.count)
+    )
 
 
 def search_static_grid(state, dt):

@@ -26,7 +26,7 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import at_most, item, replace
 from ..bits import lowest_bit
 from .brute_force import boxes_overlap
-from .lanes import eight_at, four_at
+from .lanes import code_bits, eight_at, four_at, guard_bits, outline_of_code
 from .records import HIGHEST, LARGEST_EXTENT, LOWEST
 
 CELLS_PER_BOX = 2.0  # at most; cells grow where there is more room than that
@@ -37,7 +37,6 @@ CELL_SLACK = 2.0**-16  # the same for boxes that are not in the grid, in cells
 LARGEST_EDGE = 1.0 - CELL_SLACK  # of a box that is not in the grid and for which the cells around its own are enough
 FARTHEST = 2.0**28  # distance from the origin, in boxes, up to which LOOSE and CELL_SLACK cover rounding
 FULLEST = 64  # most boxes in one cell
-CODE_BITS = 60
 NOTE_CHUNK = 1024  # notes tested at a time; they stay in the first-level cache
 OUTSIDE_MAX = 64  # boxes that may stay outside a grid
 LONGEST = 128  # notes of one box: 2 and 4 * 3 cells, all of them full, by eights, with some to spare
@@ -111,23 +110,6 @@ def find_cells(grid, lower, upper, start, count):
         before += found
         directory[k] = before
     return fullest <= FULLEST and crowding <= CROWDED * count
-
-
-@inlined
-def code_bits(d):
-    """(bits from one coordinate in a code to the next, the largest integer of a coordinate)."""
-    field = CODE_BITS // (2 * d)
-    return field, (1 << (field - 1)) - 1
-
-
-@inlined
-def guard_bits(d):
-    """The free bit above each coordinate of a code."""
-    field, largest = code_bits(d)
-    guards = np.int64(0)
-    for _ in range(2 * d):
-        guards = (guards << field) | (largest + 1)
-    return guards
 
 
 @part
@@ -219,15 +201,10 @@ def look_around(grid, start, count):
     """
     directory, order, cells, codes, notes = grid.directory, grid.order, grid.cells, grid.codes, grid.notes
     row, layer, d = grid.row, grid.layer, len(zero_of(grid))
-    field = CODE_BITS // (2 * d)
-    half = np.int64(field * d)
-    lower_half = (np.int64(1) << half) - 1
     guards = guard_bits(d)
-    full = guards - (guards >> (field - 1))  # the largest integer of each coordinate
     one, held, room, i = np.int64(1), np.int64(0), len(notes) - LONGEST, start
     while i < count and held < room:
-        key, code, here, after = cells[i], codes[i], order[i], i + 1
-        code = (full - ((code >> half) | ((code & lower_half) << half))) | guards
+        key, code, here, after = cells[i], outline_of_code(codes[i], d), order[i], i + 1
         length = directory[key + 2] - after
         bits = four_at(codes, after, code, guards) & ((one << min(length, 4)) - 1)
         longest = length + 4

@@ -31,10 +31,6 @@ def begin_uniform_grid(state, dt):
     return codes.OK
 
 
-def search_uniform_grid(state, dt):
-    return stages.search_moving_grid(state) if state.pair_search == stages.UNIFORM_GRID else codes.OK
-
-
 def begin_static_grid(state, dt):
     """Bodies that do not move are put into a grid, however few they are."""
     state.candidates.count = 0
@@ -55,7 +51,7 @@ ROOM = (
     Rows("static_grid", ("directory",), lambda s: stages.most_cells(s.count)),
     *stages.ROOM_FOR_CANDIDATES,
 )  # fmt: skip
-UNIFORM_GRID_ALONE = (begin_uniform_grid, search_uniform_grid)
+UNIFORM_GRID_ALONE = (begin_uniform_grid, stages.search_uniform_grid)
 STATIC_GRID_ALONE = (begin_static_grid, search_static_grid)
 
 

@@ -23,6 +23,7 @@ import numpy as np
 from ....framework.compilation import part
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import item, replace, scale, shifted
+from ..lanes import code_bits
 from .cells import REACH
 
 MAX_LEVELS = 60
@@ -37,7 +38,6 @@ ABOVE_SAMPLE = 1.02  # what the largest of all may exceed the largest of the sam
 LOOSE_CELL = 1.0 + 2.0**-16  # the finest cell per typical box, so that REACH does not push it a level up
 SMALLEST_CELL = 1e-290  # m; its inverse is finite
 LARGEST_SAMPLE = 1e150  # m; coordinates beyond it do not enter the estimates
-TREE_CODE_BITS = 60
 
 CROWDED_CELLS, SUITS = 0, 1  # what a pass over all boxes returns
 
@@ -246,8 +246,7 @@ def place_in_tree(tree):
     """
     keys, directory, order, cells, boxes = tree.keys, tree.directory, tree.order, tree.cells, tree.boxes
     units, offset, d = zero_of(tree), shifted(tree.origin[0], -0.5 * tree.finest_cell), len(zero_of(tree))
-    start, field = tree.start, TREE_CODE_BITS // (2 * d)
-    largest = (1 << (field - 1)) - 1
+    start, (field, largest) = tree.start, code_bits(d)
     for q in range(d):
         units = replace(units, q, largest / (item(tree.extent[0], q) + tree.finest_cell))
     for row in range(start, tree.stop):

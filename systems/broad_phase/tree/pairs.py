@@ -17,7 +17,7 @@ import numpy as np
 from ....framework.compilation import part
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import item, replace
-from .build import TREE_CODE_BITS
+from ..lanes import guard_bits, outline_of_code
 from .cells import cover
 
 RANGE_CHUNK = 2048  # candidates tested at a time; they stay in the first-level cache
@@ -152,17 +152,11 @@ def pick_candidates(tree, owners, members, stop, with_codes):
     """Into the chunk: what the codes do not rule out, from ``next_range`` on until it may be full; returns how many."""
     ranges, owner_codes, codes = tree.ranges, owners.codes, members.codes
     chunk_owners, chunk_members, d = tree.chunk_owners, tree.chunk_members, len(zero_of(tree))
-    field = TREE_CODE_BITS // (2 * d)
-    guards, full = np.int64(0), np.int64(0)
-    for _ in range(2 * d):
-        guards = (guards << field) | (1 << (field - 1))
-        full = (full << field) | ((1 << (field - 1)) - 1)
-    half = np.int64(field * d)
-    lower_half, at, held = (np.int64(1) << half) - 1, tree.next_range, 0
+    guards, at, held = guard_bits(d), tree.next_range, 0
     while at < stop and held <= RANGE_CHUNK - TEST_BLOCK:
         owner, begin, end = ranges[at, 0], ranges[at, 1], ranges[at, 2]
         code = owner_codes[owner] if with_codes else np.int64(0)  # the frames of two trees differ; 0 overlaps all
-        code = (full - ((code >> half) | ((code & lower_half) << half))) | guards
+        code = outline_of_code(code, d)
         for k in range(TEST_BLOCK):
             member = begin + k
             clear = (code - codes[member]) & guards
