@@ -6,8 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...components.spin import axes_of
 from ...framework.elementary import cos, sin
 from ...framework.matrices import matrix_product
+from ...systems.shapes.quaternions import product
 
 
 class Pose(NamedTuple):
@@ -29,9 +31,7 @@ class Pose(NamedTuple):
         if len(self.position) == 2:
             c, s = cos(self.rotation), sin(self.rotation)
             return np.array(((c, -s), (s, c)))
-        w, x, y, z = self.rotation
-        across = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
-        return np.eye(3) + 2.0 * w * across + 2.0 * matrix_product(across, across)
+        return axes_of(self.rotation)
 
     def point(self, local: Any) -> np.ndarray:
         return self.position + matrix_product(self.axes(), local)
@@ -43,25 +43,14 @@ class Pose(NamedTuple):
         """The pose of what is at ``inner`` along the axes of this."""
         if len(self.position) == 2:
             return Pose(self.point(inner.position), self.rotation + inner.rotation)
-        a, b, c, d = self.rotation
-        w, x, y, z = inner.rotation
-        turned = np.array((
-            a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y,
-            a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w,
-        ))  # fmt: skip
-        return Pose(self.point(inner.position), turned)
+        return Pose(self.point(inner.position), np.array(product(self.rotation, inner.rotation)))
 
 
 def turned_by(rotations: np.ndarray, turns: np.ndarray) -> np.ndarray:
     """Rotations (n,) or (n, 4) of bodies, turned against them by turns (n, 4), to the bit as the stages of parts do."""
     if rotations.ndim == 1:
         return rotations + turns[:, 0]
-    a, b, c, d = _unit(rotations).T
-    w, x, y, z = turns.T
-    return _unit(np.stack((
-        a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y,
-        a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w,
-    ), axis=1))  # fmt: skip
+    return _unit(np.stack(product(_unit(rotations).T, turns.T), axis=1))
 
 
 def _unit(q: np.ndarray) -> np.ndarray:

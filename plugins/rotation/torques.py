@@ -11,6 +11,7 @@ import math
 
 from ...framework.compilation import part
 from ...framework.elementary import cos, exp, sin
+from ...framework.vectors import add_scaled, cross, scale
 from ...systems.integration.stages import kick_gain, phi1, phi2, runge_kutta_weights
 from ...systems.shapes.free_rotation import turn_to_energy
 from ...systems.shapes.quaternions import product, rotate, rotation_in_space, set_rotation
@@ -27,22 +28,6 @@ def triple(column, i):
 @part
 def put(column, i, v):
     column[i, 0], column[i, 1], column[i, 2] = v
-
-
-@part
-def sum_of(u, v, factor):
-    """u + v factor."""
-    return u[0] + v[0] * factor, u[1] + v[1] * factor, u[2] + v[2] * factor
-
-
-@part
-def times(v, factor):
-    return v[0] * factor, v[1] * factor, v[2] * factor
-
-
-@part
-def cross(u, v):
-    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
 
 
 @part
@@ -130,9 +115,9 @@ def drift_of_turn(state, spin, turns, i, h):
 def kick_of_turn(state, spin, turns, i, h):
     """Its second half: the torques at its end in place of those at its start."""
     z = -spin.angular_damping[i] * h
-    change = spin_by(state, spin, i, sum_of(torques_on(state, spin, turns, i), triple(turns.pushed, i), -1.0))
+    change = spin_by(state, spin, i, add_scaled(torques_on(state, spin, turns, i), triple(turns.pushed, i), -1.0))
     gain = kick_gain(z, h) if is_plane(state) else 0.5 * h * phi1(0.5 * z)
-    put_spin(state, spin, i, sum_of(spin_now(state, spin, i), change, gain))
+    put_spin(state, spin, i, add_scaled(spin_now(state, spin, i), change, gain))
 
 
 @part
@@ -177,25 +162,25 @@ def runge_kutta_turn(state, spin, turns, i, h):
         start = momentum_of(state, spin, i, w)
         put(turns.momentum, i, start)
         put(turns.speeds, i, w)
-        put(turns.kicks, i, times(torque, f1))
-        momentum = sum_of(times(start, half_decay), torque, half)
+        put(turns.kicks, i, scale(torque, f1))
+        momentum = add_scaled(scale(start, half_decay), torque, half)
         put(turns.middle, i, momentum)
-        turn_from_start(state, turns, i, times(w, 0.5 * h))
+        turn_from_start(state, turns, i, scale(w, 0.5 * h))
     else:
         turned, start = triple(turns.turned, i), triple(turns.momentum, i)
         across = cross(turned, w)  # how fast the vector of the turn changes: the series of dexp^-1
-        rate = sum_of(sum_of(w, across, -0.5), cross(turned, across), 1.0 / 12.0)
+        rate = add_scaled(add_scaled(w, across, -0.5), cross(turned, across), 1.0 / 12.0)
         if stage == 3:
-            momentum = sum_of(times(start, decay), sum_of(triple(turns.kicks, i), torque, f3), h)
-            turn_from_start(state, turns, i, times(sum_of(triple(turns.speeds, i), rate, 1.0), h / 6.0))
+            momentum = add_scaled(scale(start, decay), add_scaled(triple(turns.kicks, i), torque, f3), h)
+            turn_from_start(state, turns, i, scale(add_scaled(triple(turns.speeds, i), rate, 1.0), h / 6.0))
         else:
-            put(turns.speeds, i, sum_of(triple(turns.speeds, i), rate, 2.0))
-            put(turns.kicks, i, sum_of(triple(turns.kicks, i), torque, 2.0 * f2))
-            momentum = sum_of(times(start, half_decay), torque, half)
+            put(turns.speeds, i, add_scaled(triple(turns.speeds, i), rate, 2.0))
+            put(turns.kicks, i, add_scaled(triple(turns.kicks, i), torque, 2.0 * f2))
+            momentum = add_scaled(scale(start, half_decay), torque, half)
             if stage == 2:
-                both = sum_of(times(torque, 2.0), triple(turns.pushed, i), -1.0)
-                momentum = sum_of(times(triple(turns.middle, i), half_decay), both, half)
-            turn_from_start(state, turns, i, times(rate, h if stage == 2 else 0.5 * h))
+                both = add_scaled(scale(torque, 2.0), triple(turns.pushed, i), -1.0)
+                momentum = add_scaled(scale(triple(turns.middle, i), half_decay), both, half)
+            turn_from_start(state, turns, i, scale(rate, h if stage == 2 else 0.5 * h))
     put_spin(state, spin, i, spin_by(state, spin, i, momentum))
 
 

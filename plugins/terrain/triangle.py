@@ -17,18 +17,13 @@ from ...components import Collider, RigidBody
 from ...framework import Component, column
 from ...framework.compilation import part
 from ...framework.typing import VectorField
-from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
+from ...framework.vectors import absolute, add, add_scaled, cross, divided, dot, larger, length, negative, scale, sub
 from ..standard_shapes import convex_convex, sharp
 from .segment import BEHIND, BESIDE, NEAR, NONE, PART, STRAIGHT, TILT, WHOLE, plugin, register_pairs
 
 # One edge: a point of it, the direction out of the triangle in its plane, that through the neighbour, whether the
 # neighbour falls away, and how far the triangle counts beyond an edge from which it does not.
 Edge = collections.namedtuple("Edge", "at outward through falls room")
-
-
-@plugin.kernel
-def cross3(u, v):
-    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
 
 
 @plugin.shape(cost=5)
@@ -69,16 +64,10 @@ class TerrainTriangleCollider(Collider):
     @staticmethod
     def bounds(shape, dimensions):
         """At least a quarter as thick as long: tolerances follow the extent. With what is behind it, see thickness."""
-        x = max(abs(shape.a[0]), max(abs(shape.b[0]), abs(shape.c[0])))
-        y = max(abs(shape.a[1]), max(abs(shape.b[1]), abs(shape.c[1])))
-        z = max(abs(shape.a[2]), max(abs(shape.b[2]), abs(shape.c[2])))
-        least, front = 0.25 * max(x, max(y, z)), cross3(sub(shape.b, shape.a), sub(shape.c, shape.a))
-        behind = shape.thickness / length(front)
-        return (
-            (1.0 + BESIDE) * max(x, least) + behind * abs(front[0]),
-            (1.0 + BESIDE) * max(y, least) + behind * abs(front[1]),
-            (1.0 + BESIDE) * max(z, least) + behind * abs(front[2]),
-        )
+        reach = larger(absolute(shape.a), larger(absolute(shape.b), absolute(shape.c)))
+        least, front = 0.25 * max(reach[0], reach[1], reach[2]), cross(sub(shape.b, shape.a), sub(shape.c, shape.a))
+        extents = scale(larger(reach, (least, least, least)), 1.0 + BESIDE)
+        return add_scaled(extents, absolute(front), shape.thickness / length(front))
 
     @staticmethod
     def support(shape, direction):
@@ -100,7 +89,7 @@ def edge_of(start, end, beyond, normal, room):
     """The Edge from start to end."""
     along = sub(end, start)
     along = divided(along, length(along))
-    outward, through = cross3(along, normal), sub(beyond, start)
+    outward, through = cross(along, normal), sub(beyond, start)
     through = add_scaled(through, along, -dot(through, along))
     far = length(through)
     if far == 0.0:  # as a vertical wall below
@@ -168,7 +157,7 @@ def is_behind(b, normal, at, most, support):
 @part
 def contact_of_triangle(a, b, d, support, rounding):
     """(whether the shape is over the triangle's own part; depth, normal, point)."""
-    normal, round_b = cross3(sub(a.b, a.a), sub(a.c, a.a)), rounding(b)
+    normal, round_b = cross(sub(a.b, a.a), sub(a.c, a.a)), rounding(b)
     size = math.sqrt(length(normal))
     normal = divided(normal, length(normal))
     zone = BESIDE * size
