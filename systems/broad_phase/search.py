@@ -12,10 +12,10 @@ from ...framework.settings import AUTOMATIC
 from ...framework.world.world import World
 from ..records import FOUND
 from .boxes import fixed_count
-from .plan import reason_of
+from .brute_force import BRUTE_FORCE_MAX
 from .plugin_broad_phase import PluginBroadPhase
 from .records import FRAME_SIZE
-from .stages import BRUTE_FORCE, NO_SEARCH, PLUGIN, UNIFORM_GRID, UNIFORM_GRID_MIN
+from .stages import BRUTE_FORCE, NO_SEARCH, PLUGIN, SPATIAL_TREE, UNIFORM_GRID, UNIFORM_GRID_MIN, has_many_static
 from .static_grid import NEVER_BUILT
 from .tree.tree import CandidateLimitError, SpatialTree
 from .uniform_grid import LONGEST, NOTE_CHUNK, OUTSIDE_MAX
@@ -174,5 +174,18 @@ class CandidateSearch:
             return "no colliders: nothing to do"
         if name != AUTOMATIC:
             return f"{name}, as the settings say"
-        moving = state.moving - state.first
-        return reason_of(self.last, moving, fixed_count(state), state.dimensions, state.moving_meet)
+        search, meet, moving, static = self.last, state.moving_meet, state.moving - state.first, fixed_count(state)
+        tree = "quadtree" if state.dimensions == 2 else "octree"
+        if search == SPATIAL_TREE:
+            beside = f" and against that of {static} static ones" if static else ""
+            return f"{tree} of {moving} moving bodies against itself{beside}"
+        if not meet:
+            among = "a uniform grid of" if has_many_static(moving, static, meet) else "all"
+            return f"layers let no two of {moving} moving bodies meet; they look into {among} {static} static ones"
+        if has_many_static(moving, static, meet):
+            among = "uniform grid" if search == UNIFORM_GRID else "every pair"
+            return f"{among} of {moving} moving bodies, which look into a uniform grid of {static} static ones"
+        if search == UNIFORM_GRID:
+            return f"uniform grid of {moving} moving bodies, and {static} static ones that look into it"
+        more = f"above {BRUTE_FORCE_MAX} a uniform grid, or a {tree} where this does not suit"
+        return f"every pair of {moving} moving and {static} static bodies; {more}"

@@ -13,7 +13,6 @@ from ..sleeping.stages import leave_out_still
 from ..stage_system import StagedSystem
 from .boxes import box_motions, box_statics, fixed_count
 from .brute_force import BRUTE_FORCE_MAX
-from .plan import planned_passes
 from .search import CandidateSearch
 from .stages import (
     ROOM_FOR_CANDIDATES,
@@ -92,7 +91,9 @@ class BroadPhase(StagedSystem):
         """The stages, and the passes of trees where the last step needed them."""
         yield from super().kernels()
         if self._state.collides and self._search.last == SPATIAL_TREE:
-            yield from planned_passes(fixed_count(self._state))
+            beside = ", and of what does not move" if fixed_count(self._state) else ""
+            does = f"builds the tree of what moves{beside}; neighbours in it; tests their boxes"
+            yield PlannedKernel("run_tree_pass", does)
 
     def reason(self) -> str:
         return self._search.describe()

@@ -28,7 +28,7 @@ from ...framework.jit.tick_counter import ticks_now
 from ...framework.plugins.registry import Registry
 from ...framework.schedule.stages import Program, Stage, linked_stage, run_stages
 from ...framework.world.world import World
-from ..broad_phase.tree.passes import tree_passes
+from ..broad_phase.tree.tree import tree_passes
 from ..forces.accumulation import required_bodies
 from ..integration.system import Integration
 from ..joints.linked import linked_joint
