@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..components import SphereCollider
 from ..framework.plugins.registry import Shape
-from ..systems.shapes.rotation import axes_of
+from ..systems.shapes.quaternions import axes_of
 from .lists import Capsules, Circles, Floats, Lines, Polygons, Style, no_capsules, no_circles
 from .outline_cache import Kind, OutlineCache, Rows
 from .outlines import fields_of

@@ -16,7 +16,7 @@ from ..framework.schedule.stages import PROGRAM_FIELDS
 from .broad_phase.records import GRID, TREE
 from .contacts.solving.records import ARM_COLUMNS, RESTED, SOLVER, TURN_COLUMNS, WARM_START
 from .impacts.records import IMPACTS
-from .parts.records import PART_COLUMNS, PARTS
+from .parts.rows import PART_COLUMNS, PARTS
 
 
 def default_of(field: Any) -> Any:

@@ -29,7 +29,7 @@ from .records import (
 )
 from .shapes.geometry_levels import arrange, in_order
 from .shapes.linking.linked_shapes import LinkedShapes, ParameterRecords, linked_shapes
-from .shapes.rotation import axes_of
+from .shapes.quaternions import axes_of
 
 # What is kept of bodies from step to step, and moves with their rows: static bodies are not boxed again for others. The
 # shape comes first: it tells which bodies have arrived.

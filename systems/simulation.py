@@ -48,8 +48,7 @@ from .records import CONTACT_ROWS, STATE
 from .scene import ENABLED, Scene, make_table
 from .settings import check_settings, gravity_vector, write_settings
 from .shapes.attribution import ErrorAttribution
-from .shapes.geometry_levels import LevelCheck, check_sensors
-from .shapes.pair_coverage import check_pairs
+from .shapes.geometry_levels import LevelCheck, check_pairs, check_sensors
 from .sleeping.sleepers import Sleepers
 from .stage_list import CLOSING, KEPT, OPENING, STAGES, SYSTEM_OF_STAGE
 from .stage_requests import handlers

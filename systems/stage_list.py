@@ -44,9 +44,8 @@ from .linking.parts import (
 )  # fmt: skip
 from .narrow_phase.manifolds import finish_found
 from .narrow_phase.system import NarrowPhase
-from .parts.records import PART_COLUMNS
+from .parts.rows import PART_COLUMNS
 from .parts.stages import begin_parts
-from .plugin_stages.kept import keep_written
 from .quarantine.columns import check_columns
 from .records import BODIES, COLLIDERS, STATE, TABLE_COLUMNS, all_rows
 from .shapes.poses import turn_with_unequal_moments
@@ -59,6 +58,7 @@ from .step_stages import (
     close_step,
     index_bodies,
     keep_state,
+    keep_written,
     read_bodies,
 )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..framework.compilation import part
+from ..framework.data.column_copies import copy_all
 from .broad_phase.boxes import box_motions, box_statics
 from .ccd.search_bounds import DISCRETE
 from .codes import INDEX, NEED_SWEEPS, OK, ROTATE
@@ -64,6 +65,13 @@ def keep_state(state, dt):
         for i in range(state.first, state.moving):
             bodies.kept_velocity[i] = bodies.linear_velocity[i]
     state.warm_start.before, state.contacts.before = state.warm_start.now, state.contacts.now
+    return OK
+
+
+def keep_written(state, dt):
+    """Copies of what stages of plugins write, before any of them runs: a step that fails puts them back."""
+    copy_all(state.plugin_stages[state.stage])
+    state.kept |= KEEPS_WRITTEN
     return OK
 
 

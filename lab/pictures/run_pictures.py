@@ -12,7 +12,7 @@ from matplotlib.colors import to_rgba_array
 from ...components.part_of import PartOf
 from ...drawing import Drawing, Lines, Style
 from ...drawing.up import up_of
-from ...systems.shapes.rotation import axes_of
+from ...systems.shapes.quaternions import axes_of
 from ..measure.bodies import QUIET, Floats
 from ..measure.paths import Traces
 from ..measure.run import Run

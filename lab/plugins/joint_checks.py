@@ -16,7 +16,7 @@ from ...systems.contacts.solving.records import SOLVER
 from ...systems.joints.custom import call_given
 from ...systems.joints.linked import linked_joint
 from ...systems.joints.own import OwnJoint, change_law, custom_numbers, custom_parameters, numbers_at, sample_of
-from ...systems.shapes.rotation import axes_of
+from ...systems.shapes.quaternions import axes_of
 from .samples import UPRIGHT, Numbers
 
 TOLERANCE = 1e-9

@@ -31,7 +31,7 @@ from ...framework.plugins.laws import size_of
 from ...framework.plugins.registry import Shape
 from ...systems.shapes.linking.linked_shape import half_extents_of
 from ...systems.shapes.linking.parameters import bind, make_parameter_record
-from ...systems.shapes.rotation import axes_of
+from ...systems.shapes.quaternions import axes_of
 from ..cli.usage_errors import Problem
 
 MISSING = "hypothesis is missing; it comes with the extra: pip install 'carom[check]'"

@@ -19,7 +19,7 @@ from ...systems.joints.records import DRIVE as DRIVE  # for those who write a jo
 from ...systems.joints.records import LIMIT as LIMIT
 from ...systems.joints.records import SERVO as SERVO
 from ...systems.joints.records import SPRING as SPRING
-from ...systems.shapes.rotation import axes_of
+from ...systems.shapes.quaternions import axes_of
 from .arms import arm_of as arm_of
 from .arms import moment as moment
 from .joint import WORLD, Joint, Place

@@ -11,7 +11,7 @@ from ...components.part_of import Changes, PartOf, rows_of_parts
 from ...components.rigid_body import WEIGHTLESS
 from ...components.spin import Spin, mass_of_shape, turning_velocity
 from ...framework import Plugin, World
-from ...systems.parts.records import PARTS
+from ...systems.parts.rows import PARTS
 from .outline import Outline as Outline
 from .outline import Piece as Piece
 from .outline import parts_from_outline

@@ -17,7 +17,7 @@ from ...framework.jit.records.schema import Schema
 from ...framework.plugins.registry import PluginStage, Registry
 from ...framework.schedule.stages import Program, Stage
 from ..joints.records import JOINTS
-from ..parts.records import PARTS
+from ..parts.rows import PARTS
 from ..records import BODY_COLUMNS, DAMPING_COLUMNS
 from ..scene import Scene
 from ..stage_list import MADE_AGAIN
@@ -32,7 +32,7 @@ class PluginStages:
     """Follows the registry and the table.
 
     written
-        copies of what the stages write, see :mod:`.kept`
+        copies of what the stages write, see :func:`keep_written`
     """
 
     def __init__(self, state: Record, scene: Scene, adoption: Adoption, registry: Registry) -> None:

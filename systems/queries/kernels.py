@@ -16,8 +16,7 @@ from ..records import STATE
 from ..shapes.attribution import NOTHING_TESTED
 from .casts import find_hits
 from .nearest import find_nearest
-from .neighbours import find_neighbours
-from .overlap import find_overlaps
+from .overlap import find_neighbours, find_overlaps
 from .records import QUERY_BATCH
 
 

@@ -1,4 +1,5 @@
-"""Overlap: which shapes touch the shape of a query, and how deep they are in each other."""
+"""All that is somewhere: which shapes touch the shape of a query, and how deep they are in each other; and which bodies
+are near which, by the distances between their positions, whatever their shapes."""
 
 from __future__ import annotations
 
@@ -6,10 +7,16 @@ import numpy as np
 
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, sub
+from ...framework.vectors import absolute, add, length, scale, shifted, sub
+from ..broad_phase.tree.cells import REACH
 from ..narrow_phase.one_way import is_one_way
 from ..shapes.query import evaluate_against, query_half_extents
-from .candidates import is_wanted, make_find_all, to_collider
+from .candidates import has_layer, is_wanted, make_find_all, to_collider
+
+ALL_LAYERS = -1
+
+
+# -- overlap ------------------------------------------------------------------------------------
 
 
 @inlined
@@ -54,3 +61,35 @@ def find_overlaps(state, batch, moving, static, first, stop):
         note_depths(state, batch, q, begin, batch.end[q])
         begin = batch.end[q]
     return reached
+
+
+# -- neighbours ---------------------------------------------------------------------------------
+
+
+@inlined
+def box_of_body(state, batch, q):
+    """(centre, low, high) of the box around the sphere about the body of the query, with room for rounding."""
+    centre, radius = state.bodies.position[batch.body[q]], batch.radius
+    reach = shifted(scale(absolute(centre), REACH), radius * (1.0 + REACH))
+    return centre, sub(centre, reach), add(centre, reach)
+
+
+@inlined
+def may_be_near(state, batch, q, centre, i):
+    """Whether row i is another body and in the layers; bodies without a collider are in none but all."""
+    in_layers = batch.mask[q] == ALL_LAYERS or (state.bodies.shape[i] >= 0 and has_layer(state, batch, q, i))
+    return i != batch.body[q] and in_layers
+
+
+@inlined
+def is_neighbour(state, batch, q, centre, i):
+    """Whether row i is within the radius."""
+    return length(sub(state.bodies.position[i], centre)) <= batch.radius
+
+
+find_near = make_find_all(box_of_body, may_be_near, is_neighbour, in_grids=False)
+
+
+def find_neighbours(state, batch, points, unused, first, stop):
+    """The neighbours of queries first..stop-1; ``points``: a tree of the bodies' positions, boxes without size."""
+    return find_near(state, batch, points, unused, first, stop)

@@ -21,7 +21,7 @@ from ..scene import Scene
 from ..shapes.attribution import ErrorAttribution
 from .batch import CollectedHits, QueryBatch, QueryShape, joined, slices_of, some_rows
 from .kernels import query_kernels
-from .neighbours import ALL_LAYERS
+from .overlap import ALL_LAYERS
 
 Point = tuple[float, ...]
 

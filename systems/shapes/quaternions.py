@@ -1,11 +1,14 @@
-"""Rotations of bodies, as stages read and write them: unit quaternions w, x, y, z, and the axes that shapes read."""
+"""Rotations of bodies, as stages read and write them: unit quaternions w, x, y, z, and the axes that shapes read: the
+columns of a rotation matrix, which turns a body's own axes into the world's."""
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ...framework.compilation import part
-from ...framework.elementary import cos, sin
+from ...framework.elementary import cos, sin, sines_and_cosines
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import dot
 
@@ -101,3 +104,21 @@ def turned_tensor(q, tensor):
         dot(along_x, x), dot(along_y, y), dot(along_z, z),
         dot(along_x, y), dot(along_x, z), dot(along_y, z),
     )  # fmt: skip
+
+
+def axes_of(rotation: np.ndarray, dimensions: int) -> np.ndarray:
+    """Rotation matrices (n, d, d) of angles (n,) in radians or unit quaternions (n, 4), order w, x, y, z.
+
+    Quaternions are normalized first, so that written columns need not be.
+    """
+    matrices = np.empty((len(rotation), dimensions, dimensions))
+    if dimensions == 2:
+        sine, cosine = sines_and_cosines(rotation)
+        matrices[:, 0, 0], matrices[:, 0, 1] = cosine, -sine
+        matrices[:, 1, 0], matrices[:, 1, 1] = sine, cosine
+        return matrices
+    w, x, y, z = (rotation / np.linalg.norm(rotation, axis=1, keepdims=True)).T
+    matrices[:, 0].T[:] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
+    matrices[:, 1].T[:] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
+    matrices[:, 2].T[:] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+    return matrices

@@ -31,7 +31,7 @@ from carom.plugins.joints import Distance, Joints
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 from carom.plugins.terrain import create_chain, create_triangle_mesh
 from carom.plugins.tile_grid import TileGridCollider
-from carom.systems.shapes.rotation import axes_of
+from carom.systems.shapes.quaternions import axes_of
 
 pytestmark = pytest.mark.plain
 both = pytest.mark.parametrize("d", [2, 3])

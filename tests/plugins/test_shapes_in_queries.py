@@ -12,7 +12,7 @@ from carom.plugins import Physics, capsule, convex_hull, convex_polygon
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_hull import ConvexHullCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider
-from carom.systems.shapes.rotation import axes_of
+from carom.systems.shapes.quaternions import axes_of
 
 pytestmark = pytest.mark.slow  # its shapes take long to compile
 
