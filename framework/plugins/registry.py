@@ -162,6 +162,13 @@ class PluginStage:
         return f"{'after' if self.after else 'before'}={self.anchor!r}"
 
 
+# What plugins register by name or class, as messages call it: the attribute of a plugin and of the registry.
+REGISTERED = {
+    "shape": "shapes", "integrator": "integrators", "broad phase": "broad_phases", "mixing rule": "mixing_rules",
+    "stage": "stages", "joint": "joints", "component": "declared", "event": "events", "record": "records",
+}  # fmt: skip
+
+
 @dataclass(eq=False)
 class Registry:
     """Everything the plugins of one world have registered; ``version`` changes whenever they register more."""
@@ -177,7 +184,7 @@ class Registry:
     pair_filters: list[tuple[str, Any]] = field(default_factory=list)  # (plugin, function)
     stages: dict[str, PluginStage] = field(default_factory=dict)
     joints: dict[type[Component], Any] = field(default_factory=dict)
-    components: dict[type[Component], Any] = field(default_factory=dict)
+    declared: dict[type[Component], Any] = field(default_factory=dict)
     events: dict[str, str] = field(default_factory=dict)
     records: dict[str, Schema] = field(default_factory=dict)
     # of the world, called with components and events: PluginError for what it cannot have
@@ -215,26 +222,12 @@ class Registry:
 
     def refresh(self) -> None:
         """Gather everything anew; PluginError if two plugins want the same, and then nothing changes."""
-        shapes: dict[Any, Any] = {}
+        gathered: dict[str, dict[Any, Any]] = {attribute: {} for attribute in REGISTERED.values()}
         pairs: dict[Any, Any] = {}
-        integrators: dict[str, Any] = {}
-        broad_phases: dict[str, Any] = {}
-        mixing_rules: dict[str, Any] = {}
-        stages: dict[str, PluginStage] = {}
-        joints: dict[Any, Any] = {}
-        components: dict[Any, Any] = {}
-        events: dict[str, str] = {}
-        records: dict[str, Schema] = {}
         owners: dict[Any, str] = {}
         for plugin in self.plugins:
-            kinds = (
-                ("shape", shapes, plugin.shapes), ("integrator", integrators, plugin.integrators),
-                ("broad phase", broad_phases, plugin.broad_phases), ("mixing rule", mixing_rules, plugin.mixing_rules),
-                ("stage", stages, plugin.stages), ("joint", joints, plugin.joints),
-                ("component", components, plugin.declared), ("event", events, plugin.events),
-                ("record", records, plugin.records),
-            )  # fmt: skip
-            for kind, known, fresh in kinds:
+            for kind, attribute in REGISTERED.items():
+                known, fresh = gathered[attribute], getattr(plugin, attribute)
                 for key in fresh:
                     name = key if isinstance(key, str) else key.__name__
                     if key in known:
@@ -260,11 +253,9 @@ class Registry:
                         f"{other.plugin}"
                     )
                 pairs[first, second] = pair
-        self.check_stages(stages.values())
-        self.declare(components, events)
-        self.shapes, self.pairs, self.integrators, self.stages = shapes, pairs, integrators, stages
-        self.broad_phases, self.mixing_rules, self.joints = broad_phases, mixing_rules, joints
-        self.components, self.events, self.records = components, events, records
+        self.check_stages(gathered["stages"].values())
+        self.declare(gathered["declared"], gathered["events"])
+        vars(self).update(gathered, pairs=pairs)
         self.pair_filters = [(plugin.name, each) for plugin in self.plugins for each in plugin.pair_filters]
         self.version += 1
 

@@ -189,11 +189,8 @@ class SystemOrder:
         later, self._later = self._later, []
         for action in later:
             action()
-        self.force_systems = list(self._wanted_forces)
-        if not _same(self._wanted, self.systems):
-            self._place_systems()
+        self._settle()
         self.changed = False
-        self._note_change()
         self._tell()
 
     def _tell(self) -> None:
@@ -229,10 +226,15 @@ class SystemOrder:
         self._wanted, self._wanted_forces, self.frame_systems, self._joined = (  # type: ignore[assignment]
             [other for other in each if other is not system] for each in lists
         )
+        self._settle()
+
+    def _settle(self) -> None:
+        """What is wanted is here from now on."""
         self.force_systems = list(self._wanted_forces)
         if not _same(self._wanted, self.systems):
             self._place_systems()
-        self._note_change()
+        self.version += 1
+        self.foreign = self._has_foreign()
 
     def _place_systems(self) -> None:
         """Each phase has a band of esper priorities; its systems take the places below the top."""
@@ -269,10 +271,6 @@ class SystemOrder:
             if isinstance(processor, System) or processor is self._runner:
                 esper_bridge.remove_processor_instance(processor)
         esper_bridge.give_back_processors()
-
-    def _note_change(self) -> None:
-        self.version += 1
-        self.foreign = self._has_foreign()
 
     def _has_foreign(self) -> bool:
         """Also true without a built-in system that integrates: it keeps the state that others overwrite after it."""

@@ -230,7 +230,7 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
         if self.physics is not None:
             raise ValueError("a world takes one Physics")
         self.physics = self._pipeline.physics = physics
-        self._declare(self.registry.components, ())
+        self._declare(self.registry.declared, ())
         physics.table.layer_names = self._layer_names
 
     @property

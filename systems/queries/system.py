@@ -106,12 +106,8 @@ class Queries:
         shape, count = self._query_shape(component, len(positions), own=False), len(positions)
         collected = CollectedHits(self._batch, count, NEAREST_COLUMNS)
         for some in slices_of(count) if shape is not None else ():
-            first, stop = 0, some.stop - some.start
             excluded = self._ask(shape, columns, some, positions, wanted)
-            while first < stop:
-                reached = self._run(self._kernels.overlaps, component, first, stop, excluded)
-                collected.take(first, reached)
-                first = reached
+            self._collect(collected, self._kernels.overlaps, component, some.stop - some.start, excluded)
         entities, rows, distances, points, normals = collected.columns()
         query = np.repeat(np.arange(count), np.diff(collected.offsets))
         order = np.lexsort((entities, distances, query))
@@ -126,18 +122,14 @@ class Queries:
         return queries.entity[: queries.end[0]].tolist()
 
     def _overlaps(self, component: type[Any], centres: np.ndarray, halves: np.ndarray, wanted: Wanted) -> Hits:
-        if self._query_shape(component, len(centres)) is None:
-            return Hits(np.zeros(len(centres) + 1, np.int64), *_no_hits())
-        queries, collected = self._batch.record, CollectedHits(self._batch, len(centres))
-        for some in slices_of(len(centres)):
-            count, first = some.stop - some.start, 0
+        shape, count = self._query_shape(component, len(centres)), len(centres)
+        queries, collected = self._batch.record, CollectedHits(self._batch, count)
+        for some in slices_of(count) if shape is not None else ():
+            count = some.stop - some.start
             queries.centre[:count], queries.half[:count] = centres[some], halves[some]
             self._batch.radius[:count] = halves[some, 0]
             excluded = self._batch.ask(count, some, wanted)
-            while first < count:
-                stop = self._run(self._kernels.overlaps, component, first, count, excluded)
-                collected.take(first, stop)
-                first = stop
+            self._collect(collected, self._kernels.overlaps, component, count, excluded)
         return Hits(collected.offsets, *collected.columns())
 
     # -- what is near -----------------------------------------------------------------------------
@@ -167,17 +159,12 @@ class Queries:
         collected = CollectedHits(self._batch, len(rows))
         if mask == ALL_LAYERS or self._scene.linked is not None:
             self._reserve(len(rows))
-            points, queries = self._points_tree(), self._batch.record
-            find, queries.radius = self._kernels.neighbours, radius
+            queries, trees = self._batch.record, (self._points_tree(),) * 2
+            queries.radius = radius
             for some in slices_of(len(rows)):
-                count, first = some.stop - some.start, 0
+                count = some.stop - some.start
                 queries.body[:count], queries.mask[:count] = rows[some], mask
-                while first < count:
-                    stop = self._kernels.run(
-                        find.address, state.address, queries.address, points, points, 0, first, count
-                    )
-                    collected.take(first, stop)
-                    first = stop
+                self._collect(collected, self._kernels.neighbours, None, count, trees=trees)
         return Neighbours(entity[rows], rows, collected.offsets, *collected.columns())
 
     def _points_tree(self) -> int:
@@ -244,9 +231,23 @@ class Queries:
 
     # -- what the kernels need --------------------------------------------------------------------
 
-    def _run(self, function: Linked, component: type[Any], first: int, stop: int, excluded: int = 0) -> int:
+    def _collect(
+        self, collected: CollectedHits, function: Linked, component: type[Any] | None, count: int, excluded: int = 0,
+        trees: tuple[int, int] | None = None,
+    ) -> None:  # fmt: skip
+        """Take the hits of the queries in the first rows, by as many calls as the room for hits makes necessary."""
+        first = 0
+        while first < count:
+            stop = self._run(function, component, first, count, excluded, trees)
+            collected.take(first, stop)
+            first = stop
+
+    def _run(
+        self, function: Linked, component: type[Any] | None, first: int, stop: int, excluded: int = 0,
+        trees: tuple[int, int] | None = None,
+    ) -> int:  # fmt: skip
         """Call a function for the queries first..stop-1; errors name the plugin, the pair and the entity."""
-        moving, static = self._trees
+        moving, static = trees or self._trees
         try:
             result = self._kernels.run(
                 function.address, self._state.address, self._batch.record.address, moving, static, excluded, first, stop
@@ -312,11 +313,6 @@ class Queries:
     def _bind(self, shape: QueryShape) -> None:
         columns = {"radius": self._batch.radius, "half_extents": self._batch.half_extents}
         shape.bind(columns, self._batch.queries)
-
-
-def _no_hits() -> tuple[np.ndarray, np.ndarray]:
-    """Entities and rows."""
-    return np.empty(0, np.int64), np.empty(0, np.int64)
 
 
 def _nothing(count: int, dimensions: int) -> tuple[np.ndarray, ...]:

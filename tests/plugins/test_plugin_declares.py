@@ -96,7 +96,7 @@ def test_also_what_is_declared_or_taken_later():
         world.add_system(Declare())
         with pytest.raises(Exception, match="component Wick can be registered between steps only"):
             world.step()
-        assert list(plugin.declared) == [Fuse] == list(world.registry.components)
+        assert list(plugin.declared) == [Fuse] == list(world.registry.declared)
 
 
 def test_what_a_world_cannot_have_is_refused_and_changes_nothing():
