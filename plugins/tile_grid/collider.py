@@ -225,7 +225,7 @@ class TileGridCollider(Collider):
             raise self._wrong(f"a map without shapes has full tiles only: make it with shapes=, got shape {shape!r}")
         if not plain and ((values < 0) | (values > MOST)).any():
             raise self._wrong(f"value must be 0, or the number of a material, 1 to {MOST}, got {value!r}")
-        rows, columns = self._shape()
+        rows, columns = shape_of(self._view())
         for row, x in places.tolist():
             if not (0 <= row < rows and 0 <= x < columns):
                 raise self._wrong(f"the map has {rows} rows and {columns} columns, got row {row}, column {x}")
@@ -247,16 +247,12 @@ class TileGridCollider(Collider):
         column: ArrayColumn = self.columns["packed"]  # type: ignore[assignment]
         return column.view(self)
 
-    def _shape(self) -> tuple[int, int]:
-        """The numbers of rows and columns."""
-        return shape_of(self._view())
-
     def _wrong(self, rule: str) -> ValueError:
         whose = "" if self.entity is None else f"entity {self.entity}: "
         return ValueError(f"{whose}TileGridCollider.set: {rule}")
 
     def _check_cell(self, method: str, row: int, column: int) -> None:
-        rows, columns = self._shape()
+        rows, columns = shape_of(self._view())
         if not (0 <= row < rows and 0 <= column < columns):
             raise ValueError(f"TileGridCollider.{method}: the map has {rows} rows and {columns} columns, "
                              f"got row {row}, column {column}")  # fmt: skip
@@ -265,7 +261,7 @@ class TileGridCollider(Collider):
         """(2,) m, the centre of the cell at ``row`` (0 is the top one) and ``column``, relative to the Transform's
         position; ValueError outside of the map."""
         self._check_cell("centre_of", row, column)
-        rows, columns = self._shape()
+        rows, columns = shape_of(self._view())
         cell = np.array((column + 0.5 - 0.5 * columns, 0.5 * rows - row - 0.5))
         return np.broadcast_to(self.offset, 2) + cell * self.tile_size
 

@@ -130,6 +130,4 @@ class LinkedQuery:
         return addresses(getattr(pair, name, None) for pair in self.pairs)
 
 
-@lru_cache(maxsize=CACHE_SIZE)
-def _made_query(asking: Shape, linked: LinkedShapes, pairs: tuple[Any, ...]) -> LinkedQuery:
-    return LinkedQuery(asking, linked, pairs)
+_made_query = lru_cache(maxsize=CACHE_SIZE)(LinkedQuery)

@@ -152,9 +152,7 @@ def linked_pair(first: Shape, second: Shape, pair: Pair, dimensions: int) -> Lin
     return _shared_pair(one, two, replace(pair, **names, helpers=(None,) * len(pair.helpers)), dimensions)
 
 
-@lru_cache(maxsize=CACHE_SIZE)
-def _shared_pair(first: Shape | None, second: Shape | None, pair: Pair, dimensions: int) -> LinkedPair:
-    return LinkedPair(first, second, pair, dimensions)
+_shared_pair = lru_cache(maxsize=CACHE_SIZE)(LinkedPair)
 
 
 @lru_cache(maxsize=CACHE_SIZE)

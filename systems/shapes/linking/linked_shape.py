@@ -135,10 +135,7 @@ class LinkedShape:
         return Linked(getattr(made, name), linked_signature(name, self.dimensions), what)
 
 
-@lru_cache(maxsize=CACHE_SIZE)
-def linked_shape(shape: Shape, dimensions: int) -> LinkedShape:
-    """The functions of that shape, the same ones for all worlds of this process."""
-    return LinkedShape(shape, dimensions)
+linked_shape = lru_cache(maxsize=CACHE_SIZE)(LinkedShape)  # the same ones for all worlds of this process
 
 
 # -- boxes around shapes that are in no world yet ---------------------------------------------------

@@ -40,15 +40,15 @@ class LinkedShapes:
     """
 
     def __init__(
-        self, shapes: tuple[Shape, ...], pairs: Mapping[tuple[int, int], Pair | None], rules: tuple[Any, ...],
-        dimensions: int,
+        self, shapes: tuple[Shape, ...], pairs: tuple[tuple[tuple[int, int], Pair | None], ...],
+        rules: tuple[Any, ...], dimensions: int,
     ) -> None:  # fmt: skip
         self.shapes, self.dimensions = shapes, dimensions
         self.functions: tuple[LinkedShape, ...] = tuple(linked_shape(shape, dimensions) for shape in shapes)
         self.pairs: dict[tuple[int, int], LinkedPair | None] = {}
-        self.warm_started: set[int] = set()  # shapes that some pair takes by the address of their support
+        self.by_address: set[int] = set()  # shapes that some pair takes by the address of their support
         self._flipped = np.zeros(len(shapes) ** 2, bool)
-        for (i, j), pair in pairs.items():
+        for (i, j), pair in pairs:
             if pair is None:
                 self.pairs[i, j] = None
                 continue
@@ -57,7 +57,7 @@ class LinkedShapes:
             self.pairs[i, j] = linked_pair(shapes[first], shapes[second], pair, dimensions)
             self._flipped[i * len(shapes) + j] = flipped
             sides = convex_sides(shapes[first], shapes[second], pair)
-            self.warm_started.update(number for number, side in zip((first, second), sides, strict=True) if side)
+            self.by_address.update(number for number, side in zip((first, second), sides, strict=True) if side)
         self._rules = tuple(linked_rule(rule) for rule in rules)
         self._tables: dict[str, np.ndarray] = {}
 
@@ -92,7 +92,7 @@ class LinkedShapes:
         stage asks for them."""
         touched = self.touched(moments)
         for number, function in enumerate(self.functions):
-            yield from function.all_functions(number in self.warm_started, number in touched)
+            yield from function.all_functions(number in self.by_address, number in touched)
             if moments and function.moments is not None:
                 yield function.moments
         yield from self._rules
@@ -116,9 +116,7 @@ class LinkedShapes:
         return self._tables[name]
 
 
-@lru_cache(maxsize=CACHE_SIZE)
-def _made(shapes: tuple[Shape, ...], pairs: tuple[Any, ...], rules: tuple[Any, ...], dimensions: int) -> LinkedShapes:
-    return LinkedShapes(shapes, dict(pairs), rules, dimensions)
+_made = lru_cache(maxsize=CACHE_SIZE)(LinkedShapes)
 
 
 def addresses(functions: Any) -> np.ndarray:
@@ -142,7 +140,7 @@ class ParameterRecords:
             for number, shape in enumerate(linked.shapes) for name in shape.columns
             if isinstance(column := shape.component.columns[name], ArrayColumn)
         ]  # fmt: skip
-        for number in linked.warm_started:
+        for number in linked.by_address:
             self.need_support(number)
         for number in linked.touched(moments):
             self.need_support(number)
