@@ -77,12 +77,16 @@ def ranges_of_level(tree, level, found):
 
 
 @part
-def count_candidates(tree, found):
-    """How many boxes the ranges hold."""
+def note_ranges(tree, found):
+    """So many ranges, and how many boxes they hold; or, below 0, that there was no room for all. Returns a code."""
+    if found < 0:
+        return MORE_RANGES
     ranges, candidates = tree.ranges, 0
     for r in range(found):
         candidates += np.int64(ranges[r, 2]) - ranges[r, 1]
-    return candidates
+    tree.range_count, tree.candidates = found, candidates
+    tree.next_range = tree.pair_count = 0
+    return DONE
 
 
 @part
@@ -206,23 +210,12 @@ def find_ranges_within(tree, _):
     for level in range(tree.levels + 1):
         found = ranges_of_level(tree, level, found)
         in_use += tree.level_end[level] > tree.level_begin[level]
-    if in_use > 1:
-        found = ranges_between(tree, tree, found, True)
-    if found < 0:
-        return MORE_RANGES
-    tree.range_count, tree.candidates = found, count_candidates(tree, found)
-    tree.next_range = tree.pair_count = 0
-    return DONE
+    return note_ranges(tree, ranges_between(tree, tree, found, True) if in_use > 1 else found)
 
 
 def find_ranges_between(tree, other):
     """Pass 1 for the pairs of two trees."""
-    found = ranges_between(tree, other, 0, False)
-    if found < 0:
-        return MORE_RANGES
-    tree.range_count, tree.candidates = found, count_candidates(tree, found)
-    tree.next_range = tree.pair_count = 0
-    return DONE
+    return note_ranges(tree, ranges_between(tree, other, 0, False))
 
 
 def test_within(tree, other):
