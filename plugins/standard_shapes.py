@@ -12,7 +12,7 @@ import math
 from ..components import AABBCollider, SphereCollider
 from ..framework.compilation import inlined
 from ..framework.plugins.plugin import Convex, Plugin
-from ..framework.vectors import divided, item, length, replace, scale
+from ..framework.vectors import add, divided, filled, item, larger, length, negative, replace, scale, smaller, sub
 from ..systems.shapes.convex.pair import convex_convex
 from .standard_sweeps import box_box_sweep, sphere_box_sweep, sphere_sphere_sweep
 
@@ -31,10 +31,7 @@ def sharp(shape):
 @inlined
 def axis_normal(like, axis, sign):
     """The unit vector along an axis."""
-    result = like
-    for k in range(len(like)):
-        result = replace(result, k, sign if k == axis else 0.0)
-    return result
+    return replace(filled(like, 0.0), axis, sign)
 
 
 @standard_shapes.pair(SphereCollider, SphereCollider)
@@ -93,15 +90,13 @@ def box_box(a, b, d):
     The point is the centre of the overlap region.
     """
     axis, depth, sign = 0, math.inf, 1.0
-    point = d
     for k in range(len(d)):
         overlap = item(a.half_extents, k) + item(b.half_extents, k) - abs(item(d, k))
         if overlap < depth:
             axis, depth, sign = k, overlap, 1.0 if item(d, k) >= 0.0 else -1.0
-        low = max(-item(a.half_extents, k), item(d, k) - item(b.half_extents, k))
-        high = min(item(a.half_extents, k), item(d, k) + item(b.half_extents, k))
-        point = replace(point, k, 0.5 * (low + high))
-    return depth >= 0.0, depth, axis_normal(d, axis, sign), point
+    low = larger(negative(a.half_extents), sub(d, b.half_extents))
+    high = smaller(a.half_extents, add(d, b.half_extents))
+    return depth >= 0.0, depth, axis_normal(d, axis, sign), scale(add(low, high), 0.5)
 
 
 standard_shapes.pair(Convex, Convex)(convex_convex)

@@ -6,7 +6,7 @@ import math
 
 from ...framework.compilation import inlined, part
 from ...framework.elementary import cos
-from ...framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, scale, sub
+from ...framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, scale, smallest, sub
 from ...systems.queries.compiled import (
     half_extents_of_row,
     is_one_way,
@@ -137,7 +137,7 @@ def ride_of(state, character, i, at, floor, up, dt):
         ride = add(ride, sub(turned(arm, character.floor_x[i], character.floor_y[i], x, y), arm))
     if length(ride) > FARTHEST_CARRIED:
         ride = scale(ride, 0.0)
-    sole = add_scaled(add(now, foot), out, 0.0 - SOLE * least(state.bodies.half_extents[i]))
+    sole = add_scaled(add(now, foot), out, 0.0 - SOLE * smallest(state.bodies.half_extents[i]))
     return add_scaled(ride, across(surface_velocity_of(state, floor, sole, out), out), dt)
 
 
@@ -334,15 +334,6 @@ def look_around(state, near, i, start, extents, reach):
     return gather(state, near, i, low, high)
 
 
-@inlined
-def least(extents):
-    """The smallest of them."""
-    smallest = item(extents, 0)
-    for k in range(len(extents)):
-        smallest = min(smallest, item(extents, k))
-    return smallest
-
-
 @part
 def move_one(state, near, character, ladder, work, i, dt):
     """Where character i will be, into ``work.place``, and all that it knows then."""
@@ -368,7 +359,7 @@ def move_one(state, near, character, ladder, work, i, dt):
     extents, since, skin = half_extents_of_row(state, i), character.since_drop[i], character.skin[i]
     dropping = since < DROPS_FOR or (since < DROPS_AT_MOST and gravity * since * since < 8.0 * skin)  # it is in it
     walker = Walker(
-        state, near, character, work, i, start, extents, least(extents), up, skin,
+        state, near, character, work, i, start, extents, smallest(extents), up, skin,
         cos(character.max_slope[i]), dropping, gravity, wish, look_around(state, near, i, start, extents, reach),
     )  # fmt: skip
     work.hits, work.inside = 0, False

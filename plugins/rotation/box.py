@@ -7,7 +7,7 @@ from ...framework import Plugin
 from ...framework.data.columns import special_column
 from ...framework.outlines import box_outline
 from ...framework.typing import VectorField
-from ...framework.vectors import add_scaled, dot, item, replace, scale
+from ...framework.vectors import absolute, add_scaled, dot, filled, item, scale
 from ..corners import along_axes, in_world
 
 boxes = Plugin("boxes that turn")
@@ -31,13 +31,10 @@ class BoxCollider(Collider):
 
     @staticmethod
     def bounds(shape, dimensions):
-        half = shape.half_extents
-        for k in range(len(half)):
-            reach = 0.0
-            for j in range(len(half)):
-                reach += abs(item(shape.axes[j], k)) * item(shape.half_extents, j)
-            half = replace(half, k, reach)
-        return half
+        reach = filled(shape.half_extents, 0.0)
+        for j in range(len(reach)):
+            reach = add_scaled(reach, absolute(shape.axes[j]), item(shape.half_extents, j))
+        return reach
 
     @staticmethod
     def support(shape, direction):
