@@ -18,7 +18,7 @@ from carom.systems.joints.records import JOINTS
 from carom.systems.linking import preparation, steps
 
 CONSTANTS, FIELDS = 34, 213
-FIRST_STEP, LATER = 130, 276  # KB of byte code that asteroids links, and with what it may need later
+FIRST_STEP, LATER = 128, 271  # KB of byte code that asteroids links, and with what it may need later
 
 
 class Linked(BaseException):
