@@ -220,18 +220,16 @@ class Bodies:
         pieces.sort(key=lambda piece: -piece.area)
         total = sum(piece.area for piece in pieces)
         middle = np.sum([piece.area * piece.centre for piece in pieces], axis=0) / total
-        own_collider: list[Any] = []
+        first, centre, own = collider_of(pieces[0], fields.material, True)
+        first.offset = tuple(turned(centre - middle, -own).tolist())
         sensor = bool(fields.material.get("sensor"))
-        for k, piece in enumerate(pieces):
-            collider, centre, own = collider_of(piece, fields.material, True)
-            if k == 0 and own == 0.0:
-                collider.offset = tuple((centre - middle).tolist())
-                own_collider = [collider]
-            else:
-                made.parts.append((centre - middle, own, 0.0 if sensor else mass * piece.area / total, collider))
-        if not sensor and own_collider:
+        for piece in pieces[1:]:
+            collider, centre, turn = collider_of(piece, fields.material, True)
+            share = 0.0 if sensor else mass * piece.area / total
+            made.parts.append((turned(centre - middle, -own), turn - own, share, collider))
+        if not sensor:
             fields.of.setdefault(RigidBody, {})["mass"] = mass * pieces[0].area / total
-        return middle, own_collider, angle
+        return middle, [first], angle + own
 
     def _static(
         self, made: Planned, shapes: list[Shape], fields: Fields, angle: float, origin: np.ndarray

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from helpers_maps import FLIPPED, SLOPE, map_of, objects_of, quiet_world_for_maps, thing, tile, tiles_of, tileset, write
 
-from carom import BoxCollider, RigidBody, Transform, maps
+from carom import BoxCollider, RigidBody, Spin, Transform, maps
 
 FORMATS = pytest.mark.parametrize("suffix", ["tmx", "tmj"])
 
@@ -77,6 +77,33 @@ def test_tiles_and_tile_objects_are_flipped_in_all_eight_ways(flips, tmp_path):
     assert level.layers["ground"].tiles.flips.tolist() == [flips, flips]
     assert [sprite.flips for sprite in level.layers["things"].sprites] == [flips, flips]
     world.close()
+
+
+@pytest.mark.parametrize("flips", range(8))
+def test_a_body_of_several_shapes_is_one_plate(flips, tmp_path, world):
+    """However its tile is flipped: place, mass, centre and moment are those of a plate of even thickness."""
+    shapes = thing(1, 1, 1, 14, 6, capsule=True), thing(2, 12, 12, 3, 3)
+    given = {"mass": 4.0, "spins": True, "gravity_scale": 0.0}
+    drawn = thing(1, 16, 48, 16, 16, gid=gid(1, flips), properties=given)
+    tiles = tileset(tile(0, "", *shapes))
+    level = maps.load(write(tmp_path / "map.tmx", map_of(4, 6, objects_of(drawn), tilesets=[tiles])), world)
+    world.step()
+
+    def mask(size):
+        places = (np.arange(size) + 0.5) * (16 / size)
+        whole = np.array([[any(contains(each, (x, y)) for each in shapes) for x in places] for y in places])
+        return flipped(whole, flips)
+
+    np.testing.assert_array_equal(solid_pixels(world, 16, 32, 16, 96), mask(16))
+    rows, columns = np.nonzero(mask(128))
+    plate = np.stack((1 + (columns + 0.5) / 128, 6 - 2 - (rows + 0.5) / 128), axis=1)
+    body = level.object(1).entity
+    assert world.component_for_entity(body, RigidBody).mass == pytest.approx(4.0, rel=1e-12)
+    np.testing.assert_allclose(world.component_for_entity(body, Transform).position, plate.mean(axis=0), atol=1e-3)
+    moment = 4.0 * ((plate - plate.mean(axis=0)) ** 2).sum(axis=1).mean()
+    assert world.component_for_entity(body, Spin).moments == pytest.approx(moment, rel=5e-3)
+    parts = next(plugin for plugin in world.plugins if plugin.name == "parts")
+    np.testing.assert_allclose(parts.centre(body), 0, atol=1e-12)
 
 
 @pytest.mark.slow
