@@ -135,7 +135,7 @@ class Bodies:
     def _body(self, made: Planned, thing: MapObject, layer: MapLayer, fields: Fields, shapes: list[Shape]) -> None:
         if tuple(layer.parallax) != (1.0, 1.0):
             raise RefusedError(f"a body in a layer with parallax {layer.parallax}: class Decoration makes it a picture")
-        self._path(fields)
+        path = self._path(fields)
         rigid = self._rigid(fields)
         if any(issubclass(kind, Collider) for _, prefab in fields.prefabs for kind in prefab._components):
             shapes = []  # the prefab has its own
@@ -144,8 +144,8 @@ class Bodies:
             mass = 1.0 if rigid is None else rigid.mass
             centre, own, rotation = self._moving(made, thing, shapes, fields, angle, mass)
             place = origin + turned(centre, angle)
-            if Path in fields.of:
-                place = self._start(fields.of[Path])
+            if path:
+                place = self._start(path)
             made.bodies.insert(0, [transform(place, rotation), *self._components(fields), *own])
         else:
             made.beside = self._components(fields)
@@ -256,21 +256,27 @@ class Bodies:
 
     # -- paths -----------------------------------------------------------------------------------------
 
-    def _path(self, fields: Fields) -> None:
-        """The word ``path``: fields of a Path."""
+    def _path(self, fields: Fields) -> dict[str, Any]:
+        """The fields of its Path, from the word ``path`` too, and from a prefab; {} if it has none."""
         given = fields.words.get("path")
-        if given is None:
-            return
-        values = fields.of.setdefault(Path, {})
-        if given.type == "places":
-            points, closed = self.to_world(given.value), False
-        else:
-            points, closed = self.points_of(given.value)
-        values.setdefault("points", checked(Path.columns["points"], points))
-        if closed:
-            values.setdefault("mode", "loop")
-        if "speed" not in values:
+        if given is not None:
+            values = fields.of.setdefault(Path, {})
+            if given.type == "places":
+                points, closed = self.to_world(given.value), False
+            else:
+                points, closed = self.points_of(given.value)
+            values.setdefault("points", checked(Path.columns["points"], points))
+            if closed:
+                values.setdefault("mode", "loop")
+        if Path not in fields.of:
+            return {}
+        prefab = next((p._components[Path] for _, p in fields.prefabs if Path in p._components), None)
+        found = {name: getattr(prefab, name) for name in Path._arguments if prefab is not None} | fields.of[Path]
+        if "points" not in found:
+            raise RefusedError("its Path needs points: property 'path', of type object, that refers to a polyline")
+        if "speed" not in found:
             raise RefusedError("its path needs a speed: property 'speed' or 'Path.speed', m/s")
+        return found
 
     def _start(self, values: dict[str, Any]) -> np.ndarray:
         """(2,) m, where a body on this path begins."""

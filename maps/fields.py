@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ..components import Collider, Prefab, RigidBody
 from ..components.spin import Spin
 from ..framework import Component, World
@@ -235,11 +237,12 @@ class Sorter:
             found.of.setdefault(RigidBody, {})
             self._field(RigidBody, name, given, found)
         elif name in VELOCITY:
-            value = given.value
-            if isinstance(value, bool) or not isinstance(value, (int, float)):
-                raise RefusedError(f"it must be a number, got {value!r}")
-            velocity = found.of.setdefault(RigidBody, {}).setdefault("linear_velocity", [0.0, 0.0])
-            velocity[VELOCITY.index(name)] = float(value)
+            prefab: Any = next((p._components[RigidBody] for _, p in found.prefabs if RigidBody in p._components), None)
+            values = found.of.setdefault(RigidBody, {})
+            before = values.get("linear_velocity", 0.0 if prefab is None else prefab.linear_velocity)
+            velocity = [*before] if np.ndim(before) else [before, before]
+            velocity[VELOCITY.index(name)] = given.value
+            values["linear_velocity"] = checked(RigidBody.columns["linear_velocity"], velocity)
         elif name in MATERIAL:
             self._material(name, given, found)
         elif name in Spin._arguments:

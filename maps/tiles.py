@@ -142,7 +142,7 @@ class TileLayers:
     def _components(self, fields: Fields) -> list[Any]:
         if fields.references:
             raise RefusedError("properties of a tile layer cannot refer to objects")
-        return [kind(**values) for kind, values in fields.of.items()]
+        return self.bodies._components(fields)
 
     # -- bodies ----------------------------------------------------------------------------------------
 

@@ -107,6 +107,19 @@ def test_layers_give_their_objects_classes_and_fields(tmp_path, world):
     assert [*level.layers] == ["ground", "sky", "plain", "things"]
 
 
+def test_one_velocity_changes_the_other_in_nothing(tmp_path, world):
+    fast = Prefab(RigidBody(linear_velocity=(1, 7)), SphereCollider(0.3))
+    drawn = [
+        thing(1, 0, 0, kind="fast", point=True, properties={"velocity_x": 5.0}),
+        thing(2, 0, 0, 8, 8, properties={"linear_velocity": "1, 7", "velocity_y": 5}),
+        thing(3, 0, 0, 8, 8, properties={"velocity_y": 2.0, "velocity_x": 3.0}),
+    ]  # fmt: skip
+    path = write(tmp_path / "map.tmx", map_of(2, 2, objects_of(*drawn)))
+    level = maps.load(path, world, prefabs={"fast": fast})
+    found = [world.component_for_entity(level.object(k).entity, RigidBody).linear_velocity for k in (1, 2, 3)]
+    assert [each.tolist() for each in found] == [[5, 7], [1, 5], [3, 2]]
+
+
 @FORMATS
 def test_references_are_entities_whatever_the_order(suffix, tmp_path, world):
     """Forwards, backwards, in a circle, of itself; to a point a vector field gets its place."""
@@ -167,10 +180,14 @@ def test_paths_follow_their_lines(tmp_path, world):
         thing(1, 0, 0, 16, 8, properties={"path": Ref(2), "speed": 3.0}), thing(2, 40, 40, polyline=((0, 0), (32, 0))),
         thing(3, 0, 0, 16, 8, properties={"path": Ref(4), "speed": 1.0, "ease": True, "travelled": 1.5}),
         thing(4, 16, 16, rotation=90, polygon=((0, 0), (16, 0), (16, 16))),
+        thing(5, 0, 0, 16, 8, kind="lift", properties={"Path.speed": 2.0}),
     ]  # fmt: skip
-    level = load(write(tmp_path / "map.tmx", map_of(6, 6, objects_of(*drawn))), world)
+    lift = Prefab(RigidBody(kind="kinematic"), Path(((1, 1), (1, 3)), 1.0))
+    path = write(tmp_path / "map.tmx", map_of(6, 6, objects_of(*drawn)))
+    level = maps.load(path, world, prefabs={"lift": lift})
     of = lambda k, kind: world.component_for_entity(level.object(k).entity, kind)  # noqa: E731
     assert of(1, Transform).position.tolist() == [2.5, 3.5]
+    assert (of(5, Transform).position.tolist(), of(5, Path).speed) == ([1.0, 1.0], 2.0)
     assert of(1, RigidBody).kind == "kinematic"
     np.testing.assert_allclose(of(3, Path).points, ((1, 5), (1, 4), (0, 4)), atol=1e-12)
     assert of(3, Path).mode == "loop"

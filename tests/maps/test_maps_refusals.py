@@ -75,6 +75,7 @@ BROKEN = {
         ["tileset 'basic', tile 0, property 'friktion'", "did you mean 'friction'?"],
     ),
     "tile's class": (good(tilesets=[tileset(tile(0, "Solidd"))]), ["tile 0, class 'Solidd'", "did you mean 'Solid'?"]),
+    "layer's component": (with_layer(**{"class": "Timer"}), ["layer 'ground': Timer needs a value for 'seconds'"]),
     "layer's class": (with_layer(**{"class": "Lavva"}), ["layer 'ground', class 'Lavva'"]),
     # of objects
     "unknown class": (with_object(kind="Coim"), [f"{IT}, class 'Coim': it is no component", "did you mean 'Coin'?"]),
@@ -102,6 +103,12 @@ BROKEN = {
     "negative field": (with_object(kind="Enemy", properties={"health": -1.0}), ["Enemy.health must be at least 0"]),
     "a kind": (with_object(properties={"kind": "dynamik"}), [f"{IT}, property 'kind'", "dynamic, kinematic, static"]),
     "no vector": (with_object(properties={"linear_velocity": "fast"}), [f"{IT}, property 'linear_velocity'", "'0, 1'"]),
+    "velocity of nan": (
+        with_object(properties={"velocity_x": float("nan")}),
+        [f"{IT}, property 'velocity_x': RigidBody.linear_velocity must be finite"],
+    ),
+    "too fast": (with_object(properties={"velocity_y": 1e308}), [f"{IT}, property 'velocity_y'", "at most 1e+307"]),
+    "velocity of text": (with_object(properties={"velocity_x": "3"}), [f"{IT}, property 'velocity_x'", "be numbers"]),
     "three numbers": (with_object(properties={"linear_velocity": "1, 2, 3"}), [f"{IT}", "must have 2 components"]),
     "unknown layer": (
         with_object(properties={"layer": "coins"}),
@@ -153,6 +160,16 @@ BROKEN = {
     "a path without speed": (
         {**good(), "layers": [objects_of(thing(7, 0, 0, 5, 5, name="it", properties={"path": Ref(8)}), LINE)]},
         [f"{IT}: its path needs a speed"],
+    ),
+    "a Path without points": (with_object(properties={"Path.speed": 2.0}), [f"{IT}: its Path needs points: property"]),
+    "a path that is not set": (
+        with_object(properties={"path": Ref(0), "Path.speed": 2.0}),
+        [f"{IT}: its Path needs points"],
+    ),
+    "class Path": (with_object(kind="Path", properties={"speed": 2.0}), [f"{IT}: its Path needs points"]),
+    "a Path of a tile": (
+        good(tilesets=[tileset(tile(0, "", **{"Path.mode": "loop"}))]),
+        ["layer 'ground', tileset 'basic', tile 0: its Path needs points"],
     ),
     "a path of itself": (
         with_object(polygon=U, properties={"path": Ref(7), "speed": 1.0}),
