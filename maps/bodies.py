@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,11 @@ from ..components import Collider, RigidBody, Transform
 from ..components.spin import Spin
 from ..plugins.character import Character
 from ..plugins.parts import parts_from_outline
-from ..plugins.parts.outline import sound_corners
 from ..plugins.paths import MODES, Legs, Path
 from .contents import LevelLayer, LevelObject, LevelSprite
 from .errors import RefusedError
 from .fields import Fields, Sorter, checked
-from .formats.model import MapLayer, MapObject
+from .formats.model import MapLayer, MapObject, Tile
 from .formats.reading import Property
 from .plan import Chain, Late, Planned, transform
 from .shapes import Shape, collider_of, is_convex, shape_of, tile_shapes, turned
@@ -127,10 +127,19 @@ class Bodies:
         if not (size[0] > 0.0 and size[1] > 0.0):
             raise RefusedError(f"a tile of {thing.size[0]:g} x {thing.size[1]:g} pixels")
         lower = np.array((-thing.origin[0] * size[0], (thing.origin[1] - 1.0) * size[1]))
-        found = tile_shapes(thing.tile.shapes, thing.tile.size, thing.flips, size)
+        found = self.tile_shapes(thing.tile, thing.flips, size)
         if not found:
             found = [Shape("box", np.array(((0, 0), (1, 0), (1, 1), (0, 1)), float) * size)]
         return [shape.moved(lambda points: points + lower) for shape in found]
+
+    def tile_shapes(self, tile: Tile, flips: int, size: tuple[float, float]) -> list[Shape]:
+        """Those of the collision editor, flipped and stretched to ``size`` m; from its lower left corner."""
+        for each in tile.shapes:
+            with self.sorter.findings.at(f"shape {each.id}"):
+                said = self.sorter.sort(each.kinds, each.properties)
+                if replace(said, kinds=[], words={}) != Fields() or said.words.keys() - {"shape"}:
+                    raise RefusedError("a shape of a tile can say 'shape' alone; the rest is for the tile to say")
+        return tile_shapes(tile.shapes, tile.size, flips, size)
 
     def _body(self, made: Planned, thing: MapObject, layer: MapLayer, fields: Fields, shapes: list[Shape]) -> None:
         if tuple(layer.parallax) != (1.0, 1.0):
@@ -149,7 +158,7 @@ class Bodies:
             made.bodies.insert(0, [transform(place, rotation), *self._components(fields), *own])
         else:
             made.beside = self._components(fields)
-            centre, rotation = self._static(made, shapes, fields, angle, origin), angle
+            centre, rotation = self.static(made, shapes, fields, angle, origin), angle
         if thing.tile is not None:
             made.sprite = self._sprite(thing, layer, 0, centre, rotation)
 
@@ -231,7 +240,7 @@ class Bodies:
             fields.of.setdefault(RigidBody, {})["mass"] = mass * pieces[0].area / total
         return middle, [first], angle + own
 
-    def _static(
+    def static(
         self, made: Planned, shapes: list[Shape], fields: Fields, angle: float, origin: np.ndarray
     ) -> np.ndarray:
         """Plans what does not move, an entity for each shape; the centre of the first one, from the object's place."""
@@ -244,9 +253,8 @@ class Bodies:
             if shape.kind == "line":
                 made.chains.append(Chain(placed.points, False, thickness, own_sides, one_way))
             elif shape.kind == "polygon" and (hollow or not (sensor or is_convex(shape.points))):
-                _refuse_crossing(shape.points)
                 outline = placed.points if hollow else placed.points[::-1]
-                made.chains.append(Chain(outline, True, thickness, own_sides, one_way))
+                made.chains.append(Chain(outline, True, thickness, material))
             else:
                 for piece in _convex(shape):
                     turns = bool(angle % (0.5 * math.pi)) or fields.words.get("shape") == "box"
@@ -309,13 +317,6 @@ def _convex(shape: Shape) -> list[Shape]:
     except (ValueError, ImportError) as error:
         raise RefusedError(f"the polygon is not convex: {error}") from error
     return [Shape("polygon", outline.centre + piece.position + piece.vertices) for piece in outline.pieces]
-
-
-def _refuse_crossing(corners: np.ndarray) -> None:
-    try:
-        sound_corners(corners)
-    except ValueError as error:
-        raise RefusedError(str(error)) from error
 
 
 def _plain(given: Property) -> Any:

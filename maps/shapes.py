@@ -11,6 +11,7 @@ import numpy as np
 from ..components import AABBCollider, Collider, SphereCollider
 from ..plugins.capsule import CapsuleCollider
 from ..plugins.convex_polygon import ConvexPolygonCollider
+from ..plugins.parts.outline import sound_corners
 from ..plugins.rotation import BoxCollider
 from .errors import RefusedError
 from .formats.model import DIAGONAL, HORIZONTAL, VERTICAL, MapObject
@@ -110,7 +111,11 @@ def _corners(points: np.ndarray) -> np.ndarray:
     before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
     size = np.hypot(*before.T) * np.hypot(*after.T)
     points = points[np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]) > STRAIGHT * size]
-    return points if signed_area(points) > 0.0 else points[::-1].copy()
+    points = points if signed_area(points) > 0.0 else points[::-1].copy()
+    try:
+        return points if is_convex(points) else sound_corners(points)
+    except ValueError as error:
+        raise RefusedError(str(error)) from error
 
 
 def is_convex(corners: np.ndarray) -> bool:
@@ -161,6 +166,8 @@ def tile_shapes(
         points = placed(thing.place + turned(shape.points, angle) * (1.0, -1.0))
         if shape.kind == "polygon":
             points = _corners(points)
+        elif shape.kind == "line" and flips.bit_count() % 2:
+            points = points[::-1]  # else a mirror would turn its solid side
         made.append(Shape(shape.kind, points, shape.radius * stretch[0]))
     return made
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,8 +13,8 @@ from .contents import LevelLayer, Tiles
 from .errors import Findings, RefusedError
 from .fields import ONE_WAY, Fields
 from .formats.model import DIAGONAL, MapData, MapLayer, MapObject, Tile
-from .plan import Chain, Planned, transform
-from .shapes import Shape, collider_of, is_convex, tile_shapes
+from .plan import Planned, transform
+from .shapes import Shape
 
 DIGITS = 6  # of a tile: corners that are nearer to those of a shape of the grid are these
 CORNERS = {frozenset(shape.corners): shape for shape in TileShape if shape.corners}  # in tiles
@@ -185,14 +185,7 @@ class TileLayers:
             for row, column in np.argwhere(cells).tolist():
                 corner = lower + self.corner(row, column)
                 planned = Planned(f"{place}, {meaning.tile.where}", out, [])
-                for shape in shapes:
-                    if shape.kind == "line":
-                        planned.chains.append(Chain(corner + shape.points, False, 0.0, material))
-                    elif shape.kind == "polygon" and not is_convex(shape.points):
-                        planned.chains.append(Chain(corner + shape.points[::-1], True, 0.0, material))
-                    else:
-                        collider, centre, angle = collider_of(shape, material, False)
-                        planned.bodies.append([transform(corner + centre, angle), collider])
+                self.bodies.static(planned, shapes, replace(meaning.fields, material=material), 0.0, corner)
                 made.append(planned)
         return made
 
@@ -200,7 +193,7 @@ class TileLayers:
         """Of a tile as it lies in a cell, from the cell's lower left corner, m."""
         width, height = tile.size[::-1] if flips & DIAGONAL else tile.size
         aside = np.array((tile.offset[0], -tile.offset[1])) * self.scale
-        found = tile_shapes(tile.shapes, tile.size, flips, (width * self.scale, height * self.scale))
+        found = self.bodies.tile_shapes(tile, flips, (width * self.scale, height * self.scale))
         return [shape.moved(lambda points: points + aside) for shape in found]
 
     def _named(self, shape: Shape) -> TileShape | None:

@@ -75,6 +75,22 @@ BROKEN = {
         ["tileset 'basic', tile 0, property 'friktion'", "did you mean 'friction'?"],
     ),
     "tile's class": (good(tilesets=[tileset(tile(0, "Solidd"))]), ["tile 0, class 'Solidd'", "did you mean 'Solid'?"]),
+    "crossing tile": (
+        good(tilesets=[tileset(tile(0, "", thing(1, 0, 0, polygon=((0, 0), (16, 16), (16, 0), (0, 12)))))]),
+        ["layer 'ground', tileset 'basic', tile 0: the outline crosses"],
+    ),
+    "a tile's shape": (
+        good(tilesets=[tileset(tile(0, "", thing(3, 0, 8, 16, 8, properties={"shape": "blob"})))]),
+        ["tile 0, shape 3, property 'shape': it must be one of box, capsule"],
+    ),
+    "property of a tile's shape": (
+        good(tilesets=[tileset(tile(0, "", thing(3, 0, 8, 16, 8, properties={"friction": 0.5})))]),
+        ["tile 0, shape 3: a shape of a tile can say 'shape' alone"],
+    ),
+    "class of a tile's shape": (
+        good(tilesets=[tileset(tile(0, "", thing(3, 0, 8, 16, 8, kind="Solidd")))]),
+        ["tile 0, shape 3, class 'Solidd'", "did you mean 'Solid'?"],
+    ),
     "layer's component": (with_layer(**{"class": "Timer"}), ["layer 'ground': Timer needs a value for 'seconds'"]),
     "layer's class": (with_layer(**{"class": "Lavva"}), ["layer 'ground', class 'Lavva'"]),
     # of objects

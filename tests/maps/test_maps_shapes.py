@@ -60,6 +60,46 @@ def test_lines_are_solid_on_their_right_and_rings_inside(tmp_path, world):
     assert heights[4] < 3
 
 
+def test_lines_of_tiles_keep_their_solid_side(tmp_path, world):
+    """In a tile that is flipped what was below the line is on the same side of it."""
+    cells = 1 | np.arange(8)[None] << 29
+    tiles = tileset(tile(0, "", thing(1, 0, 0, polyline=((0, 16), (16, 8)))))
+    level = maps.load(write(tmp_path / "map.tmx", map_of(8, 1, tiles_of(cells), tilesets=[tiles])), world)
+    for k, entity in enumerate(level.layers["ground"].entities):
+        x, y = (14, 12) if k & 1 else (12, 14)  # pixels, below the line; the diagonal comes first
+        x, y = 16 - x if k & 4 else x, 16 - y if k & 2 else y
+        segment = world.component_for_entity(entity, ChainSegmentCollider)
+        start = world.component_for_entity(entity, Transform).position + segment.start
+        (a, b), (c, d) = segment.end - segment.start, np.array((k + x / 16, 1 - y / 16)) - start
+        assert a * d - b * c < 0.0  # on its right
+
+
+@pytest.mark.parametrize("what", ["sensor", "one_way"])
+def test_concave_polygons_are_the_same_in_tiles_and_as_objects(what, tmp_path, world):
+    """A sensor sees what is in its middle; what is one-way holds from above and lets through from below."""
+    pytest.importorskip("mapbox_earcut")
+    shape = ((0, 0), (4, 8), (12, 8), (16, 0), (16, 16), (0, 16))
+    cells = np.zeros((8, 8), int)
+    cells[4, 1] = 1
+    tiles = tileset(tile(0, "", thing(1, 0, 0, polygon=shape), **{what: True}))
+    drawn = thing(1, 48, 80, 16, 16, gid=1), thing(2, 80, 64, polygon=shape, properties={what: True})
+    whole = map_of(8, 8, tiles_of(cells), objects_of(*drawn), tilesets=[tiles])
+    maps.load(write(tmp_path / "map.tmx", whole), world)
+    balls = [
+        world.create_entity(Transform((x + aside, y)), RigidBody(linear_velocity=(0, v)), SphereCollider(0.1))
+        for x in (1.5, 3.5, 5.5)
+        for aside, y, v in ([(0, 3.2, 0)] if what == "sensor" else [(0.12, 4.5, 0), (-0.12, 2, 7)])
+    ]
+    if what == "sensor":
+        world.step()
+        assert {contact.entity_b for contact in world.contacts} == {*balls}
+        return
+    for _ in range(150):
+        world.step()
+    heights = [world.component_for_entity(each, Transform).y for each in balls]
+    np.testing.assert_allclose(heights, 3.6, atol=0.01)
+
+
 def test_concave_bodies_are_parts_with_the_mass_of_the_whole(tmp_path, world):
     pytest.importorskip("mapbox_earcut")
     shape = ((0, 0), (32, 0), (32, 16), (16, 16), (16, 48), (0, 48))
