@@ -164,11 +164,15 @@ class Sorter:
             found.of = {kind: dict(values) for kind, values in base.of.items()}
             found.material, found.words = dict(base.material), dict(base.words)
             found.references, found.prefabs = list(base.references), list(base.prefabs)
-            found.kinds, found.marks = list(base.kinds), set(base.marks)
+            found.kinds = list(base.kinds)
         for name in (each.strip() for each in kinds.split(",")):
             if name:
                 with self.findings.at(f"class {name!r}"):
                     self._class(name, found)
+        if found.marks:
+            found.words.pop("solid", None)  # that of its layer
+        elif base is not None:
+            found.marks = set(base.marks)
         for name, given in sorted(properties.items(), key=lambda item: item[0] != "path"):  # its words need it
             with self.findings.at(f"property {name!r}"):
                 self._property(name, given, found)
@@ -179,12 +183,14 @@ class Sorter:
         if name in (SOLID, ONE_WAY, DECORATION):
             found.marks.add(name)
             return
+        if name in found.kinds:  # its layer is one too
+            return
         found.kinds.append(name)
         if name in known.prefabs:
             found.prefabs.append((name, known.prefabs[name]))
         elif name in known.materials:
             found.kinds.remove(name)
-            found.words.setdefault("solid", known.materials[name] is not None)
+            found.words["solid"] = known.materials[name] is not None
             found.material.update(known.materials[name] or {})
         elif (component := known.component(name)) is not None:
             if issubclass(component, Collider):

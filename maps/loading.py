@@ -16,7 +16,7 @@ from ..systems.shapes.geometry_levels import in_order
 from .bodies import Bodies
 from .contents import LevelLayer
 from .errors import Finding, Findings, MapError, RefusedError
-from .fields import Sorter, Vocabulary
+from .fields import Fields, Sorter, Vocabulary
 from .formats.ldtk import is_ldtk, level_names, read_ldtk
 from .formats.model import MapData, MapLayer, MapObject
 from .formats.reading import Property, document
@@ -145,8 +145,12 @@ class Plan:
         bodies.sorter = Sorter(known, findings, bodies.points_of, bodies.place_of, bodies.to_world)
         tiles = TileLayers(data, metres, bodies, findings)
         for layer in data.layers:
+            base = Fields()
+            for each in (*layer.groups, layer):
+                with findings.at(f"layer {each.name!r}"):
+                    base = bodies.sorter.sort(each.kinds, each.properties, base)
             with findings.at(f"layer {layer.name!r}"):
-                self._layer(layer, bodies, tiles, scale)
+                self._layer(layer, base, bodies, tiles, scale)
         self._check_references(objects)
         self._check_world()
 
@@ -169,12 +173,14 @@ class Plan:
             raise MapError(findings.found) from error
         return cls(file, data, findings, known, metres)
 
-    def _layer(self, layer: MapLayer, bodies: Bodies, tiles: TileLayers, scale: float) -> None:
-        base = bodies.sorter.sort(layer.kinds, layer.properties)
+    def _layer(self, layer: MapLayer, base: Fields, bodies: Bodies, tiles: TileLayers, scale: float) -> None:
         x, y = layer.offset
+        whole = *layer.groups, layer
         out = LevelLayer(
-            layer.name, layer.kind, tuple(each.strip() for each in layer.kinds.split(",") if each.strip()),
-            _plain(layer.properties), (x * scale, -y * scale), layer.parallax, layer.opacity, layer.visible, layer.tint,
+            layer.name, layer.kind,
+            tuple(kind.strip() for each in whole for kind in each.kinds.split(",") if kind.strip()),
+            {name: value for each in whole for name, value in _plain(each.properties).items()},
+            (x * scale, -y * scale), layer.parallax, layer.opacity, layer.visible, layer.tint,
             picture=layer.picture, repeat=layer.repeat,
         )  # fmt: skip
         self.level.layers[_free(layer.name, self.level.layers)] = out

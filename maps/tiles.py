@@ -135,6 +135,7 @@ class TileLayers:
                 solid = fields.is_solid
                 if solid is None:
                     solid = bool(base.is_solid or tile.shapes)
+                fields.marks = fields.marks or base.marks
                 if solid or is_entity:
                     found[gid] = Meaning(tile, fields, solid, is_entity)
         return found

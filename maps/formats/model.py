@@ -71,6 +71,7 @@ class Tile:
 class MapLayer:
     """A layer with what its groups give it: offset (x, y) pixels, parallax, opacity, visible, tint.
 
+    groups: in which it is, the outermost first: they have classes and properties too
     kind: tiles, objects or image
     cells: (rows, columns) of tiles, whole numbers: which of the map's tiles, 0 none
     flips: (rows, columns), bits of the flips
@@ -92,6 +93,7 @@ class MapLayer:
     picture: int = -1
     repeat: tuple[bool, bool] = (False, False)
     painted: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+    groups: tuple[MapLayer, ...] = ()
 
 
 @dataclass

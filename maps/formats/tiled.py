@@ -134,7 +134,7 @@ class Reader:
                 visible, tint = visible and group.visible, tint or group.tint
             layer = MapLayer(
                 word(node, "name"), "", kinds, properties(node), tuple(offset.tolist()), tuple(parallax.tolist()),
-                opacity, visible, tint,
+                opacity, visible, tint, groups=() if group is None else (*group.groups, group),
             )  # fmt: skip
             kind = node.get("type")
             if kind == "group":

@@ -107,6 +107,50 @@ def test_layers_give_their_objects_classes_and_fields(tmp_path, world):
     assert [*level.layers] == ["ground", "sky", "plain", "things"]
 
 
+def test_groups_give_their_layers_classes_and_fields(tmp_path, world):
+    """Their own come first: fields, and whether there are bodies."""
+    ones = np.ones((2, 2), int)
+
+    def group(name, *layers, **fields):
+        return {"type": "group", "name": name, "layers": [*layers], **fields,
+                "properties": properties(fields.pop("properties", {}))}  # fmt: skip
+
+    things = objects_of(thing(1, 0, 0, 8, 8), thing(2, 0, 0, 8, 8, kind="Enemy", properties={"health": 7.0}),
+                        properties={"sensor": True})  # fmt: skip
+    inner = group("inner", things, properties={"health": 2.0, "_note": "inner"})
+    enemies = group("enemies", inner, properties={"health": 1.0, "speed": 4.0}, **{"class": "Enemy"})
+    own = tiles_of(ones, "own", **{"class": "Solid"})
+    sky = group("sky", tiles_of(ones, "clouds"), own, **{"class": "Decoration"})
+    bare = group("bare", tiles_of(ones + 1, "walls"), tiles_of(ones + 1, "none", **{"class": "Decoration"}),
+                 tiles_of(ones + 2, "air"), tiles_of(ones + 1, "steps", **{"class": "OneWay"}),
+                 properties={"solid": True, "friction": 0.25})  # fmt: skip
+    tiles = tileset(tile(0, "Solid"), tile(2, "Air"))
+    path = write(tmp_path / "map.tmx", map_of(2, 2, enemies, sky, bare, tilesets=[tiles]))
+    level = load(path, world, materials={"Air": None})
+    enemies = [world.component_for_entity(level.object(k).entity, Enemy) for k in (1, 2)]
+    assert [(each.health, each.speed) for each in enemies] == [(2.0, 4.0), (7.0, 4.0)]
+    assert level.of_class["Enemy"] == [level.object(k).entity for k in (1, 2)]
+    assert world.component_for_entity(level.object(1).entity, AABBCollider).sensor
+    shown = level.layers["things"]
+    assert shown.kinds == ("Enemy",)
+    assert shown.properties == {"health": 2.0, "speed": 4.0, "_note": "inner", "sensor": True}
+    grids = {name: [world.component_for_entity(each, TileGridCollider) for each in layer.entities]
+             for name, layer in level.layers.items() if name != "things"}  # fmt: skip
+    faces = {name: [each.faces for each in found] for name, found in grids.items()}
+    both = ["floors", "walls"]
+    assert faces == {"clouds": [], "own": both, "walls": both, "none": [], "air": [], "steps": ["one_way"]}
+    assert grids["walls"][0].friction == 0.25
+
+
+def test_a_class_of_a_tile_object_replaces_that_of_its_tile(tmp_path, world):
+    drawn = [thing(k, 0, 16, 16, 16, gid=1, kind=kind) for k, kind in enumerate(("", "Coin"), 1)]
+    tiles = tileset(tile(0, "Enemy"))
+    level = load(write(tmp_path / "map.tmx", map_of(2, 2, objects_of(*drawn), tilesets=[tiles])), world)
+    assert {k: level.object(k).kinds for k in (1, 2)} == {1: ("Enemy",), 2: ("Coin",)}
+    assert dict(level.of_class) == {"Enemy": [level.object(1).entity], "Coin": [level.object(2).entity]}
+    assert not world.has_component(level.object(2).entity, Enemy)
+
+
 def test_one_velocity_changes_the_other_in_nothing(tmp_path, world):
     fast = Prefab(RigidBody(linear_velocity=(1, 7)), SphereCollider(0.3))
     drawn = [

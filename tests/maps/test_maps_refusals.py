@@ -75,6 +75,11 @@ BROKEN = {
         ["tileset 'basic', tile 0, property 'friktion'", "did you mean 'friction'?"],
     ),
     "tile's class": (good(tilesets=[tileset(tile(0, "Solidd"))]), ["tile 0, class 'Solidd'", "did you mean 'Solid'?"]),
+    "group's class": (
+        map_of(6, 4, {"type": "group", "name": "all", "class": "Lavva", "layers": [tiles_of(CELLS)]}),
+        ["layer 'all', class 'Lavva'"],
+    ),
+    "layer's component": (with_layer(**{"class": "Timer"}), ["layer 'ground': Timer needs a value for 'seconds'"]),
     "crossing tile": (
         good(tilesets=[tileset(tile(0, "", thing(1, 0, 0, polygon=((0, 0), (16, 16), (16, 0), (0, 12)))))]),
         ["layer 'ground', tileset 'basic', tile 0: the outline crosses"],
@@ -91,7 +96,6 @@ BROKEN = {
         good(tilesets=[tileset(tile(0, "", thing(3, 0, 8, 16, 8, kind="Solidd")))]),
         ["tile 0, shape 3, class 'Solidd'", "did you mean 'Solid'?"],
     ),
-    "layer's component": (with_layer(**{"class": "Timer"}), ["layer 'ground': Timer needs a value for 'seconds'"]),
     "layer's class": (with_layer(**{"class": "Lavva"}), ["layer 'ground', class 'Lavva'"]),
     # of objects
     "unknown class": (with_object(kind="Coim"), [f"{IT}, class 'Coim': it is no component", "did you mean 'Coin'?"]),
