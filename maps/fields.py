@@ -330,7 +330,7 @@ def checked(column: Column, value: Any) -> Any:
         except ValueError as error:
             raise RefusedError(f"it must be numbers as '0, 1', got {value!r}") from error
     try:
-        column.checked(value)
+        column.check_dimensions(column.checked(value), 2)
     except (ValueError, TypeError) as error:
         hint = ""
         if isinstance(value, str) and not column.choices and column.item == "scalar":

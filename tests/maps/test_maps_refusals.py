@@ -129,7 +129,14 @@ BROKEN = {
     ),
     "too fast": (with_object(properties={"velocity_y": 1e308}), [f"{IT}, property 'velocity_y'", "at most 1e+307"]),
     "velocity of text": (with_object(properties={"velocity_x": "3"}), [f"{IT}, property 'velocity_x'", "be numbers"]),
-    "three numbers": (with_object(properties={"linear_velocity": "1, 2, 3"}), [f"{IT}", "must have 2 components"]),
+    "three numbers": (
+        with_object(properties={"linear_velocity": "1, 2, 3"}),
+        [f"{IT}, property 'linear_velocity': RigidBody.linear_velocity must have 2 components"],
+    ),
+    "a tile's three numbers": (
+        good(tilesets=[tileset(tile(0, "Solid", surface_velocity="1, 2, 3"))]),
+        ["tile 0, property 'surface_velocity'", "must have 2 components"],
+    ),
     "unknown layer": (
         with_object(properties={"layer": "coins"}),
         [f"{IT}, property 'layer': no layer is named 'coins'"],
