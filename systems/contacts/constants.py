@@ -28,7 +28,6 @@ MOST_REPEATS = 1024  # substeps of an island, beyond which the heaviest count as
 # passes over rows that are not solved and islands that have gained energy, or until hard islands agree;
 ISLAND_WORK = 20_000  # rows at most in all of these, and in all substeps of an island, if they are more than usual
 FINER_PASSES = 32  # an island for which that is more passes is solved as much better
-SWEEPS_PER_LOOK = 4  # between two looks at which rows these are: so many whatever its size
 STRUCK_EXCESS = 0.01  # extents per step: an island with a row whose speed is wrong by more is solved further, what
 # closes slower strikes nothing, and a fault tells where contacts would have made an island faster by more
 

@@ -262,13 +262,16 @@ def relax_open(solver):
 
 @part
 def add_joints(solver):
-    """What the joints of a range have done in a substep."""
+    """What the joints of a range have done in a substep. What is solved at once and torn open begins the next one
+    without: its rows may press against each other, as they would not where bodies are then, nor if passes come next."""
     joints, order, impulse, push = solver.joints, solver.joints.order, solver.joints.impulse, solver.joints.push
-    total, thrust = joints.total, joints.thrust
+    total, thrust, shares = joints.total, joints.thrust, solver.direct.share
     for e in range(joints.begin, joints.end):
         j = order[e]
         total[j] += impulse[j]
         thrust[j] = add(thrust[j], push[j])
+        if joints.at_once[j] != BY_PASSES and shares[joints.group[j]] < 1.0:
+            impulse[j], push[j] = 0.0, scale(push[j], 0.0)
 
 
 @inlined

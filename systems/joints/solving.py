@@ -69,17 +69,6 @@ def sum_joint_work(solver, work):
     return work
 
 
-@part
-def fade_joints(solver):
-    """Joints of islands that the guard has restrained begin the next substep with as much less."""
-    joints = solver.joints
-    for e in range(joints.begin, joints.end):
-        j = joints.order[e]
-        kept = solver.share[island_of_joint(solver, j)]
-        if kept < 1.0:
-            joints.impulse[j], joints.push[j] = kept * joints.impulse[j], scale(joints.push[j], kept)
-
-
 @packed
 def solve_joined_range(solver, what, numbers, span):
     """Whatever calls asks of the joints of a range."""
@@ -111,6 +100,4 @@ def solve_joined_range(solver, what, numbers, span):
         add_joint_work(solver)
     elif what == calls.SUM_WORK:
         return sum_joint_work(solver, h)
-    elif what == calls.FADE:
-        fade_joints(solver)
     return h

@@ -11,11 +11,11 @@ import pytest
 from carom import scenes
 
 HASHES = {
-    "pile2d": ({"n": 40}, "db9b1fa37750d253586190e5ecd27710ec7762a7ba553529d2497c98fd04f62e"),
-    "pile3d": ({"n": 27}, "9ad266244af78d058c9aa2d952f57397bda578cb94a123711b905e59024ddbbe"),
+    "pile2d": ({"n": 40}, "cd7509a1e0ebf3e8dd650f971ed439fba1a9b4cd4e1653bde781d6d0e52ec160"),
+    "pile3d": ({"n": 27}, "209d2ed3b3a57a71d14a8cbbb6a538736b091f19cab922dc3fa4766712647a2b"),
     "tumbler": ({"n": 12}, "0c1980139e89fde1c589cce28d44e01f52c316eeab435314c4e599fccb103c62"),
-    "bridge": ({"n": 8, "crates": 2}, "7b974753b6372f34ce8be2475462266e7713eb3a797772518304388d06facc04"),
-    "ragdoll": ({"n": 1}, "a9e9c205ab054056285aac4404ad19f7c768d7097e3e4ea4eb5933623dfbbcda"),
+    "bridge": ({"n": 8, "crates": 2}, "3bbdbc989a745f5000ceb692967d1f8ecab7b283a805ba952c2a92361a33e3a6"),
+    "ragdoll": ({"n": 1}, "72b6f74d1b488d07880bc6b6263df96570b0936e178aa2cc37630a937483eb8a"),
 }
 STEPS = 60
 

@@ -22,7 +22,6 @@ from ..constants import (
     GAIN_WEIGHT,
     ISLAND_WORK,
     STRUCK_EXCESS,
-    SWEEPS_PER_LOOK,
 )  # fmt: skip
 from .chunks import relax_pairs
 from .passes import most_repeats
@@ -209,8 +208,6 @@ def limit_energy(solver, span, arms, islands):
             if len(arms) > 0:
                 turned = sub(solver.spin[q], solver.spin_before[q])
                 solver.spin[q] = add_scaled(solver.spin_before[q], turned, share[t])
-    if any_gain:
-        for_joints(solver, calls.FADE, NO_NUMBERS, span, arms)
     for k in range(start, stop if any_gain else start):
         kept = share[island_of(solver, k)]
         if kept < 1.0:
@@ -243,14 +240,13 @@ def finish_substep(solver, bias_rate, any_struck, h, dt, span, arms):
     energy_budget(solver, bias_rate, h, dt, span, arms, islands)
     turn, count = 0, find_unsolved_rows(solver, 0, any_struck, dt, span, arms, islands)
     while count > 0:
-        for _ in range(SWEEPS_PER_LOOK):
-            for_joints(solver, calls.RELAX_OPEN, NO_NUMBERS, span, arms)
-            if len(arms) > 0 and not solver.surfaces_run:
-                relax_pairs(solver, count, span)
-            else:
-                relax_listed(solver, count, arms)
+        for_joints(solver, calls.RELAX_OPEN, NO_NUMBERS, span, arms)
+        if len(arms) > 0 and not solver.surfaces_run:
+            relax_pairs(solver, count, span)
+        else:
+            relax_listed(solver, count, arms)
         measure_energy(solver, span, arms, islands)
-        turn += SWEEPS_PER_LOOK
+        turn += 1
         count = find_unsolved_rows(solver, turn, any_struck, dt, span, arms, islands)
     limit_energy(solver, span, arms, islands)
     carry_budget(solver, islands)

@@ -1,0 +1,85 @@
+"""Bodies that several joints hold together, put where these cannot be: no joint bears more than what pulls them back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from joints.helpers_joints import joint_world
+from worlds import run
+
+from carom import RigidBody, Transform
+from carom.plugins.joints import Ball, Distance, Hinge
+from carom.plugins.rotation import BoxCollider, Spin
+
+SEEDS, STEPS = range(6), 60
+
+
+def box(world, d, place, mass):
+    half = (0.5, 0.1, 0.2)[:d]
+    return world.create_entity(Transform(place), RigidBody(mass=mass), Spin(), BoxCollider(half))
+
+
+def pinned(d, seed, **motor):
+    """(world, joints, the generator, two boxes that three pins hold together in free fall, a third box)."""
+    random, (world, joints) = np.random.default_rng(seed), joint_world((0, -9.81, 0)[:d], d)
+    boxes = [box(world, d, place[:d], mass) for place, mass in (((0, 0, 0), 2), ((0.6, 0.1, 0), 1), ((3, 1, 0), 1))]
+    for anchor in random.uniform((0.1, -0.1, -0.1)[:d], (0.5, 0.2, 0.1)[:d], (3, d)):
+        world.create_entity(Hinge(*boxes[:2], anchor=anchor, **motor) if d == 2 else Ball(*boxes[:2], anchor=anchor))
+    run(world, 3)
+    return world, joints, random, boxes
+
+
+def put_aside(world, random, body):
+    """By up to a metre along each axis, and turned a little."""
+    place = world.component_for_entity(body, Transform)
+    place.position = place.position + random.uniform(-1, 1, len(place.position))
+
+
+def fastest(world):
+    return np.linalg.norm(world.bodies.linear_velocity, axis=1).max()
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_pins_that_are_torn_open_alike_bear_nothing(d, seed):
+    """They fall freely: their momentum grows by the weight, no pin has more of an impulse than brings 1 kg to a few m/s,
+    and in the end they are together as they were."""
+    world, joints, random, (one, two, _) = pinned(d, seed)
+    apart = world.component_for_entity(two, Transform).position - world.component_for_entity(one, Transform).position
+    put_aside(world, random, two)
+    bodies, most = world.bodies, 0.0
+    for _ in range(STEPS):
+        before = bodies.mass @ bodies.linear_velocity
+        world.step()
+        gained = bodies.mass @ bodies.linear_velocity - before
+        assert np.allclose(gained, np.array((0, -9.81, 0)[:d]) * bodies.mass.sum() / 60, atol=1e-9)
+        most = max(most, abs(joints.columns()["impulse"]).max())
+    assert most < 10.0
+    now = world.component_for_entity(two, Transform).position - world.component_for_entity(one, Transform).position
+    assert np.linalg.norm(now) == pytest.approx(np.linalg.norm(apart), abs=1e-3)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_another_joint_of_what_is_torn_open_throws_nothing(seed):
+    """A rope joins it to what was free, and passes solve what was solved at once. Motors of 1 N m turn the pins."""
+    world, _, random, (_, two, three) = pinned(2, seed, motor_speed=2.0, max_torque=1.0)
+    put_aside(world, random, two)
+    run(world, 3)
+    world.create_entity(Distance(two, three, length=(0, 2.0)))
+    for _ in range(STEPS):
+        world.step()
+        assert fastest(world) < 9.81 * world.time + 10.0
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_pins_that_contradict_each_other_throw_nothing(seed):
+    """The second box is moved and pinned again where it is then, so that its old pins cannot close, nor can the new."""
+    world, _, random, (one, two, three) = pinned(2, seed, motor_speed=2.0, max_torque=1.0)
+    for _ in range(3):
+        put_aside(world, random, two)
+        world.create_entity(Hinge(one, two, anchor=random.uniform(-1, 1, 2)))
+        run(world, 3)
+    world.create_entity(Distance(two, three, length=(0, 2.0)))
+    for _ in range(STEPS):
+        world.step()
+        assert fastest(world) < 9.81 * world.time + 60.0
