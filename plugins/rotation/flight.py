@@ -1,8 +1,12 @@
-"""How bodies turn in a step whose torques hold throughout it.
+"""How bodies turn in a step.
 
 In a plane the angle is one more coordinate, and is advanced as positions are. In space a body turns under no torque as
 Euler's equations say (see free_rotation), between two halves of what torques and damping do: of order 1, 2 or 4, as the
 integrator of the positions is.
+
+Where force systems give torques these are evaluated at each stage of the integrator, and bodies turn within the step.
+In space Verlet steps, and what composes them, push by the torques of both ends and turn freely in between; RK4 turns by
+a vector from the rotation at the start (Munthe-Kaas 1998), and its other state is the angular momentum.
 """
 
 from __future__ import annotations
@@ -13,7 +17,9 @@ from ...components.spin import UNKNOWN, inertia_about
 from ...framework.compilation import inlined, part
 from ...framework.elementary import exp
 from ...framework.jit.records.record_type import zero_of
-from ...systems.integration.stages import CUBE_ROOT_OF_2, CUBIC, LINE, phi1, phi2
+from ...framework.vectors import add_scaled, cross, length, scale
+from ...systems.integration.stages import CUBE_ROOT_OF_2, CUBIC, LINE, kick_gain, phi1, phi2, runge_kutta_weights
+from ...systems.integration.turning import quaternion_of
 from ...systems.parts.inertia import inertia_with_parts
 from ...systems.parts.rows import has_parts
 from ...systems.shapes.dispatch import second_moments
@@ -23,6 +29,7 @@ from ...systems.shapes.quaternions import product, rotate, rotation_in_space, se
 TRIPLE = 1.0 / (2.0 - CUBE_ROOT_OF_2)  # of the step: the outer two of Yoshida's three
 HEAVY = 5.0  # damping times the step: above it the middle one, which goes back in time, enlarges rounding too much
 NOT_POSITIVE = "Spin.inertia must be positive and finite"
+FAST_TURN = 0.5  # rad in a step: what turns faster in space RK4 changes the energy of more than Verlet steps do
 NO_EXTENT = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
@@ -66,9 +73,8 @@ def inertia_of(state, spin, i):
 @part
 def limited(w, most):
     """An angular velocity, shortened if it exceeds the limit; nan: none."""
-    size = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-    by = most / size if size > most else 1.0
-    return w[0] * by, w[1] * by, w[2] * by
+    size = length(w)
+    return scale(w, most / size if size > most else 1.0)
 
 
 @inlined
@@ -157,17 +163,55 @@ def principal_moments(state, spin, i):
 
 
 @part
+def by_axis(v, factors):
+    """Three numbers, each times its own factor."""
+    return v[0] * factors[0], v[1] * factors[1], v[2] * factors[2]
+
+
+@part
+def spin_now(state, spin, i):
+    """Three numbers; in a plane the first."""
+    w = spin.angular_velocity
+    if is_plane(state):
+        return w[i, 0], 0.0, 0.0
+    return w[i, 0], w[i, 1], w[i, 2]
+
+
+@part
+def put_spin(state, spin, i, w):
+    spin.angular_velocity[i, 0] = w[0]
+    if not is_plane(state):
+        spin.angular_velocity[i, 1], spin.angular_velocity[i, 2] = w[1], w[2]
+
+
+@part
+def frame_of(state, i, own):
+    """The unit quaternion of the principal axes of body i, which ``own`` turns to the body's."""
+    return product(rotation_in_space(state, i), own)
+
+
+@part
+def motion_of_spin(state, spin, i, w):
+    """(quaternion of the principal axes, angular momentum along them of a body with that spin, its moments)."""
+    moments = principal_moments(state, spin, i)
+    q = frame_of(state, i, moments[2])
+    return q, by_axis(rotate(q, w, True), moments[0]), moments
+
+
+@part
+def put_motion(state, spin, i, q, m, moments):
+    """Body i is turned so that its principal axes are those of q, and has the angular momentum m along them."""
+    _, inverse, own = moments
+    put_spin(state, spin, i, rotate(q, by_axis(m, inverse), False))
+    set_rotation(state, i, product(q, (own[0], -own[1], -own[2], -own[3])))
+
+
+@part
 def turn_in_space(state, spin, turns, i, h):
     """The rotation and the angular velocity of a dynamic body after a step."""
-    principal, inverse, own = principal_moments(state, spin, i)
-    w, speed = (
-        (spin.angular_velocity[i, 0], spin.angular_velocity[i, 1], spin.angular_velocity[i, 2]),
-        spin.angular_velocity,
-    )
-    torque, most = torques_on(state, spin, turns, i), spin.max_angular_speed[i]
-    act, q = (torque, spin.angular_damping[i]), product(rotation_in_space(state, i), own)
-    along = rotate(q, limited(w, most), True)
-    m, gained = (along[0] * principal[0], along[1] * principal[1], along[2] * principal[2]), 0.0
+    most, act, gained = spin.max_angular_speed[i], (torques_on(state, spin, turns, i), spin.angular_damping[i]), 0.0
+    q, m, moments = motion_of_spin(state, spin, i, limited(spin_now(state, spin, i), most))
+    inverse = moments[1]
     if state.usual_path_degree == CUBIC and act[1] * h <= HEAVY:
         for place in range(3):
             q, m, more = turn_between_pushes(q, m, inverse, act, h * (TRIPLE if place != 1 else 1.0 - 2.0 * TRIPLE))
@@ -181,9 +225,8 @@ def turn_in_space(state, spin, turns, i, h):
         m = pushed(q, m, inverse, act, h)
         q, m, gained = turn_freely(q, m, inverse, h)
     q, m = turn_to_energy(q, m, inverse, gained)
-    w = limited(rotate(q, (m[0] * inverse[0], m[1] * inverse[1], m[2] * inverse[2]), False), most)
-    speed[i, 0], speed[i, 1], speed[i, 2] = w[0], w[1], w[2]
-    set_rotation(state, i, product(q, (own[0], -own[1], -own[2], -own[3])))
+    put_motion(state, spin, i, q, m, moments)
+    put_spin(state, spin, i, limited(spin_now(state, spin, i), most))
 
 
 @part
@@ -193,3 +236,156 @@ def turn_alone(state, spin, turns, i, h):
         turn_in_plane(state, spin, turns, i, h)
     else:
         turn_in_space(state, spin, turns, i, h)
+
+
+# -- where torques change within the step ------------------------------------------------------------------------------
+
+
+@part
+def triple(column, i):
+    return column[i, 0], column[i, 1], column[i, 2]
+
+
+@part
+def put(column, i, v):
+    column[i, 0], column[i, 1], column[i, 2] = v
+
+
+@part
+def momentum_of(state, spin, i, w):
+    """Of a body that turns so fast, along the axes of the world."""
+    if is_plane(state):
+        return inertia_of(state, spin, i)[2] * w[0], 0.0, 0.0
+    q, m, _ = motion_of_spin(state, spin, i, w)
+    return rotate(q, m, False)
+
+
+@part
+def spin_by(state, spin, i, momentum):
+    """How fast a body turns that has such an angular momentum, as it is turned now."""
+    if is_plane(state):
+        moment = inertia_of(state, spin, i)[2]
+        return momentum[0] / moment if moment > 0.0 else 0.0, 0.0, 0.0
+    _, inverse, own = principal_moments(state, spin, i)
+    q = frame_of(state, i, own)
+    return rotate(q, by_axis(rotate(q, momentum, True), inverse), False)
+
+
+@part
+def begin_turn(state, spin, turns, i):
+    """What the step began with."""
+    rotation, width = state.bodies.rotation, 1 if is_plane(state) else 4
+    for k in range(width):
+        turns.start_rotation[i, k] = rotation[width * i + k]
+    put(turns.start_spin, i, spin_now(state, spin, i))
+    turns.gained[i], turns.changed[i] = 0.0, False
+
+
+@part
+def put_start_back(state, spin, turns, i):
+    """Of a body that the flight has taken out."""
+    rotation, width = state.bodies.rotation, 1 if is_plane(state) else 4
+    for k in range(width):
+        rotation[width * i + k] = turns.start_rotation[i, k]
+    put_spin(state, spin, i, triple(turns.start_spin, i))
+
+
+@part
+def drift_of_turn(state, spin, turns, i, h):
+    """A Verlet step of a turn with the torques at its start."""
+    w, torque, c = spin_now(state, spin, i), torques_on(state, spin, turns, i), spin.angular_damping[i]
+    put(turns.pushed, i, torque)
+    if is_plane(state):
+        z, a = -c * h, spin_by(state, spin, i, torque)[0]
+        state.bodies.rotation[i] += h * (w[0] * phi1(z) + a * h * phi2(z))
+        put_spin(state, spin, i, (w[0] * exp(z) + a * h * phi1(z), 0.0, 0.0))
+        return
+    q, m, moments = motion_of_spin(state, spin, i, w)
+    q, m, gained = turn_between_pushes(q, m, moments[1], (torque, c), h)
+    turns.gained[i] += gained
+    put_motion(state, spin, i, q, m, moments)
+
+
+@part
+def kick_of_turn(state, spin, turns, i, h):
+    """Its second half: the torques at its end in place of those at its start."""
+    z = -spin.angular_damping[i] * h
+    change = spin_by(state, spin, i, add_scaled(torques_on(state, spin, turns, i), triple(turns.pushed, i), -1.0))
+    gain = kick_gain(z, h) if is_plane(state) else 0.5 * h * phi1(0.5 * z)
+    put_spin(state, spin, i, add_scaled(spin_now(state, spin, i), change, gain))
+
+
+@part
+def turn_from_start(state, turns, i, turned):
+    """A body is turned by a vector from where the step began."""
+    put(turns.turned, i, turned)
+    if is_plane(state):
+        state.bodies.rotation[i] = turns.start_rotation[i, 0] + turned[0]
+        return
+    start = turns.start_rotation
+    set_rotation(state, i, product(quaternion_of(turned), (start[i, 0], start[i, 1], start[i, 2], start[i, 3])))
+
+
+@part
+def runge_kutta_turn(state, spin, turns, i, h):
+    """As ``runge_kutta_stage`` does with places: the vector that a body has turned by, and its angular momentum. Where
+    the torque holds throughout the step there are better ways, which keep the energy of a free top; and what turns fast
+    in space takes two Verlet steps of half the length, whose torques are those of the stages."""
+    stage, torque, w = state.rk_stage, torques_on(state, spin, turns, i), spin_now(state, spin, i)
+    f1, f2, f3, decay, half_decay, half_gain = runge_kutta_weights(-spin.angular_damping[i] * h)
+    half = 0.5 * h * half_gain
+    if stage == 0:
+        put(turns.pushed, i, torque)
+        turned = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+        turns.fast[i] = not is_plane(state) and turned * h * h > FAST_TURN * FAST_TURN
+    turns.changed[i] |= torque != triple(turns.pushed, i)
+    if stage == 3 and not turns.changed[i]:
+        turns.gained[i] = 0.0
+        put_start_back(state, spin, turns, i)
+        turn_alone(state, spin, turns, i, h)
+        return
+    if turns.fast[i]:
+        if stage == 0 or stage == 2:
+            drift_of_turn(state, spin, turns, i, 0.5 * h)
+        else:
+            kick_of_turn(state, spin, turns, i, 0.5 * h)
+        return
+    if stage == 0:
+        start = momentum_of(state, spin, i, w)
+        put(turns.momentum, i, start)
+        put(turns.speeds, i, w)
+        put(turns.kicks, i, scale(torque, f1))
+        momentum = add_scaled(scale(start, half_decay), torque, half)
+        put(turns.middle, i, momentum)
+        turn_from_start(state, turns, i, scale(w, 0.5 * h))
+    else:
+        turned, start = triple(turns.turned, i), triple(turns.momentum, i)
+        across = cross(turned, w)  # how fast the vector of the turn changes: the series of dexp^-1
+        rate = add_scaled(add_scaled(w, across, -0.5), cross(turned, across), 1.0 / 12.0)
+        if stage == 3:
+            momentum = add_scaled(scale(start, decay), add_scaled(triple(turns.kicks, i), torque, f3), h)
+            turn_from_start(state, turns, i, scale(add_scaled(triple(turns.speeds, i), rate, 1.0), h / 6.0))
+        else:
+            put(turns.speeds, i, add_scaled(triple(turns.speeds, i), rate, 2.0))
+            put(turns.kicks, i, add_scaled(triple(turns.kicks, i), torque, 2.0 * f2))
+            momentum = add_scaled(scale(start, half_decay), torque, half)
+            if stage == 2:
+                both = add_scaled(scale(torque, 2.0), triple(turns.pushed, i), -1.0)
+                momentum = add_scaled(scale(triple(turns.middle, i), half_decay), both, half)
+            turn_from_start(state, turns, i, scale(rate, h if stage == 2 else 0.5 * h))
+    put_spin(state, spin, i, spin_by(state, spin, i, momentum))
+
+
+@part
+def end_turn(state, spin, turns, i, dt):
+    """What splitting has gained of energy goes; limits of speed."""
+    most = spin.max_angular_speed[i]
+    if is_plane(state):
+        start, rotation = turns.start_rotation[i, 0], state.bodies.rotation
+        if abs(rotation[i] - start) > most * dt:
+            rotation[i] = start + math.copysign(most * dt, rotation[i] - start)
+    elif turns.gained[i] != 0.0:
+        q, m, moments = motion_of_spin(state, spin, i, spin_now(state, spin, i))
+        q, m = turn_to_energy(q, m, moments[1], turns.gained[i])
+        put_motion(state, spin, i, q, m, moments)
+    put_spin(state, spin, i, limited(spin_now(state, spin, i), most))

@@ -1,7 +1,7 @@
 """The stages of a step in which bodies turn.
 
-Bodies turn under torques that hold throughout the step once, after their flight (see flight); under those of force
-systems, which change within it, beside each stage of the integrator (see torques).
+Bodies turn under torques that hold throughout the step once, after their flight; under those of force systems, which
+change within it, beside each stage of the integrator (see flight).
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from ...components import SphereCollider
 from ...components.spin import FASTEST_TURN, Spin
 from ...framework import Plugin
 from ...framework.compilation import part
-from ...framework.elementary import cos, sin
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import item, length, replace, scale
+from ...framework.vectors import item, length, replace, scale, triple
 from ...systems.forces.stages import is_zero
+from ...systems.integration.turning import quaternion_of
 from ...systems.integration.turns import ROTATION_DRIFT, ROTATION_KICK, TURNS
 from ...systems.shapes.poses import has_unequal_moments
 from ...systems.shapes.quaternions import (
@@ -27,8 +27,20 @@ from ...systems.shapes.quaternions import (
     turned_tensor,
     write_axes,
 )
-from .flight import inertia_of, principal_moments, torque_on, turn_alone
-from .torques import begin_turn, drift_of_turn, end_turn, kick_of_turn, put_start_back, runge_kutta_turn
+from .flight import (
+    begin_turn,
+    drift_of_turn,
+    end_turn,
+    frame_of,
+    inertia_of,
+    kick_of_turn,
+    principal_moments,
+    put_start_back,
+    runge_kutta_turn,
+    spin_now,
+    torque_on,
+    turn_alone,
+)
 
 SLOW = 1e-4  # rad in a step: what turns slower may fall asleep, if it is dynamic
 TOO_FAST = f"a torque is so large for the inertia that Spin.angular_velocity exceeds {FASTEST_TURN:g} rad/s"
@@ -42,11 +54,8 @@ def turn_about(state, i, angle):
     if len(angle) == 2:
         state.bodies.rotation[i] += item(angle, 0)
         return
-    size = length(angle)
-    if size > 0.0:
-        s = sin(0.5 * size) / size
-        turn = cos(0.5 * size), s * item(angle, 0), s * item(angle, 1), s * item(angle, 2)
-        set_rotation(state, i, product(turn, rotation_in_space(state, i)))
+    if length(angle) > 0.0:
+        set_rotation(state, i, product(quaternion_of(angle), rotation_in_space(state, i)))
 
 
 @part
@@ -139,11 +148,11 @@ def write_inverse_inertia(state, spin, i):
         return
     xx, yy, zz, xy, xz, yz = inverted(xx, yy, zz, xy, xz, yz)
     if xx == yy == zz and xy == xz == yz == 0.0:  # round, to the bit
-        bodies.inverse_inertia[i] = replace(replace(replace(nothing, 0, xx), 1, xx), len(nothing) - 1, xx)
+        bodies.inverse_inertia[i] = triple(nothing, (xx, yy, zz))
         return
     xx, yy, zz, xy, xz, yz = turned_tensor(rotation_in_space(state, i), (xx, yy, zz, xy, xz, yz))
-    bodies.inverse_inertia[i] = replace(replace(replace(nothing, 0, xx), 1, yy), len(nothing) - 1, zz)
-    bodies.inverse_products[i] = replace(replace(replace(nothing, 0, xy), 1, xz), len(nothing) - 1, yz)
+    bodies.inverse_inertia[i] = triple(nothing, (xx, yy, zz))
+    bodies.inverse_products[i] = triple(nothing, (xy, xz, yz))
 
 
 @spinning.stage(
@@ -197,12 +206,12 @@ def turn_with_contacts(state, spin, i, angle):
         turn_about(state, i, angle)
         return
     principal, _, own = principal_moments(state, spin, i)
-    w = spin.angular_velocity[i, 0], spin.angular_velocity[i, 1], spin.angular_velocity[i, 2]
-    before = rotate(product(rotation_in_space(state, i), own), w, True)
+    w = spin_now(state, spin, i)
+    before = rotate(frame_of(state, i, own), w, True)
     turn_about(state, i, angle)
     if principal[0] == principal[1] == principal[2]:
         return
-    after, old, new = rotate(product(rotation_in_space(state, i), own), w, True), 0.0, 0.0
+    after, old, new = rotate(frame_of(state, i, own), w, True), 0.0, 0.0
     for k in range(3):
         old += principal[k] * before[k] * before[k]
         new += principal[k] * after[k] * after[k]

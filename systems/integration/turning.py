@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ...framework.compilation import inlined
+from ...framework.compilation import inlined, part
 from ...framework.elementary import cos, sin
 from ...framework.vectors import add, add_scaled, components, dot, item, length, replace, scale, sub, triple
 
@@ -94,6 +94,15 @@ def end_of_turn(turn, shares, arm):
 def turn_of_arm(turn, arm):
     """The same of one arm alone."""
     return end_of_turn(turn, shares_of_turn(turn), arm)
+
+
+@part
+def quaternion_of(turn):
+    """The unit quaternion of a vector by which something turns."""
+    size = length(turn)
+    sine = sin(0.5 * size) / size if size > 0.0 else 0.5
+    x, y, z = components(turn)
+    return cos(0.5 * size), sine * x, sine * y, sine * z
 
 
 @inlined

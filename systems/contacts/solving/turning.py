@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 from ....framework.compilation import part
-from ....framework.elementary import atan2, cos, sin
+from ....framework.elementary import atan2
 from ....framework.vectors import add_scaled, components, dot, length, scale, triple
-from ...integration.turning import SERIES, change_of_spin
+from ...integration.turning import SERIES, change_of_spin, quaternion_of
 from ...shapes.free_rotation import diagonalised, energy_of, turn_freely, turn_to_energy
 from ...shapes.poses import NO_INERTIA, has_unequal_moments, momentum_along
 from ...shapes.quaternions import product, rotate, rotation_in_space, turned_tensor
@@ -66,15 +66,6 @@ def rotation_vector(like, q):
     sine = math.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     size = 2.0 * atan2(math.copysign(sine, q[0]), abs(q[0])) / sine if sine > 0.0 else 0.0
     return triple(like, (size * q[1], size * q[2], size * q[3]))
-
-
-@part
-def quaternion_of(turn):
-    """The unit quaternion of a vector by which something turns."""
-    size = length(turn)
-    sine = sin(0.5 * size) / size if size > 0.0 else 0.5
-    x, y, z = components(turn)
-    return cos(0.5 * size), sine * x, sine * y, sine * z
 
 
 @part
