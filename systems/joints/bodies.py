@@ -109,12 +109,10 @@ def find_driven(state, dt):
             continue
         a, b = joints.row_a[j], joints.row_b[j]
         axis, missing = joints.axis[j], joints.target[j]
-        if a >= 0 and len(axis) == 3:
+        if len(axis) == 3:
             axis = turned_since(state, a, axis)
         missing -= spin_about(state, b, axis) - spin_about(state, a, axis)
-        hold = j  # the first row of the joint: the point about which they turn
-        while hold > 0 and joints.joint[hold - 1] == joints.joint[j]:
-            hold -= 1
+        hold = first_of(joints, j)  # the point about which they turn
         for i, anchor in ((a, joints.anchor_a[hold]), (b, joints.anchor_b[hold])):
             if may_move(state, i):
                 k = owner_of(state, i)
@@ -166,9 +164,9 @@ def turned_by_quaternion(rotation, i, v):
 
 @inlined
 def turned_since(state, i, v):
-    """A vector along the axes of body i, as it is in the world."""
+    """A vector along the axes of body i, or of the world, as it is in the world."""
     rotation, axes = state.bodies.rotation, state.bodies.axes
-    if len(rotation) == 0:
+    if len(rotation) == 0 or i < 0:
         return v
     if len(v) == 2:
         if len(axes) > 0 and state.bodies.axes_rotation[i] == rotation[i]:
@@ -189,7 +187,7 @@ def has_turned_by_impacts(state, i):
 def turned_before(state, i, v):
     """The same where the step starts."""
     before = state.bodies.previous_rotation
-    if len(before) == 0:
+    if len(before) == 0 or i < 0:
         return turned_since(state, i, v)
     if len(v) == 2:
         c, s = cos(before[i]), sin(before[i])
@@ -200,7 +198,7 @@ def turned_before(state, i, v):
 @part
 def turned_in_step(state, i, v):
     """The same where the step ends, as impacts have turned it."""
-    if not has_turned_by_impacts(state, i):
+    if i < 0 or not has_turned_by_impacts(state, i):
         return turned_since(state, i, v)
     if has_unequal_moments(state, i):
         if len(state.bodies.axes) == 0:
@@ -233,8 +231,8 @@ def build_custom_rows(state, j):
     joints.base_b[j] = bodies.previous_position[b] if b >= 0 else zero
     for k in range(d):
         axis = replace(zero, k, 1.0)
-        joints.axes_a[d * j + k] = turned_in_step(state, a, axis) if a >= 0 else axis
-        joints.axes_b[d * j + k] = turned_in_step(state, b, axis) if b >= 0 else axis
+        joints.axes_a[d * j + k] = turned_in_step(state, a, axis)
+        joints.axes_b[d * j + k] = turned_in_step(state, b, axis)
 
 
 @part
@@ -260,10 +258,10 @@ def build_joint_rows(state):
         start_a = bodies.previous_position[a] if a >= 0 else zero
         start_b = bodies.previous_position[b] if b >= 0 else zero
         joints.between[j] = sub(start_b, start_a)
-        joints.base_a[j] = turned_in_step(state, a, joints.anchor_a[j]) if a >= 0 else joints.anchor_a[j]
-        joints.base_b[j] = turned_in_step(state, b, joints.anchor_b[j]) if b >= 0 else joints.anchor_b[j]
+        joints.base_a[j] = turned_in_step(state, a, joints.anchor_a[j])
+        joints.base_b[j] = turned_in_step(state, b, joints.anchor_b[j])
         if joints.kind[j] == SLIDE or len(zero) == 3:
-            joints.rail[j] = turned_in_step(state, a, joints.axis[j]) if a >= 0 else joints.axis[j]
+            joints.rail[j] = turned_in_step(state, a, joints.axis[j])
 
 
 def count_turns(state, dt):
@@ -272,12 +270,9 @@ def count_turns(state, dt):
     for j in range(joints.count if len(zero_of(state)) == 3 else 0):
         a, b, above = joints.row_a[j], joints.row_b[j], max(j - 1, 0)
         if joints.kind[j] in (TURN, TWIST) and not (is_left_out(state, a) or is_left_out(state, b)):
-            axis, end_a = joints.axis[j], joints.anchor_a[j]
-            axis, end_a = (turned_since(state, a, axis), turned_since(state, a, end_a)) if a >= 0 else (axis, end_a)
-            end_b, axis_b = joints.anchor_b[j], joints.anchor_b[above]
-            if b >= 0:
-                end_b, axis_b = turned_since(state, b, end_b), turned_since(state, b, axis_b)
+            axis, axis_b = turned_since(state, a, joints.axis[j]), turned_since(state, b, joints.anchor_b[above])
+            ends = turned_since(state, a, joints.anchor_a[j]), turned_since(state, b, joints.anchor_b[j])
             if joints.rule[j] == FREE:  # others have been counted in each substep
                 joints.value[first_of(joints, j)] += dt * (spin_about(state, b, axis) - spin_about(state, a, axis))
-            turn_about(joints, j, axis, (end_a, end_b), axis_b)
+            turn_about(joints, j, axis, ends, axis_b)
     return OK

@@ -11,7 +11,7 @@ from functools import cache
 
 from ...framework.compilation import inlined, part
 from ...framework.jit.kinds import FLOAT, INT, Signature, floats, record_kind, tuple_of
-from ...framework.vectors import add, add_scaled, dot, scale
+from ...framework.vectors import dot
 from ..contacts.solving.records import SOLVER
 from ..integration.turning import change_of_spin
 from ..shapes.linking.signatures import call_in_dimension
@@ -64,18 +64,3 @@ def measure_custom(solver, j, moved_for):
             value += dot(along_a, solver.shift[a]) + dot(along_b, solver.shift[b])
     joints.value[j] = value
     return value
-
-
-@inlined
-def push_custom(solver, j, impulse):
-    """Let a row act with an impulse."""
-    joints = solver.joints
-    a, b = joints.first[j], joints.second[j]
-    velocity, spin = solver.velocity, solver.spin
-    w_a, w_b = solver.inverse_mass[a], solver.inverse_mass[b]
-    if w_a > 0.0:
-        velocity[a] = add_scaled(velocity[a], joints.along_a[j], impulse * w_a)
-        spin[a] = add(spin[a], change_of_spin(solver, a, scale(joints.turn_a[j], impulse)))
-    if w_b > 0.0:
-        velocity[b] = add_scaled(velocity[b], joints.normal[j], impulse * w_b)
-        spin[b] = add(spin[b], change_of_spin(solver, b, scale(joints.turn_b[j], impulse)))

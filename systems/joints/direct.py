@@ -87,18 +87,12 @@ def directions_at(joints, j, k):
 
 
 @inlined
-def carried_mass(solver, j):
-    """What a row may have to bear, times how much stiffer it is; of angles times how far they bend."""
-    direct, g = solver.direct, solver.joints.group[j]
-    bend = max(1.0, FRAME_BEND * direct.welds[g] ** 2) if solver.joints.kind[j] >= TURN else 1.0
-    return DIRECT_STIFFNESS / direct.heavy[g] * bend
-
-
-@inlined
 def inverse_mass_of(solver, j):
     """How stiff a row is: as if it bore the heaviest body of its group; of angles, at the end of a beam of welds."""
     joints, a, b, axis = solver.joints, solver.joints.first[j], solver.joints.second[j], solver.joints.normal[j]
-    stiffness = solver.direct.stiffer * joints.stiffness * carried_mass(solver, j)
+    direct, g = solver.direct, joints.group[j]
+    bend = max(1.0, FRAME_BEND * direct.welds[g] ** 2) if joints.kind[j] >= TURN else 1.0
+    stiffness = direct.stiffer * joints.stiffness * (DIRECT_STIFFNESS / direct.heavy[g] * bend)
     w = max(solver.inverse_mass[a], solver.inverse_mass[b])
     if joints.kind[j] == CUSTOM:
         return min(stiffness * w, DIRECT_STIFFNESS_MAX) * joints.mass[j]

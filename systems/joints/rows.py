@@ -21,8 +21,7 @@ from ..contacts.constants import FREQUENCY, JOINT_DAMPING_RATIO, TURNING_FREQUEN
 from ..contacts.solving.faults import TORN_OPEN, note_fault
 from ..integration.turning import change_of_spin, cross_spin, symmetric, twist
 from .coupling import couple, first_of, has_coupling, is_holding, is_soft_spring, response_at, symmetric_product
-from .custom import push_custom
-from .direct import factorise, solve_all_limited, solve_direct, speed_between, speed_of
+from .direct import apply_to_bodies, factorise, solve_all_limited, solve_direct, speed_between, speed_of
 from .measuring import reach_at
 from .order import is_rigid
 from .records import BY_PASSES, CUSTOM, POINT, TURN
@@ -126,7 +125,7 @@ def apply_row(solver, j, impulse):
         push_apart(columns_of(solver), ends, arms, scale(joints.normal[j], impulse))
         return
     if joints.kind[j] == CUSTOM:
-        push_custom(solver, j, impulse)
+        apply_to_bodies(solver, j, 0, impulse)
         return
     a, b, twisted = joints.first[j], joints.second[j], scale(joints.normal[j], impulse)
     if solver.inverse_mass[a] > 0.0:

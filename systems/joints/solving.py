@@ -60,19 +60,10 @@ def add_joint_work(solver):
         solver.slope[t] += work_of_joint(solver, j)
 
 
-@part
-def sum_joint_work(solver, work):
-    """``work`` and that of all joints of a range."""
-    joints = solver.joints
-    for e in range(joints.begin, joints.end if solver.movers > 0 else joints.begin):
-        work += work_of_joint(solver, joints.order[e])
-    return work
-
-
 @packed
 def solve_joined_range(solver, what, numbers, span):
     """Whatever calls asks of the joints of a range."""
-    h, dt = numbers
+    (h, dt), joints = numbers, solver.joints
     if what == calls.START:
         start_joints(solver, h, dt / solver.usual)
         measure_joints(solver, 0.0)
@@ -99,5 +90,6 @@ def solve_joined_range(solver, what, numbers, span):
     elif what == calls.ADD_WORK:
         add_joint_work(solver)
     elif what == calls.SUM_WORK:
-        return sum_joint_work(solver, h)
+        for e in range(joints.begin, joints.end if solver.movers > 0 else joints.begin):
+            h += work_of_joint(solver, joints.order[e])
     return h
