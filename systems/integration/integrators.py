@@ -12,15 +12,65 @@ program; ``advance`` is for worlds with force systems.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
 
+import numpy as np
+
+from ...framework.jit.records.record import Record
+from ...framework.schedule.stages import Program
 from .stages import CUBE_ROOT_OF_2
 from .stages import CUBIC as CUBIC
 from .stages import LINE as LINE
 from .stages import PARABOLA as PARABOLA
+from .turns import ROTATION_STAGES
 
-if TYPE_CHECKING:
-    from .motion import Motion
+
+@dataclass
+class Motion:
+    """Views of the dynamic rows; position and velocity hold the state that forces are evaluated at.
+
+    position, velocity, force, start_position, start_velocity (n, d); inverse_mass, damping (n,).
+    """
+
+    position: np.ndarray
+    velocity: np.ndarray
+    force: np.ndarray
+    inverse_mass: np.ndarray
+    damping: np.ndarray
+    start_position: np.ndarray
+    start_velocity: np.ndarray
+    evaluator: Callable[[float], None] | None  # None: no force depends on the state
+    program: Program | None = None  # with the stages of the built-in integrators
+    turn: Callable[[int, float], None] | None = None  # beside such a stage; None: torques hold throughout the step
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        return self.position, self.velocity, self.force, self.inverse_mass, self.damping
+
+    @property
+    def force_changes(self) -> bool:
+        """Whether some force depends on position, velocity or time; else the forces of the start hold throughout."""
+        return self.evaluator is not None
+
+    def evaluate(self, seconds: float) -> None:
+        """Sum the forces again at the state in the columns, ``seconds`` into the step."""
+        if self.evaluator is not None:
+            self.evaluator(seconds)
+
+    @property
+    def state(self) -> Record:
+        """The record that the stages work on."""
+        assert self.program is not None
+        return self.program.state
+
+    def run(self, stage: str, h: float) -> None:
+        """Run a stage of a built-in integrator over ``h`` seconds, and turn bodies beside it."""
+        assert self.program is not None
+        if self.turn is not None and stage in ROTATION_STAGES:
+            self.turn(ROTATION_STAGES[stage], h)
+        self.program.run_one(stage, h)
 
 
 class Integrator:
@@ -38,7 +88,8 @@ class Integrator:
     evaluations: ClassVar[int]
     path: ClassVar[int] = CUBIC
     moves_with_old_velocity: ClassVar[bool] = False  # of a LINE: which end's velocity it follows
-    STAGES: ClassVar[tuple[str, ...]] = ()  # of a built-in one, for forces that hold throughout the step
+    STAGES: ClassVar[tuple[str, ...]] = ()  # of a built-in one, for forces that hold throughout the step,
+    CHANGING: ClassVar[tuple[str, ...]] = ()  # and for those that change, where these are others
     COLUMNS: ClassVar[tuple[str, ...]] = ()  # of bodies that it needs
 
     def advance(self, motion: Motion, dt: float) -> None:
@@ -47,48 +98,40 @@ class Integrator:
 
     def kernels(self, force_changes: bool) -> tuple[str, ...]:
         """Names of the kernels that :meth:`advance` calls, for ``world.plan()``; force_changes: see Motion."""
-        return ()
+        return (self.CHANGING if force_changes else ()) or self.STAGES
 
 
-class ExplicitEuler(Integrator):
-    """Position with the old velocity. Drifts upwards by g dt t / 2; unstable for springs."""
+class _Euler(Integrator):
+    """One stage does it all."""
 
     order, evaluations, path = 1, 1, LINE
+
+    def advance(self, motion: Motion, dt: float) -> None:
+        motion.run(self.STAGES[0], dt)
+
+
+class ExplicitEuler(_Euler):
+    """Position with the old velocity. Drifts upwards by g dt t / 2; unstable for springs."""
+
     moves_with_old_velocity = True
     STAGES = ("explicit_euler",)
 
-    def advance(self, motion: Motion, dt: float) -> None:
-        motion.run("explicit_euler", dt)
 
-    def kernels(self, force_changes: bool) -> tuple[str, ...]:
-        return self.STAGES
-
-
-class SemiImplicitEuler(Integrator):
+class SemiImplicitEuler(_Euler):
     """Velocity first, position with the new one. Symplectic: energy stays within bounds below z = 2."""
 
-    order, evaluations, path = 1, 1, LINE
     STAGES = ("semi_implicit_euler",)
-
-    def advance(self, motion: Motion, dt: float) -> None:
-        motion.run("semi_implicit_euler", dt)
-
-    def kernels(self, force_changes: bool) -> tuple[str, ...]:
-        return self.STAGES
 
 
 class VelocityVerlet(Integrator):
     """Second order, symplectic (Swope et al. 1982); forces that depend on velocity see v + a dt at the end."""
 
     order, evaluations, path = 2, 2, PARABOLA
-    STAGES = ("verlet_drift",)
+    STAGES, CHANGING = ("verlet_drift",), ("verlet_drift", "verlet_kick")
     COLUMNS = ("acceleration",)
 
     def advance(self, motion: Motion, dt: float) -> None:
         verlet(motion, dt, 0.0)
-
-    def kernels(self, force_changes: bool) -> tuple[str, ...]:
-        return ("verlet_drift", "verlet_kick") if force_changes else self.STAGES
 
 
 class RungeKutta4(Integrator):
@@ -98,7 +141,7 @@ class RungeKutta4(Integrator):
     """
 
     order, evaluations = 4, 4
-    STAGES = ("verlet_drift",)
+    STAGES, CHANGING = ("verlet_drift",), ("runge_kutta_stage",)
     COLUMNS = ("acceleration", "rk_middle", "rk_speeds", "rk_kicks")
 
     def advance(self, motion: Motion, dt: float) -> None:
@@ -107,9 +150,6 @@ class RungeKutta4(Integrator):
                 motion.evaluate(dt if stage == 3 else dt / 2)
             motion.state.rk_stage = stage
             motion.run("runge_kutta_stage", dt)
-
-    def kernels(self, force_changes: bool) -> tuple[str, ...]:
-        return ("runge_kutta_stage",) if force_changes else self.STAGES
 
 
 class Yoshida4(Integrator):
@@ -123,7 +163,7 @@ class Yoshida4(Integrator):
     HEAVY_DAMPING: ClassVar[float] = 5.0  # rounding stays at 1e-12
 
     order, evaluations = 4, 4
-    STAGES = ("verlet_drift",)
+    STAGES, CHANGING = ("verlet_drift",), ("verlet_drift", "verlet_kick")
     COLUMNS = ("acceleration",)
 
     def advance(self, motion: Motion, dt: float) -> None:
@@ -133,9 +173,6 @@ class Yoshida4(Integrator):
         verlet(motion, outer * dt, 0.0, heavy, 0.0)
         verlet(motion, inner * dt, outer * dt, heavy, dt)
         verlet(motion, outer * dt, (outer + inner) * dt, heavy, 0.0)
-
-    def kernels(self, force_changes: bool) -> tuple[str, ...]:
-        return ("verlet_drift", "verlet_kick") if force_changes else self.STAGES
 
 
 class Flight(Integrator):

@@ -23,8 +23,7 @@ from ..records import COLLISIONS, SPINS, all_rows
 from ..scene import Scene
 from ..sleeping.stages import look_at_sleepers, rest_sleepers
 from ..stage_system import StagedSystem
-from .integrators import STANDARD_INTEGRATORS, Flight, Integrator
-from .motion import Motion
+from .integrators import STANDARD_INTEGRATORS, Flight, Integrator, Motion
 from .stages import (
     ROOM_FOR_PATHS,
     ROOM_FOR_PUSHES,
