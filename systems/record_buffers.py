@@ -9,9 +9,8 @@ import numpy as np
 
 from ..framework.jit.records.record import Record
 from ..framework.schedule.stages import Stage
-from .contacts.solving.faults import KINDS_OF_FAULT
 from .contacts.solving.islands import COLOURS
-from .contacts.solving.records import WARM_START_ROWS
+from .contacts.solving.records import KINDS_OF_FAULT, WARM_START_ROWS
 from .records import CONTACT_ROWS
 
 SPARE_ROWS = 1 << 16  # rows at most that are reserved beyond what is asked for

@@ -14,8 +14,15 @@ from ...framework.plugins.checks import shown
 from ...framework.plugins.laws import Law
 from ...systems.contacts.solving.records import SOLVER
 from ...systems.joints.custom import call_given
-from ...systems.joints.linked import linked_joint
-from ...systems.joints.own import OwnJoint, change_law, custom_numbers, custom_parameters, numbers_at, sample_of
+from ...systems.joints.own import (
+    OwnJoint,
+    change_law,
+    custom_numbers,
+    custom_parameters,
+    linked_joint,
+    numbers_at,
+    sample_of,
+)
 from ...systems.shapes.quaternions import axes_of
 from .samples import UPRIGHT, Numbers
 

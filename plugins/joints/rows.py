@@ -11,8 +11,7 @@ import numpy as np
 from ...framework import PluginError
 from ...framework.jit.lazy import is_of_compiler
 from ...framework.jit.records.schema import Column
-from ...systems.joints.linked import linked_joint
-from ...systems.joints.own import custom_numbers
+from ...systems.joints.own import custom_numbers, linked_joint
 from ...systems.joints.records import CUSTOM, JOINTS
 from .joint import WORLD, Joint, Row
 

@@ -20,8 +20,8 @@ from ..records import COLLIDERS
 from ..sleeping.sleepers import Sleepers
 from ..sleeping.stored import merged
 from ..stage_system import StagedSystem
-from .event_stages import ROOM_FOR_FOUND, compare_contacts
-from .solving.faults import OVERLOADED, RESTRAINED, SQUEEZED, TORN_OPEN
+from .solving.records import OVERLOADED, RESTRAINED, SQUEEZED, TORN_OPEN
+from .stages import ROOM_FOR_FOUND, compare_contacts
 
 Columns = dict[str, np.ndarray]
 MEETING = ("layer", "mask", "group")  # of colliders: whom they meet

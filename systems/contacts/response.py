@@ -15,14 +15,13 @@ from ..joints.bodies import count_turns
 from ..parts.stages import place_parts
 from ..stage_system import StagedSystem
 from .bodies import ROOM_AT_REST, gather, put_back
-from .event_stages import ROOM_FOR_CONTACTS, publish_contacts
 from .events import disabled_pairs
-from .response_stages import begin_response
 from .resting import find_resting, find_touching, linearise
 from .solving.prediction import ROOM_FOR_SUPPORT, predict_rest
 from .solving.records import RESTED
 from .solving.solver import solve_contacts, solve_turning_contacts
 from .solving.warm_start import ROOM_TO_STORE, match_warm_start, store_warm_start
+from .stages import ROOM_FOR_CONTACTS, begin_response, publish_contacts
 from .static_penetration import resolve_static_penetration
 
 MOVED_COLUMNS = ("position", "linear_velocity", "path_velocity")

@@ -18,7 +18,7 @@ from ...framework.compilation import inlined, part
 from ...framework.elementary import cos, exp
 from ...framework.vectors import add, add_scaled, length, scale, sub
 from ..contacts.constants import FREQUENCY, JOINT_DAMPING_RATIO, TURNING_FREQUENCY
-from ..contacts.solving.faults import TORN_OPEN, note_fault
+from ..contacts.solving.records import TORN_OPEN, note_fault
 from ..integration.turning import change_of_spin, cross_spin, symmetric, twist
 from .coupling import couple, first_of, has_coupling, is_holding, is_soft_spring, response_at, symmetric_product
 from .direct import apply_to_bodies, factorise, solve_all_limited, solve_direct, speed_between, speed_of

@@ -31,8 +31,7 @@ from ...framework.world.world import World
 from ..broad_phase.tree.tree import tree_passes
 from ..forces.accumulation import required_bodies
 from ..integration.system import Integration
-from ..joints.linked import linked_joint
-from ..joints.own import OwnJoint
+from ..joints.own import OwnJoint, linked_joint
 from ..plugin_stages.placement import placed
 from ..plugin_stages.plugin_stages import NEEDED, QUERYING
 from ..queries.kernels import query_kernels

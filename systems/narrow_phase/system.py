@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from ...framework.data.bodies import Bodies
+from ...framework.errors import PluginError
 from ...framework.plugins.registry import Registry
 from ...framework.schedule.phases import Phase
 from ...framework.schedule.stages import Program, PythonPart, Stage
@@ -12,17 +15,36 @@ from ..ccd.search_bounds import sweep_pairs
 from ..scene import Scene
 from ..sleeping.stages import find_touched, measure_force_changes
 from ..stage_system import StagedSystem
-from .filters import filtered
-from .level_stages import evaluate_levels
 from .one_way import release_one_way
 from .stages import (
     ROOM_FOR_ORDER,
     ROOM_FOR_PAIRS,
     collect_contacts,
+    evaluate_levels,
     evaluate_pairs,
     order_candidates,
     select_pairs,
 )
+
+
+def filtered(
+    filters: list[tuple[str, Any]], bodies: Any, first: np.ndarray, second: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Those pairs of rows that every filter (plugin, function) lets through; PluginError if one does not say which."""
+    for plugin, function in filters:
+        if not len(first):
+            break
+        name = f"plugin {plugin}: pair filter {function.__name__}"
+        try:
+            may_meet = function(bodies, first, second)
+        except Exception as error:
+            error.add_note(name)
+            raise
+        if not isinstance(may_meet, np.ndarray) or may_meet.dtype != bool or may_meet.shape != first.shape:
+            got = f"{may_meet.dtype} {may_meet.shape}" if isinstance(may_meet, np.ndarray) else repr(may_meet)
+            raise PluginError(f"{name} must return an array of {len(first)} bool, one for each pair, got {got}")
+        first, second = first[may_meet], second[may_meet]
+    return first, second
 
 
 class NarrowPhase(StagedSystem):
@@ -96,5 +118,3 @@ class NarrowPhase(StagedSystem):
         names = ", ".join(shape.component.__name__ for shape in self._scene.linked.shapes)
         levels = "; bodies with several colliders: level by level, the cheap one first"
         return f"all pairs of {names}" + (levels if self._state.several_levels else "")
-
-

@@ -17,9 +17,8 @@ from ..double_buffers import WARM_START_NUMBERS, put_rows_back, saved_rows
 from ..records import CONTACT_ROWS, SLEEP_COLUMNS, SLEEPING
 from ..scene import ZERO_WHERE_STATIC, Scene
 from .exposed_columns import ExposedColumns
-from .links import links_with_falling
 from .stages import ASLEEP, AWAKE, FALLING_ASLEEP, WAKING
-from .stored import CONTACT_COLUMNS, IMPULSE_COLUMNS, Stored
+from .stored import CONTACT_COLUMNS, IMPULSE_COLUMNS, Stored, links_with_falling
 
 PUSH_COLUMNS = ("applied_force", "applied_frame", "step_force")
 PATH_COLUMNS = ("origin", "path_velocity", "path_second", "path_third")

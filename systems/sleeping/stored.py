@@ -1,4 +1,5 @@
-"""What is kept of pairs of which both bodies are still: their contacts, and the impulses of contacts at rest.
+"""What is kept of pairs of which both bodies are still: their contacts, the impulses of contacts at rest, and what
+cannot be moved and bears them.
 
 They are taken out of the records, which hold what is awake, and put back when one of the two wakes. Both lists are in
 canonical order.
@@ -13,6 +14,7 @@ import numpy as np
 
 from ...framework.jit.records.record import Record
 from ...framework.jit.records.schema import Section
+from .stages import FALLING_ASLEEP
 
 Columns = dict[str, np.ndarray]
 
@@ -95,3 +97,21 @@ class Stored:
 
     def take_back(self, saved: Any) -> None:
         self.columns = {name: np.array(saved[name], self.columns[name].dtype) for name in self._names}
+
+
+def links_with_falling(state: Record, links: np.ndarray) -> np.ndarray:
+    """(k, 2) ids of what cannot be moved, each with an island that stands on it: those known, and those of what falls
+    asleep."""
+    bodies, pairs, joints, dynamic = state.bodies, state.pairs, state.solver.joints, state.dynamic
+    near = pairs.near_contact[: pairs.count] & pairs.is_solid[: pairs.count]
+    held = joints.order[: joints.active]
+    a = np.concatenate((pairs.a[: pairs.count][near], joints.row_a[held]))
+    b = np.concatenate((pairs.b[: pairs.count][near], joints.row_b[held]))
+    fixed, body = np.maximum(a, b), np.minimum(a, b)
+    some = (fixed >= dynamic) & (body >= 0) & (body < dynamic)
+    fixed, body = fixed[some], body[some]
+    due = bodies.sleep_state[body] == FALLING_ASLEEP
+    found = np.stack((bodies.entity[fixed[due]], bodies.island[body[due]]), axis=1)
+    links = np.concatenate((links, found))
+    links = links[np.lexsort((links[:, 1], links[:, 0]))]
+    return links[np.append(True, (links[1:] != links[:-1]).any(axis=1))[: len(links)]]

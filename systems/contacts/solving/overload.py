@@ -12,8 +12,8 @@ from ...integration.turning import momentum_of_spin
 from ...joints import calls
 from ...joints.calls import for_joints
 from ..constants import GAIN_ROUNDING
-from .faults import OVERLOADED, note_fault
 from .guard import work_of_row
+from .records import OVERLOADED, note_fault
 from .rows import compute_effective_mass, rotate_body
 
 

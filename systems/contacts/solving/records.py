@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ....framework.compilation import inlined
 from ....framework.jit.records.schema import (
     Schema,
     Section,
@@ -14,6 +15,12 @@ from ....framework.jit.records.schema import (
     vectors,
 )  # fmt: skip
 from ...joints.records import DIRECT, JOINTS
+
+# What has gone wrong in a step, of which faults will tell: how many bodies or joints of each kind, and the first.
+SQUEEZED, OVERLOADED, RESTRAINED, TORN_OPEN = range(4)
+# there is no room where they are pushed; they count as lighter than they are; first bodies of islands to which contacts
+# would have given much energy; joints that are wide open
+KINDS_OF_FAULT = 4
 
 ROW_CHUNK = 64  # pairs at most: their columns stay in the processor's first cache
 
@@ -175,3 +182,11 @@ WARM_START = Schema(
     rows_version=ints(),
     step=floats(unit="s"),  # that the impulses are for
 )  # fmt: skip
+
+
+@inlined
+def note_fault(solver, kind, first):
+    """One more. first: the row of a body, the entity of a joint, if it is the first."""
+    if solver.faults[kind] == 0:
+        solver.faulty[kind] = first
+    solver.faults[kind] += 1

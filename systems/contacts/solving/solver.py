@@ -32,12 +32,12 @@ from ..constants import (
     TURNING_RELAX_PASSES,
 )  # fmt: skip
 from .chunks import find_chunks, load_masses, measure_chunks
-from .faults import RESTRAINED, note_fault
 from .guard import finish_substep, island_of, islands_of, open_all
 from .hard import select_rigid
 from .islands import is_hard_island
 from .overload import cap_mass_ratio, restore_mass
 from .passes import close_nearest_first, note_impulses, solve_passes
+from .records import RESTRAINED, note_fault
 from .rows import (
     ARMS,
     NO_ARMS,
