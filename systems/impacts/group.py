@@ -119,12 +119,6 @@ def gained_along(state, m):
 
 
 @part
-def is_affordable(impacts, count):
-    """Whether this step may still solve a group of so many impacts."""
-    return impacts.group_visits + LEAST_PASSES * count <= WORK
-
-
-@part
 def solve_group(state, count):
     """Find the impulses of a group's impacts, into ``ahead``; returns whether there are such."""
     impacts, pairs, inverse_mass = state.impacts, state.pairs, state.bodies.inverse_mass
@@ -217,8 +211,7 @@ def is_shooting(state, count):
     impacts, pairs, inverse_mass, any_shot = state.impacts, state.pairs, state.bodies.inverse_mass, False
     for g in range(count):
         c = impacts.event_pair[impacts.member[impacts.group[g]]]
-        for side in range(2):
-            i = owner_of(state, pairs.a[c] if side == 0 else pairs.b[c])
+        for i in (owner_of(state, pairs.a[c]), owner_of(state, pairs.b[c])):
             any_shot |= inverse_mass[i] > 0.0 and is_ejected(state, i)
     return any_shot
 
@@ -298,8 +291,7 @@ def push_group(state, count, dt):
         for g in range(count):
             c = impacts.event_pair[impacts.member[impacts.group[g]]]
             a, b = pairs.a[c], pairs.b[c]
-            for side in range(2):
-                i = a if side == 0 else b
+            for i in (a, b):
                 still = is_immovable(bodies, a + b - i)
                 if inverse_mass[i] > 0.0 and still == (strikes_mover == 0):
                     note_trapped(state, i, still)

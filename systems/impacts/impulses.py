@@ -129,13 +129,12 @@ def bounce_pair(state, event, dt):
     if state.spinning:
         impulse, friction = impacts.event_change[event] * mass, scale(impacts.event_pull[event], mass)
         call_turn_by_impact(state.links[TURN_BY_IMPACT], state, event, impulse, friction, dt)
-    for side in range(2):
-        i = a if side == 0 else b
+    for i, push in ((a, -mass), (b, mass)):
         if inverse_mass[i] > 0.0:  # what cannot be moved is as it was: its other impacts stand, and no cap is on it
             count_impact(state, i, counted)
             if impacts.sweeps:
                 note_trapped(state, i, is_immovable(bodies, a + b - i))
-            deflect(state, i, scale(change, (-mass if side == 0 else mass) * inverse_mass[i]), now, dt)
+            deflect(state, i, scale(change, push * inverse_mass[i]), now, dt)
     log_impact(state, event, impacts.event_change[event] * mass)
 
 
@@ -207,14 +206,6 @@ def slide_body(state, i, normal, rate, dt):
 
 
 @part
-def is_landing(state, event):
-    """Whether an event is a landing: too slow to bounce, where impacts are left."""
-    impacts, pairs = state.impacts, state.pairs
-    c = impacts.event_pair[event]
-    return impacts.event_kind[event] == HAND_OVER and not is_beyond_cap(state, pairs.a[c], pairs.b[c])
-
-
-@part
 def count_capped(state, a, b):
     """An impact of two bodies is beyond the cap of one of them."""
     impacts, counts = state.impacts, state.bodies.impact_count
@@ -225,12 +216,13 @@ def count_capped(state, a, b):
 
 @part
 def hand_over(state, event, dt):
-    """Leave a touch to the solver. What lands loses its approach and slides along what cannot be moved, as does what is
-    caught there, until it is caught twice as often; what else is beyond the cap, or halts, stays where it is."""
+    """Leave a touch to the solver. What lands, too slow to bounce, loses its approach and slides along what cannot be
+    moved, as does what is caught there, until it is caught twice as often; what else is beyond the cap, or halts, stays
+    where it is."""
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
     c = impacts.event_pair[event]
     a, b = pairs.a[c], pairs.b[c]
-    landing = is_landing(state, event)
+    landing = impacts.event_kind[event] == HAND_OVER and not is_beyond_cap(state, a, b)
     halts = impacts.event_kind[event] == HALT
     if landing:
         bounce_pair(state, event, dt)
@@ -247,7 +239,6 @@ def hand_over(state, event, dt):
         return
     pairs.crossed[c] = True
     forget_manifold(pairs, c)
-    for side in range(2):
-        i = a if side == 0 else b
+    for i in (a, b):
         if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] < STOPPED:
             stop_body(state, i, impacts.now)

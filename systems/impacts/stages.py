@@ -66,21 +66,14 @@ def begin_impacts(state, dt):
     impacts.active = impacts.sweeps or any_restitution(state)
     impacts.may_sink = impacts.sweeps and may_sink(state, dt)
     if impacts.sweeps:
-        begin_sweeps(state)
+        known = impacts.swept_version == state.version  # impacts change nothing of static bodies
+        for i in range(state.first if known else 0, state.moving if known else state.count):
+            bodies.trapped_impacts[i], bodies.last_impact[i] = 0, -1.0
+        impacts.swept_version = state.version
     impacts.waiting, impacts.listed, impacts.pending = 0, UNLISTED, -1
     impacts.linked, impacts.touchdown_pair, impacts.touchdown_time = False, -1, 0.0
     impacts.until = state.neighbours_known_until if impacts.sweeps else math.inf
     return NEED_IMPACTS if impacts.active and state.links[FIRST_TOUCH] == 0 else OK
-
-
-@part
-def begin_sweeps(state):
-    """No body has had an impact. Impacts change nothing of static ones."""
-    impacts, bodies = state.impacts, state.bodies
-    known = impacts.swept_version == state.version
-    for i in range(state.first if known else 0, state.moving if known else state.count):
-        bodies.trapped_impacts[i], bodies.last_impact[i] = 0, -1.0
-    impacts.swept_version = state.version
 
 
 @part
@@ -146,8 +139,7 @@ def take_event(state, event, dt):
 def request_bodies(state, c):
     """The bodies of pair c will be looked at soon, and each column of each is far away in memory."""
     bodies, pairs = state.bodies, state.pairs
-    for side in range(2):
-        i = pairs.a[c] if side == 0 else pairs.b[c]
+    for i in (pairs.a[c], pairs.b[c]):
         request(bodies.origin, i)
         request(bodies.path_velocity, i)
         request(bodies.offset, i)

@@ -16,7 +16,7 @@ from ..codes import NEED_ROOM, OK
 from ..integration.trajectory import rate_along, relative_path
 from ..joints.groups import is_joined
 from ..parts.rows import owner_of
-from .group import WORK, is_affordable, is_shooting, is_turning_group, push_group, solve_group
+from .group import LEAST_PASSES, WORK, is_shooting, is_turning_group, push_group, solve_group
 from .heap import heap_pop, heap_push, is_current
 from .impulses import HALT, HAND_OVER, IMPACT, bounce_pair
 from .worklist import list_landings, list_pairs_of
@@ -113,8 +113,7 @@ def link_members(state, members):
     event_pair, member, firsts = impacts.event_pair, impacts.member, impacts.first_member
     for m in range(members):
         c = event_pair[member[m]]
-        for side in range(2):
-            i = owner_of(state, pairs.a[c] if side == 0 else pairs.b[c])
+        for i in (owner_of(state, pairs.a[c]), owner_of(state, pairs.b[c])):
             firsts[i], impacts.gained[i] = -1, zero_of(state)
     for m in range(members):
         c = event_pair[member[m]]
@@ -153,8 +152,7 @@ def find_group(state, m):
     while done < reached:
         c = impacts.event_pair[impacts.member[impacts.group[done]]]
         done += 1
-        for side in range(2):
-            i = owner_of(state, pairs.a[c] if side == 0 else pairs.b[c])
+        for i in (owner_of(state, pairs.a[c]), owner_of(state, pairs.b[c])):
             entry = impacts.first_member[i] if inverse_mass[i] > 0.0 else -1
             while entry >= 0:
                 if impacts.is_left[entry // 2]:
@@ -179,7 +177,7 @@ def take_group(state, m, dt):
     impacts.now = impacts.event_time[first]
     count = find_group(state, m)
     single = count == 1 or is_turning_group(state, count)
-    solves = not single and is_affordable(impacts, count)
+    solves = not single and impacts.group_visits + LEAST_PASSES * count <= WORK
     if solves:
         solves = solve_group(state, count)
     elif not single:
@@ -193,8 +191,7 @@ def take_group(state, m, dt):
         bounce_pair(state, first, dt)
     for k in range(logged, impacts.logged):
         c, listed = impacts.log_pair[k], -1
-        for side in range(2):
-            i = owner_of(state, pairs.a[c] if side == 0 else pairs.b[c])
+        for i in (owner_of(state, pairs.a[c]), owner_of(state, pairs.b[c])):
             if bodies.inverse_mass[i] == 0.0:
                 continue
             if impacts.first_member[i] >= 0:

@@ -149,8 +149,7 @@ def turn_by_impact(state, event, impulse, friction, dt):
     c, normal, left = impacts.event_pair[event], impacts.event_normal[event], dt - impacts.now
     if is_joined(state, state.pairs.a[c], state.pairs.b[c]):
         call_turn_by_impact(state.links[JOINED_IMPACT], state, event, impulse, friction, dt)
-    for side in range(2):
-        i, arm, sign = (state.pairs.a[c], arms[0], -1.0) if side == 0 else (state.pairs.b[c], arms[1], 1.0)
+    for i, arm, sign in ((state.pairs.a[c], arms[0], -1.0), (state.pairs.b[c], arms[1], 1.0)):
         twisted = add(scale(lever(bodies, i, arm, normal), impulse), twist(arm, friction))
         motion = motion_of(state, i)
         advance_pose(state, i, bodies.spin[i], -left)

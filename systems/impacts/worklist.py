@@ -81,8 +81,7 @@ def list_pairs_of(state, i, but, dt):
 def list_neighbours(state, c, dt):
     """The pairs of the two bodies of pair c that can be moved."""
     listed = -1
-    for side in range(2):
-        i = state.pairs.a[c] if side == 0 else state.pairs.b[c]
+    for i in (state.pairs.a[c], state.pairs.b[c]):
         if state.bodies.inverse_mass[i] > 0.0:
             list_pairs_of(state, i, listed, dt)
             listed = c
@@ -102,8 +101,7 @@ def list_landings(state, c, now):
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
     if not impacts.linked:
         link_pairs(state)
-    for side in range(2):
-        i = pairs.a[c] if side == 0 else pairs.b[c]
+    for i in (pairs.a[c], pairs.b[c]):
         free = bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] == 0
         entry = impacts.heads[owner_of(state, i)] if free else -1
         while entry >= 0:
