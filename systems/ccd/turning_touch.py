@@ -87,12 +87,6 @@ def thickness_of(state, i):
 
 
 @part
-def thin_of(state, a, b, slop):
-    """How far points may move between two looks at a pair that is near; infinity if one has no end."""
-    return max(THIN * (thickness_of(state, a) + thickness_of(state, b)), GRAZE * slop)
-
-
-@part
 def has_to_stop(state, a, b, threshold):
     """Whether one of two whose way an impact search cannot follow still moves."""
     count, inverse_mass = state.bodies.impact_count, state.bodies.inverse_mass
@@ -125,7 +119,8 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
     corners = threshold < 0.0 or (is_turned(bodies, a) and is_turned(bodies, b))  # of others, too
     poses = pose_of(state, a), pose_of(state, b)
     touch, found, gap, crept, ended = (until, zero_of(state), zero_of(state), zero_of(state)), False, 0.0, 0, False
-    t, least, begun, low, high, thin = since, 0.0, 0.0, since, math.inf, thin_of(state, a, b, slop)
+    t, least, begun, low, high = since, 0.0, 0.0, since, math.inf
+    thin = max(THIN * (thickness_of(state, a) + thickness_of(state, b)), GRAZE * slop)  # infinity if one has no end
     for look in range(MOST_STRIDES + strides):
         turn_to(state, a, poses[0], spin_a, until, t)
         turn_to(state, b, poses[1], spin_b, until, t)

@@ -113,23 +113,16 @@ def is_ball(state, i, way):
     return is_same(support_by_address(shape, way), support_by_address(shape, scale(way, -1.0)))
 
 
-@inlined
-def middle_of(state, i, normal):
-    """From the mass centre of body i to the middle of its shape if that is a ball which contacts turn; else 0."""
-    offset, nothing = state.bodies.offset[i], zero_of(state)
-    if dot(offset, offset) > 0.0 and is_turned(state.bodies, i) and is_ball(state, i, normal):
-        return offset
-    return nothing
-
-
 @part
 def note_middles(state, r, all_alike):
-    """The middle about which each body of a contact rolls. all_alike: none where another of its contacts, which are all
-    noted by now, has another one."""
-    solver, pairs = state.solver, state.pairs
+    """The middle about which each body of a contact rolls, from its mass centre: that of a ball which contacts turn.
+    all_alike: none where another of its contacts, which are all noted by now, has another one."""
+    solver, pairs, bodies = state.solver, state.pairs, state.bodies
     c, k = solver.pair[r], solver.slot[r]
     for i, q in ((pairs.a[c], solver.first[k]), (pairs.b[c], solver.second[k])):
-        middle = middle_of(state, i, solver.normal[k])
+        middle = bodies.offset[i]
+        if not (dot(middle, middle) > 0.0 and is_turned(bodies, i) and is_ball(state, i, solver.normal[k])):
+            middle = zero_of(state)
         if all_alike:
             other = sub(solver.middle[q], middle)
             solver.middle[q] = scale(middle, 0.0) if dot(other, other) > 0.0 else middle

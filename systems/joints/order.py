@@ -41,7 +41,7 @@ def is_rigid(joints, j):
 
 @part
 def measure_group(state, j):
-    """What a row of joints is to the group of its bodies, by whose first one that is known; returns that."""
+    """What a row of joints is to the group of its bodies, by whose first one that is known."""
     solver, joints, inverse_mass = state.solver, state.solver.joints, state.bodies.inverse_mass
     direct, a, b = solver.direct, joints.row_a[j], joints.row_b[j]
     w_a, w_b = inverse_mass[a] if a >= 0 else 0.0, inverse_mass[b] if b >= 0 else 0.0
@@ -57,7 +57,6 @@ def measure_group(state, j):
             reach_a = length(joints.anchor_a[j]) if w_a > 0.0 else 0.0
             size = max(reach_a, length(joints.anchor_b[j]) if w_b > 0.0 else 0.0)
         direct.swing[g] = max(direct.swing[g], (w_a + w_b) / size if size > 0.0 else 0.0)
-    return g
 
 
 @part

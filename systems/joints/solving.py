@@ -50,16 +50,6 @@ def work_of_joint(solver, j):
     return away * dot(push, add(solver.velocity[q], cross_spin(solver.spin[q], arm)))
 
 
-@part
-def add_joint_work(solver):
-    """What moves by itself gives its work to open islands."""
-    joints = solver.joints
-    for e in range(joints.opened if solver.movers > 0 else 0):
-        j = joints.open_row[e]
-        t = island_of_joint(solver, j)
-        solver.slope[t] += work_of_joint(solver, j)
-
-
 @packed
 def solve_joined_range(solver, what, numbers, span):
     """Whatever calls asks of the joints of a range."""
@@ -88,7 +78,9 @@ def solve_joined_range(solver, what, numbers, span):
     elif what == calls.RELAX_OPEN:
         relax_open(solver)
     elif what == calls.ADD_WORK:
-        add_joint_work(solver)
+        for e in range(joints.opened if solver.movers > 0 else 0):
+            j = joints.open_row[e]
+            solver.slope[island_of_joint(solver, j)] += work_of_joint(solver, j)
     elif what == calls.SUM_WORK:
         for e in range(joints.begin, joints.end if solver.movers > 0 else joints.begin):
             h += work_of_joint(solver, joints.order[e])

@@ -118,23 +118,33 @@ def depth_at(state, c, d, extent, exact):
     return depth, normal
 
 
+@inlined
+def skip_before(rows, k, a, b):
+    """The first row of the step before, from k on, of a pair of entities that is not before (a, b)."""
+    now = rows.now
+    while k < rows.counts[now] and (
+        rows.entity_a[now, k] < a or (rows.entity_a[now, k] == a and rows.entity_b[now, k] < b)
+    ):
+        k += 1
+    return k
+
+
+@inlined
+def is_of_pair(rows, k, a, b):
+    """Whether there is a row k of the step before, and of that pair of entities."""
+    now = rows.now
+    return k < rows.counts[now] and rows.entity_a[now, k] == a and rows.entity_b[now, k] == b
+
+
 @part
 def mark_early(state):
     """Pairs that rested in the step before, and touched, are taken where this one starts. Both lists are in canonical
     order."""
     pairs, contacts, entity, now, k = state.pairs, state.contacts, state.bodies.entity, state.contacts.now, 0
-    count = contacts.counts[now] if state.moved else 0
-    for c in range(pairs.count if count > 0 else 0):
-        first, second = entity[pairs.a[c]], entity[pairs.b[c]]
-        while k < count and (
-            contacts.entity_a[now, k] < first
-            or (contacts.entity_a[now, k] == first and contacts.entity_b[now, k] < second)
-        ):
-            k += 1
-        if k == count:
-            break
-        same = contacts.entity_a[now, k] == first and contacts.entity_b[now, k] == second
-        pairs.early[c] = same and contacts.rested[now, k] and pairs.is_solid[c]
+    for c in range(pairs.count if state.moved and contacts.counts[now] > 0 else 0):
+        a, b = entity[pairs.a[c]], entity[pairs.b[c]]
+        k = skip_before(contacts, k, a, b)
+        pairs.early[c] = is_of_pair(contacts, k, a, b) and contacts.rested[now, k] and pairs.is_solid[c]
 
 
 @inlined

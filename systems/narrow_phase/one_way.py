@@ -17,7 +17,7 @@ from ..codes import OK
 from ..shapes.dispatch import both_convex
 from ..shapes.surfaces import along_world
 from ..shapes.tolerances import SAME_PLACE, way_of_turning
-from .manifolds import centre_offset, centre_offset_at_start, evaluate_pair
+from .manifolds import centre_offset, centre_offset_at_start, evaluate_pair, is_of_pair, skip_before
 
 UPRIGHT = 0.5  # cosine of the most that a normal leans from the direction: what leans farther is met from the side
 SLACK = 0.02  # of its extent: what is no deeper in at the start of the step comes from the front, as off a floor beside
@@ -93,18 +93,13 @@ def release_one_way(state, dt):
     """Pairs with a one-way collider that do not meet its front count as disabled. Pairs and the contacts of the step
     before are in canonical order."""
     pairs, contacts, entity, now, k = state.pairs, state.contacts, state.bodies.entity, state.contacts.now, 0
-    count = contacts.counts[now] if state.moved else 0
     for c in range(pairs.count):
         a, b = pairs.a[c], pairs.b[c]
         if not pairs.is_solid[c] or not (is_one_way(state, a) or is_one_way(state, b)):
             continue
         first, second = entity[a], entity[b]
-        while k < count and (
-            contacts.entity_a[now, k] < first
-            or (contacts.entity_a[now, k] == first and contacts.entity_b[now, k] < second)
-        ):
-            k += 1
-        touched = k < count and contacts.entity_a[now, k] == first and contacts.entity_b[now, k] == second
+        k = skip_before(contacts, k, first, second)
+        touched = state.moved and is_of_pair(contacts, k, first, second)
         pressed = contacts.depth[now, k] if touched and contacts.enabled[now, k] else -math.inf
         start, end = centre_offset_at_start(state.bodies, a, b), centre_offset(state.bodies, a, b)
         if not one_way_holds(state, a, b, start if state.moved else end, end, pressed):

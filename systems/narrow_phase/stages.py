@@ -23,7 +23,8 @@ FAST_TURN = 1.0  # rad in a step
 def rank_rows(state):
     """The place of each row in the order of entity ids, which ascend in each of four runs: how many ids of its own run
     and of the others are smaller."""
-    entity, rank, stops = state.bodies.entity, state.bodies.rank, block_stops(state)
+    entity, rank = state.bodies.entity, state.bodies.rank
+    stops = state.sleepers, state.dynamic, state.moving, state.count  # of sleepers, dynamic, kinematic, static rows
     start = 0
     for run in range(4):
         stop, first = stops[run], 0
@@ -38,12 +39,6 @@ def rank_rows(state):
             first = last
         start = stop
     state.ranks_version = state.version
-
-
-@part
-def block_stops(state):
-    """The first row after those that sleep, the dynamic, the kinematic and the static ones."""
-    return state.sleepers, state.dynamic, state.moving, state.count
 
 
 ROOM_FOR_ORDER = (

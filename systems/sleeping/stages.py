@@ -235,20 +235,14 @@ def is_at_rest(state, i, dt):
 
 
 @part
-def is_unmoved_by_itself(state, i):
-    """Whether a body that moves by its own velocity alone has none."""
-    bodies = state.bodies
-    return is_zero(bodies.linear_velocity[i]) and is_same_vector(bodies.position[i], bodies.previous_position[i])
-
-
-@part
 def count_rest(state, dt, needed):
     """For how many steps each moving body has been at rest; returns whether some body has for long enough: also one
     that cannot be moved, where others sleep."""
     bodies, ripe, last = state.bodies, False, state.moving if state.asleep > 0 else state.dynamic
     for i in range(state.first, state.moving):
         if bodies.sleep_state[i] == AWAKE:
-            rests = is_at_rest(state, i, dt) if i < state.dynamic else is_unmoved_by_itself(state, i)
+            v, x, before = bodies.linear_velocity[i], bodies.position[i], bodies.previous_position[i]
+            rests = is_at_rest(state, i, dt) if i < state.dynamic else is_zero(v) and is_same_vector(x, before)
             bodies.rest_steps[i] = bodies.rest_steps[i] + 1 if rests else 0
             if bodies.rest_steps[i] <= 1:
                 bodies.rest_position[i] = bodies.position[i]

@@ -127,7 +127,7 @@ def exceeds_budget(solver, t):
 
 
 @part
-def energy_budget(solver, bias_rate, h, dt, span, arms, islands):
+def energy_budget(solver, bias_rate, h, dt, span, islands):
     """What each island may gain in a substep: what its joints have taken before in the step, what forces give from
     rest, more of that where it is pushed out, and without joints, which would use it in each substep, a small share of
     the energy at the speed of pushing."""
@@ -145,12 +145,6 @@ def energy_budget(solver, bias_rate, h, dt, span, arms, islands):
 def gains_by_contacts(solver, t):
     """Whether further passes may take what island t has gained: those of contacts do not take what joints give."""
     return exceeds_budget(solver, t) and solver.links[t] == 0
-
-
-@inlined
-def further_passes(solver, t):
-    """How many further passes island t may have in a substep."""
-    return most_repeats(solver.size_of[t] + solver.links[t])
 
 
 @inlined
@@ -173,7 +167,8 @@ def find_unsolved_rows(solver, turn, any_struck, dt, span, arms, islands):
         if excess * finest > least or any_gain:  # seldom
             t = island_of(solver, k)
             wrong = struck[t] and excess * excess_scale(solver, t) > least
-            if (wrong or gains_by_contacts(solver, t)) and turn <= further_passes(solver, t):
+            rows = solver.size_of[t] + solver.links[t]
+            if (wrong or gains_by_contacts(solver, t)) and turn <= most_repeats(rows):
                 solver.listed[count] = k
                 solver.listed_of[t] += 1
                 count += 1
@@ -237,7 +232,7 @@ def finish_substep(solver, bias_rate, any_struck, h, dt, span, arms):
     if not (any_gain or any_struck):
         carry_budget(solver, islands)
         return
-    energy_budget(solver, bias_rate, h, dt, span, arms, islands)
+    energy_budget(solver, bias_rate, h, dt, span, islands)
     turn, count = 0, find_unsolved_rows(solver, 0, any_struck, dt, span, arms, islands)
     while count > 0:
         for_joints(solver, calls.RELAX_OPEN, NO_NUMBERS, span, arms)

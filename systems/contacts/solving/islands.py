@@ -338,15 +338,6 @@ def build_chunks(state):
 
 
 @part
-def place_ends(state):
-    """The places of the two bodies of each row."""
-    solver, pairs = state.solver, state.pairs
-    for r in range(solver.contacts):
-        a, b, k = pairs.a[solver.pair[r]], pairs.b[solver.pair[r]], solver.slot[r]
-        solver.first[k], solver.second[k] = place_of(state, a), place_of(state, b)
-
-
-@part
 def order_joints(state):
     """The rows of joints by range and island, and the places of their bodies; the world has that behind all bodies.
 
@@ -408,5 +399,8 @@ def order_rows(state, dt, listed):
         solver.chunks = 0
         if state.spinning:
             build_chunks(state)
-        place_ends(state)
+        pairs = state.pairs
+        for r in range(solver.contacts):
+            a, b, k = pairs.a[solver.pair[r]], pairs.b[solver.pair[r]], solver.slot[r]
+            solver.first[k], solver.second[k] = place_of(state, a), place_of(state, b)
     solver.joint_ends[0] = 0

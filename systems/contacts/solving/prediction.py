@@ -12,10 +12,11 @@ from ....framework.schedule.stages import Rows
 from ....framework.vectors import add, add_scaled, dot, length, scale, sub
 from ...codes import OK
 from ...linking.parts import JOINED_SUPPORT, call_of_step
+from ...narrow_phase.manifolds import is_of_pair, skip_before
 from ...parts.rows import owner_of
 from ...parts.stages import copy_prediction_to_parts
 from ...records import CURVES, PREDICTED
-from .warm_start import find_rows, scale_to, skip_before
+from .warm_start import find_rows, scale_to
 
 
 @part
@@ -31,7 +32,7 @@ def mark_disabled(state):
             continue
         a, b = entity[pairs.a[c]], entity[pairs.b[c]]
         m = skip_before(memory, m, a, b)
-        while m < memory.counts[now] and memory.entity_a[now, m] == a and memory.entity_b[now, m] == b:
+        while is_of_pair(memory, m, a, b):
             memory.off[m] = True
             m += 1
 

@@ -189,14 +189,6 @@ def is_still(solver, dt, span, arms):
 
 
 @part
-def repeat_substep(solver, left, h, span, arms):
-    """The substeps that are left of an island that rests do what the last one did."""
-    for k in range(span[0], span[1]):
-        solver.total[k] += left * solver.impulse[k]
-    integrate_positions(solver, left * h, span, arms)
-
-
-@part
 def scale_impulses(solver, by, span):
     """Impulses of a step become those of one of its substeps, or the other way."""
     for k in range(span[0], span[1]):
@@ -260,8 +252,10 @@ def solve_range(solver, s, dt, span, arms):
         if special:
             note_impulses(solver, span)
         solve_substep(solver, springs, (h, dt), rule, left == 0, span, arms)
-        if special and left > 0 and is_still(solver, dt, span, arms):
-            repeat_substep(solver, left, h, span, arms)
+        if special and left > 0 and is_still(solver, dt, span, arms):  # those that are left do what this one did
+            for k in range(span[0], span[1]):
+                solver.total[k] += left * solver.impulse[k]
+            integrate_positions(solver, left * h, span, arms)
             break
     scale_impulses(solver, float(substeps), span)
     for_joints(solver, calls.KEEP, (h, dt), span, arms)

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 
-from ....framework.compilation import inlined, part
+from ....framework.compilation import part
 from ....framework.data.row_moves import place_of
 from ....framework.jit.records.record_type import zero_of
 from ....framework.schedule.stages import Rows
 from ....framework.vectors import add_scaled, dot, scale, sub
 from ...codes import OK
+from ...narrow_phase.manifolds import skip_before
 from ..constants import NEGLIGIBLE, SAME_PLACE_EXTENTS, WARM_START_MAX
 from .guard import island_of
 from .records import WARM_START_ROWS
@@ -45,13 +46,6 @@ def row_of(state, wanted):
 
 
 @part
-def row_of_shape(state, wanted):
-    """The row of an entity; -1 if it is no body, or has no shape any more."""
-    row = row_of(state, wanted)
-    return row if row >= 0 and state.bodies.shape[row] >= 0 else -1
-
-
-@part
 def find_rows(state):
     """The rows of the remembered pairs, -1 for bodies that are gone, or have lost their shape. They hold until rows
     move or shapes go."""
@@ -59,8 +53,9 @@ def find_rows(state):
     if memory.rows_version[now] == state.version:
         return
     for m in range(memory.counts[now]):
-        memory.first[now, m] = row_of_shape(state, memory.entity_a[now, m])
-        memory.second[now, m] = row_of_shape(state, memory.entity_b[now, m])
+        for rows, entity in ((memory.first, memory.entity_a[now, m]), (memory.second, memory.entity_b[now, m])):
+            row = row_of(state, entity)
+            rows[now, m] = row if row >= 0 and state.bodies.shape[row] >= 0 else -1
     memory.rows_version[now] = state.version
 
 
@@ -83,17 +78,6 @@ def start_with(solver, memory, k, several, span):
     n, pull = solver.normal[k], memory.tangent[now, m]
     solver.impulse[k] = memory.impulse[now, m]
     solver.tangent[k] = add_scaled(pull, n, -dot(pull, n))
-
-
-@inlined
-def skip_before(memory, m, a, b):
-    """The first remembered contact, from m on, of a pair of entities that is not before (a, b)."""
-    now = memory.now
-    while m < memory.counts[now] and (
-        memory.entity_a[now, m] < a or (memory.entity_a[now, m] == a and memory.entity_b[now, m] < b)
-    ):
-        m += 1
-    return m
 
 
 def match_warm_start(state, dt):
