@@ -273,22 +273,27 @@ def join_islands(state, dt, needed):
                 i = owner_of(state, row)
                 if i < state.dynamic and bodies.rest_steps[i] >= needed:
                     keeps_awake[i] = goes_on(state, i, dt)
-    reach = reach_of_next_step(state, dt)
-    for c in range(pairs.count):
-        a, b = min(pairs.a[c], pairs.b[c]), max(pairs.a[c], pairs.b[c])
-        awake = b < state.dynamic and still[a] == AWAKE and still[b] == AWAKE
-        if awake and pairs.is_solid[c] and (pairs.near_contact[c] or wakes(state, dt, c, reach)):
-            join_roots(root, a, b)
     for i in range(state.first, state.dynamic if state.has_parts else state.first):
         if owner_of(state, i) != i:
             keeps_awake[i] = False
             join_roots(root, i, owner_of(state, i))
+    reach = reach_of_next_step(state, dt)
+    for c in range(pairs.count):
+        a, b, near = min(pairs.a[c], pairs.b[c]), max(pairs.a[c], pairs.b[c]), pairs.near_contact[c]
+        awake = b < state.dynamic and still[a] == AWAKE and still[b] == AWAKE
+        if awake and pairs.is_solid[c] and (near or wakes(state, dt, c, reach)):
+            join_roots(root, a, b)
+        carried = a < state.dynamic and state.dynamic <= b < state.moving and bodies.rest_steps[b] < needed
+        if carried and pairs.is_solid[c] and near:
+            keeps_awake[a] = True
     joints = state.solver.joints
     for e in range(joints.active):
         a, b = joints.row_a[joints.order[e]], joints.row_b[joints.order[e]]
         low, high = min(a, b), max(a, b)
         if low >= state.first and high < state.dynamic:
             join_roots(root, low, high)
+        if state.first <= low < state.dynamic <= high < state.moving and bodies.rest_steps[high] < needed:
+            keeps_awake[low] = True
     for c in range(pairs.count if pairs.disabled_count > 0 else 0):
         a, b = pairs.a[c], pairs.b[c]
         if not pairs.disabled[c] or is_one_way(state, a) or is_one_way(state, b):  # of these no system decides
@@ -299,16 +304,6 @@ def join_islands(state, dt, needed):
     for i in range(state.first, state.dynamic):
         if keeps_awake[i]:
             keeps_awake[root_of(root, i)] = True
-    for c in range(pairs.count):
-        a, b = min(pairs.a[c], pairs.b[c]), max(pairs.a[c], pairs.b[c])
-        carried = a < state.dynamic and state.dynamic <= b < state.moving
-        if carried and pairs.is_solid[c] and pairs.near_contact[c] and bodies.rest_steps[b] < needed:
-            keeps_awake[root_of(root, a)] = True
-    for e in range(joints.active):
-        a, b = joints.row_a[joints.order[e]], joints.row_b[joints.order[e]]
-        low, high = min(a, b), max(a, b)
-        if state.first <= low < state.dynamic <= high < state.moving and bodies.rest_steps[high] < needed:
-            keeps_awake[root_of(root, low)] = True
 
 
 @part
