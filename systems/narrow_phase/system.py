@@ -27,26 +27,6 @@ from .stages import (
 )
 
 
-def filtered(
-    filters: list[tuple[str, Any]], bodies: Any, first: np.ndarray, second: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Those pairs of rows that every filter (plugin, function) lets through; PluginError if one does not say which."""
-    for plugin, function in filters:
-        if not len(first):
-            break
-        name = f"plugin {plugin}: pair filter {function.__name__}"
-        try:
-            may_meet = function(bodies, first, second)
-        except Exception as error:
-            error.add_note(name)
-            raise
-        if not isinstance(may_meet, np.ndarray) or may_meet.dtype != bool or may_meet.shape != first.shape:
-            got = f"{may_meet.dtype} {may_meet.shape}" if isinstance(may_meet, np.ndarray) else repr(may_meet)
-            raise PluginError(f"{name} must return an array of {len(first)} bool, one for each pair, got {got}")
-        first, second = first[may_meet], second[may_meet]
-    return first, second
-
-
 class NarrowPhase(StagedSystem):
     """Tests the candidates with the functions of their shapes, level by level, and fills ``world.contacts``.
 
@@ -104,11 +84,23 @@ class NarrowPhase(StagedSystem):
         ]
 
     def filter_candidates(self) -> None:
-        """Keep the candidates that the plugins' filters let through."""
+        """Keep the candidates that every plugin's filter lets through; PluginError if one does not say which."""
         candidates = self._state.candidates
         count = candidates.count
         first, second = candidates.sorted_a[:count], candidates.sorted_b[:count]
-        first, second = filtered(self._registry.pair_filters, self._bodies, first, second)
+        for plugin, function in self._registry.pair_filters:
+            if not len(first):
+                break
+            name = f"plugin {plugin}: pair filter {function.__name__}"
+            try:
+                may_meet = function(self._bodies, first, second)
+            except Exception as error:
+                error.add_note(name)
+                raise
+            if not isinstance(may_meet, np.ndarray) or may_meet.dtype != bool or may_meet.shape != first.shape:
+                got = f"{may_meet.dtype} {may_meet.shape}" if isinstance(may_meet, np.ndarray) else repr(may_meet)
+                raise PluginError(f"{name} must return an array of {len(first)} bool, one for each pair, got {got}")
+            first, second = first[may_meet], second[may_meet]
         candidates.count = len(first)
         candidates.sorted_a[: len(first)], candidates.sorted_b[: len(first)] = first, second
 
