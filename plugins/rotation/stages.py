@@ -61,10 +61,7 @@ def turn_about(state, i, angle):
 @part
 def spin_of(state, spin, i):
     """The angular velocity of a body; in a plane the first component."""
-    w = zero_of(state)
-    for k in range(1 if len(w) == 2 else 3):
-        w = replace(w, k, spin.angular_velocity[i, k])
-    return w
+    return triple(zero_of(state), spin_now(state, spin, i))
 
 
 TURNS_BY = (

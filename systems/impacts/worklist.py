@@ -88,16 +88,9 @@ def list_neighbours(state, c, dt):
 
 
 @part
-def may_have_sunk(state, i, k, now):
-    """Whether body i may by now have sunk through k, which cannot be moved, as slowly as a contact at rest lets it."""
-    if state.bodies.inverse_mass[k] > 0.0:
-        return False
-    return bounce_threshold(state, i, k) * now > FAST * smaller_extent(state.bodies, i, k)
-
-
-@part
 def list_landings(state, c, now):
-    """The pairs in which a body of pair c may have sunk before its impact, from the start of the step on."""
+    """The pairs in which a body of pair c may have sunk through what cannot be moved before its impact, as slowly as a
+    contact at rest lets it, from the start of the step on."""
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
     if not impacts.linked:
         link_pairs(state)
@@ -107,6 +100,7 @@ def list_landings(state, c, now):
         while entry >= 0:
             p = entry // 2
             one, other = (pairs.a[p], pairs.b[p]) if entry % 2 == 0 else (pairs.b[p], pairs.a[p])
-            if p != c and pairs.is_solid[p] and may_have_sunk(state, one, other, now):
+            fixed, room = bodies.inverse_mass[other] == 0.0, FAST * smaller_extent(bodies, one, other)
+            if p != c and pairs.is_solid[p] and fixed and bounce_threshold(state, one, other) * now > room:
                 list_pair(impacts, p, 0.0)
             entry = impacts.links[entry]
