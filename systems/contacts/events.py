@@ -24,6 +24,7 @@ from .solving.records import OVERLOADED, RESTRAINED, SQUEEZED, TORN_OPEN
 from .stages import ROOM_FOR_FOUND, compare_contacts
 
 Columns = dict[str, np.ndarray]
+TOLD = ("entity_a", "entity_b", "point", "normal", "depth", "impulse")  # of contacts
 MEETING = ("layer", "mask", "group")  # of colliders: whom they meet
 
 
@@ -130,19 +131,15 @@ class RecordedContacts:
 
     def record_waiting(self) -> None:
         """Add what has begun, ended and bounced in the last step to the histories, unless that is done."""
-        self._record_impacts()
+        if self._impacts.logged and not self._state.impacts_recorded:
+            self._state.impacts_recorded = True
+            self.record("impacts", self.impacts())
         if self._state.event_count:
             self._state.event_count = 0
             if self._touching.begins:
                 self.record("begin", self.began())
             if self._touching.ends:
                 self.record("end", self.ended())
-
-    def _record_impacts(self) -> None:
-        """Add the impacts of the step that is running to the history, unless they are in it already."""
-        if self._impacts.logged and not self._state.impacts_recorded:
-            self._state.impacts_recorded = True
-            self.record("impacts", self.impacts())
 
     def points(self, columns: Columns) -> Columns:
         """The same contacts, a row for each of their points, with its place in the columns; those of a pair of which
@@ -177,16 +174,9 @@ class RecordedContacts:
     def _rows(self, slot: int, rows: Any) -> Columns:
         """Copies of some contacts."""
         columns = self._touching.columns()
-        entity_a = columns["entity_a"][slot][rows].copy()
-        return {
-            "entity_a": entity_a,
-            "entity_b": columns["entity_b"][slot][rows].copy(),
-            "point": columns["point"][slot][rows].copy(),
-            "normal": columns["normal"][slot][rows].copy(),
-            "depth": columns["depth"][slot][rows].copy(),
-            "normal_impulse": columns["impulse"][slot][rows].copy(),
-            "step": _repeated(columns["steps"][slot], len(entity_a)),
-        }
+        found = {name: columns[name][slot][rows].copy() for name in TOLD}
+        found["normal_impulse"] = found.pop("impulse")
+        return {**found, "step": _repeated(columns["steps"][slot], len(found["depth"]))}
 
     def _found(self) -> Columns:
         self._program.run_one("finish_found", self._clock.dt)

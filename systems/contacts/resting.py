@@ -1,4 +1,5 @@
-"""Contacts at rest: which pairs they are, their geometry at the start of the step, and what touches in the end."""
+"""Contacts at rest: where two bodies first touch on their way, which pairs rest, their geometry at the start of the
+step, and what touches in the end."""
 
 from __future__ import annotations
 
@@ -12,7 +13,8 @@ from ..ccd.turning_touch import is_followed
 from ..codes import NEED_REST, OK
 from ..forces.stages import is_zero
 from ..impacts.impulses import STOPPED, is_beyond_cap, is_trapped
-from ..integration.turning import arms_to, closing_by_spin, size_of_turn
+from ..integration.trajectory import ROUNDING, along, relative_path
+from ..integration.turning import arms_to, closing_by_spin, is_turned, size_of_turn
 from ..linking.parts import ARMS_AT_REST, TOUCH_OF_TURN, call_of_step, call_touch_of_turn
 from ..narrow_phase.manifolds import (
     centre_offset,
@@ -28,7 +30,15 @@ from ..narrow_phase.manifolds import (
     make_manifold,
 )  # fmt: skip
 from ..parts.rows import owner_of
-from ..shapes.dispatch import both_convex, friction_at, restitution_at, restitution_of
+from ..shapes.dispatch import (
+    both_convex,
+    both_sharp,
+    friction_at,
+    has_corner_rule,
+    is_corner_touch,
+    restitution_at,
+    restitution_of,
+)  # fmt: skip
 from ..shapes.surfaces import any_surface_runs, slip_at
 from ..shapes.tolerances import (
     SAME_PLACE,
@@ -41,13 +51,81 @@ from ..shapes.tolerances import (
     turning_margin,
     turning_travel,
 )  # fmt: skip
-from .approach import STAYS_SLOPS, first_touch_on_segment, is_stationary, meets_at_corner, segment_start
 from .points import is_ball, points_of, rows_from
 
+APPROACH_LOOKS = 24
 ENTRY_ITERATIONS = 24
+STAYS_SLOPS = 1e-3  # slops: two bodies that go less far past each other in a step stay where they are
 REST_GAP = 1e-11  # of the extent: a smaller gap is none, not even as seen past a round corner
 NORMAL_PROBE, NORMAL_VARIATION = 1e-6, 1e-9  # of the extent: so near the normal differs, by this much of its cosine
 STATIONARY, SEPARATES_SLOWLY, SEPARATES = range(3)  # what an elastic pair does at the end of the step
+
+
+@inlined
+def is_stationary(travel, slop):
+    """Whether two bodies that go so far past each other stay where they are; false for nan."""
+    return dot(travel, travel) < STAYS_SLOPS * STAYS_SLOPS * slop * slop
+
+
+@part
+def meets_at_corner(state, a, b, d, met, slop):
+    """Whether the two touch at a corner only. Shapes without a rule of their own are looked at if they move past each
+    other: what stays where it is does not catch. Two that turn may lean on each other's corners. met: (depth, normal)
+    there."""
+    bodies, shape = state.bodies, state.bodies.shape
+    if state.spinning and is_turned(bodies, a) and is_turned(bodies, b):
+        return False
+    if not has_corner_rule(state, shape[a], shape[b]):
+        if not both_sharp(state, shape[a], shape[b]):
+            return False
+        if is_stationary(sub(centre_offset(bodies, a, b), centre_offset_at_start(bodies, a, b)), slop):
+            return False
+    return is_corner_touch(state, shape[a], a, shape[b], b, d, met, slop)
+
+
+@part
+def segment_start(state, a, b):
+    """From a's centre to b's where the last stretch of their way begins: at the later of their last impacts if they are
+    apart there, else at the start of the step. Nothing holds what rests between two impacts.
+    """
+    bodies = state.bodies
+    start = centre_offset_at_start(bodies, a, b)
+    if state.impacts.sweeps and (bodies.impact_count[a] > 0 or bodies.impact_count[b] > 0):
+        since = max(0.0, bodies.last_impact[a], bodies.last_impact[b])
+        d = along(relative_path(state, a, b), since)
+        if evaluate_pair(state, a, b, d)[1] <= slop_of(state, a, b):
+            return d
+    return start
+
+
+@part
+def first_touch_on_segment(state, a, b, d, travel, edge):
+    """(whether they touch on the way from d to d + travel and get deeper than ``edge``; gap at d and normal of that),
+    by conservative advancement; of concave shapes by their distance, as what comes next may have another normal.
+    A touch of corners is none, nor one that only is the edge of the next thing in a row that one of them slides along.
+    """
+    shape, t, nothing = state.bodies.shape, 0.0, zero_of(state)
+    way, slop = length(travel), slop_of(state, a, b)
+    convex = both_convex(state, shape[a], shape[b])
+    _, depth, normal, _ = evaluate_pair(state, a, b, d)
+    for _ in range(APPROACH_LOOKS):
+        rate = dot(travel, normal)
+        if convex and not rate < 0.0:
+            break
+        at, further = add_scaled(d, travel, t), t - depth / (-rate if convex else way)
+        if depth >= -ROUNDING * (length(d) + t * way) or (not convex and depth >= -slop):
+            further = t + 2.0 * slop / way
+            if rate < 0.0 and not meets_at_corner(state, a, b, at, (depth, normal), slop):
+                ahead = t - 2.0 * edge / rate
+                if ahead < 1.0 and evaluate_pair(state, a, b, add_scaled(d, travel, ahead))[1] > edge:
+                    return True, -depth - t * rate, normal
+                if convex:
+                    break
+        if not further < 1.0:
+            break
+        t = further
+        _, depth, normal, _ = evaluate_pair(state, a, b, add_scaled(d, travel, t))
+    return False, 0.0, nothing
 
 
 @part
@@ -297,7 +375,7 @@ def linearise(state, dt):
         for e in range(r, r + rows_from(solver, r)):
             k = solver.slot[e]
             solver.normal[k], solver.gap[k], solver.extent[k], solver.friction[k] = normal, gap, extent, mu
-            solver.apart[k], solver.varies[k], solver.parting[k] = apart, varies, parts
+            solver.apart[k], solver.hard[k], solver.parting[k] = apart, not varies, parts
     solver.has_friction, solver.surfaces_run = has_friction, any_surface_runs(state) and find_surface_slips(state)
     solver.has_rolling = False
     return call_of_step(state.links[ARMS_AT_REST], state, dt) if state.spinning else OK

@@ -35,7 +35,7 @@ from ..narrow_phase.one_way import is_one_way
 from ..narrow_phase.stages import is_solid_pair, layers_meet
 from ..parts.rows import next_row, owner_of
 from ..shapes.tolerances import SAME_PLACE, smaller_extent, way_of_turning
-from .approach import first_touch_on_segment, segment_start
+from .resting import first_touch_on_segment, segment_start
 from .solving.records import SQUEEZED, note_fault
 
 QUARTER = 0.5 * math.pi  # rad: what turns farther shows its other side

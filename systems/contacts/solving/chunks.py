@@ -11,9 +11,9 @@ from ....framework.compilation import inlined, part
 from ....framework.jit.records.schema import Schema, floats, vectors
 from ....framework.jit.records.stack_record import stack_record
 from ....framework.vectors import add, add_scaled, dot, scale, sub
-from ...integration.turning import cross_spin, symmetric, twist
+from ...integration.turning import cross_spin, end_of_turn, symmetric, twist
 from .records import ROW_CHUNK
-from .rows import pull_along_surface, turned_apart, update_targets
+from .rows import pull_along_surface, update_targets
 
 SEVERAL = 1.0 + 1e-9  # times the masses that two points of a pair move: they are solved at once even if they are one
 
@@ -226,9 +226,9 @@ def measure_rows(solver, chunk, ahead, dt, first, pairs):
     any_far = False
     for q in range(pairs):
         k, n = first + q, solver.normal[first + q]
-        a = chunk.turn_a[q], (chunk.sine_a[q], chunk.versine_a[q]), solver.core_a[k]
-        b = chunk.turn_b[q], (chunk.sine_b[q], chunk.versine_b[q]), solver.core_b[k]
-        room = solver.gap[k] + dot(chunk.way[q], n) + turned_apart(a, b, n)
+        end_a = end_of_turn(chunk.turn_a[q], (chunk.sine_a[q], chunk.versine_a[q]), solver.core_a[k])
+        end_b = end_of_turn(chunk.turn_b[q], (chunk.sine_b[q], chunk.versine_b[q]), solver.core_b[k])
+        room = solver.gap[k] + dot(chunk.way[q], n) + dot(sub(end_b, end_a), n)
         closing = -dot(parting_at(chunk_motion(chunk, q), solver.arm_a[k], solver.arm_b[k]), n)
         any_far |= update_targets(solver, k, room, closing, ahead, dt)
     return any_far

@@ -10,7 +10,7 @@ from ....framework.compilation import part
 from ....framework.vectors import dot, sub
 from ...ccd.search_bounds import turns_far
 from ...integration.turning import is_turned
-from ..approach import centre_offset, centre_offset_at_start
+from ...narrow_phase.manifolds import centre_offset, centre_offset_at_start
 from ..constants import NEGLIGIBLE, UNREACHED
 from .rows import closing_speed, separation_from_rotation
 
@@ -51,11 +51,11 @@ def select_rigid(state, dt, nothing, arms):
     any_apart = False
     for k in range(solver.contacts):
         a, b = solver.first[k], solver.second[k]
-        solver.hard[k] = False
+        may_be, solver.hard[k] = solver.hard[k], False
         if inverse_mass[a] == 0.0 or inverse_mass[b] == 0.0:
             body = moved_body(solver, k)
             rested = state.any_warm_started and warm_started[solver.body_row[body]]
-            hard = rested and not (pressed[body] > 0.0 or solver.varies[k])
+            hard = may_be and rested and not pressed[body] > 0.0
             solver.hard[k] = hard
             any_apart |= hard and solver.apart[k]
             if hard and solver.apart[k]:

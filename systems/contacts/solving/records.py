@@ -39,7 +39,6 @@ SOLVER = Schema(
     normal=vectors(unit="1"),
     gap=floats(unit="m"),  # along the normal, where the step starts; below 0: overlap
     apart=flags(),  # there is a gap where the step starts
-    varies=flags(),  # its normal stands for several faces
     parting=flags(),  # it bounces: no overlap to be pushed out
     mass=floats(unit="kg"),  # see effective_mass
     friction=floats(unit="1"),
@@ -54,7 +53,7 @@ SOLVER = Schema(
     most_push=floats(unit="m/s"),  # but not below this
     soft=floats(unit="1"),  # share of its impulse that it gives back in that pass; below 0 where it is open: none
     peak=floats(unit="N s"),  # largest impulse in this step, that it starts with counts
-    hard=flags(),
+    hard=flags(),  # before that: its normal does not stand for several faces
     has_friction=flag(),
     tips=flag(),  # some pair has several points
     has_rolling=flag(),

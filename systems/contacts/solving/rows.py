@@ -66,20 +66,12 @@ def turned(solver, q, arm):
 
 
 @inlined
-def turned_apart(a, b, normal):
-    """How much farther apart along the normal turning brings the ends of two arms: (turn, shares of it, arm) of each.
-    """
-    return dot(sub(end_of_turn(*b), end_of_turn(*a)), normal)
-
-
-@inlined
 def separation_from_rotation(solver, k, arms):
     """How much farther apart row k is along its normal because its bodies are not turned as where the step ends."""
     if len(arms) == 0:
         return 0.0
-    a, b, turn, sine, versine = solver.first[k], solver.second[k], solver.turn, solver.sine, solver.versine
-    one = turn[a], (sine[a], versine[a]), solver.core_a[k]
-    return turned_apart(one, (turn[b], (sine[b], versine[b]), solver.core_b[k]), solver.normal[k])
+    one, other = turned(solver, solver.first[k], solver.core_a[k]), turned(solver, solver.second[k], solver.core_b[k])
+    return dot(sub(other, one), solver.normal[k])
 
 
 @inlined
@@ -270,9 +262,8 @@ def solve_friction_of(solver, k, over, arms, runs):
 @part
 def solve_friction(solver, over, span, arms):
     """One pass along their surfaces, where nothing spins."""
-    start, stop, _, _ = span
     runs = solver.surfaces_run
-    for k in range(start, stop):
+    for k in range(span[0], span[1]):
         if solver.friction[k] != 0.0:
             solve_friction_of(solver, k, over, arms, runs)
 
