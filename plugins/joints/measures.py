@@ -44,15 +44,15 @@ class Moving(NamedTuple):
             x, y = vectors.T
             return np.stack((c * x - s * y, s * x + c * y), axis=1)
         real, axis = self.rotation[:, :1], self.rotation[:, 1:]
-        half = _cross(axis, vectors)
-        return vectors + 2.0 * (real * half + _cross(axis, half))
+        half = np.cross(axis, vectors)
+        return vectors + 2.0 * (real * half + np.cross(axis, half))
 
     def speed_at(self, points: np.ndarray) -> np.ndarray:
         """The velocities of the bodies' points that are there."""
         arm = points - self.position
         if self.spin.ndim == 1:
             return self.velocity + self.spin[:, None] * np.stack((-arm[:, 1], arm[:, 0]), axis=1)
-        return self.velocity + _cross(self.spin, arm)
+        return self.velocity + np.cross(self.spin, arm)
 
     def rate(self, along: np.ndarray, turn: np.ndarray) -> np.ndarray:
         """What the bodies move along some vectors and turn about others, per second."""
@@ -90,7 +90,7 @@ def _angle(of: Holds, a: Moving, b: Moving) -> tuple[np.ndarray, np.ndarray]:
     if a.spin.ndim == 1:
         return b.rotation - a.rotation - of.start, b.spin - a.spin
     axis, side_a, side_b = a.turned(of.axis), a.turned(of.side_a), b.turned(of.side_b)
-    return np.arctan2(_dot(axis, _cross(side_a, side_b)), _dot(side_a, side_b)), _dot(axis, b.spin - a.spin)
+    return np.arctan2(_dot(axis, np.cross(side_a, side_b)), _dot(side_a, side_b)), _dot(axis, b.spin - a.spin)
 
 
 def _twist(of: Holds, a: Moving, b: Moving) -> tuple[np.ndarray, np.ndarray]:
@@ -99,7 +99,7 @@ def _twist(of: Holds, a: Moving, b: Moving) -> tuple[np.ndarray, np.ndarray]:
     between = axis + b.turned(of.axis_b)
     rate = between / np.maximum(FOLDED, _dot(between, axis))[:, None]
     side_b = side_b - _dot(axis, side_b)[:, None] * rate
-    return np.arctan2(_dot(axis, _cross(side_a, side_b)), _dot(side_a, side_b)), _dot(rate, b.spin - a.spin)
+    return np.arctan2(_dot(axis, np.cross(side_a, side_b)), _dot(side_a, side_b)), _dot(rate, b.spin - a.spin)
 
 
 def _travel(of: Holds, a: Moving, b: Moving) -> tuple[np.ndarray, np.ndarray]:
@@ -141,10 +141,6 @@ def measure(table: Any, found: list[Holds], count: int, counted: Any) -> tuple[n
 
 def _dot(u: np.ndarray, v: np.ndarray) -> np.ndarray:
     return (u * v).sum(axis=1)
-
-
-def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    return u[:, [1, 2, 0]] * v[:, [2, 0, 1]] - u[:, [2, 0, 1]] * v[:, [1, 2, 0]]
 
 
 def borne(record: Any, rows: Any, dimensions: int, dt: float) -> dict[str, np.ndarray]:

@@ -146,11 +146,7 @@ def width_that_holds(share, extents):
 @part
 def speed_at(state, i, now):
     """A body's speed on its path."""
-    bodies = state.bodies
-    v = bodies.path_velocity[i]
-    if state.path_degree > 1:
-        v = rate_along((v, v, bodies.path_second[i], bodies.path_third[i]), now)
-    return length(v)
+    return length(rate_along(path_of(state, i), now))
 
 
 @part
