@@ -9,7 +9,6 @@ import numpy as np
 
 from ..framework.jit.records.record import Record
 from ..framework.schedule.stages import Stage
-from .contacts.solving.islands import COLOURS
 from .contacts.solving.records import KINDS_OF_FAULT, WARM_START_ROWS
 from .records import CONTACT_ROWS
 
@@ -26,7 +25,6 @@ def reserve_fixed(state: Record) -> None:
     state.warm_start.rows_version = np.full(2, -1, np.int64)
     state.warm_start.step = np.ones(2)
     state.contacts.stays, state.contacts.steps = np.zeros(2, np.int64), np.zeros(2, np.int64)
-    state.solver.starts = np.zeros(2 * COLOURS + 2, np.int64)
     state.solver.faults, state.solver.faulty = np.zeros(KINDS_OF_FAULT, np.int64), np.zeros(KINDS_OF_FAULT, np.int64)
     state.frame = np.zeros(7)
 

@@ -317,14 +317,9 @@ CONTACTS = Schema(
     steps=ints(),  # numbers of the steps that the contacts are of
 )  # fmt: skip
 
-# The solver's columns: those of contacts, but for ``starts`` and faults, from ``bodies`` on those of bodies, islands,
+# The solver's columns: those of contacts, but for faults, from ``bodies`` on those of bodies, islands,
 # ranges, and those of either that are there where bodies spin.
-_fields = dict(SOLVER.fields)
-_fields.pop("starts")
-_fields.pop("joints")
-_fields.pop("faults")
-_fields.pop("faulty")
-_fields.pop("direct")
+_fields = {name: field for name, field in SOLVER.fields.items() if name not in ("faults", "faulty", "joints", "direct")}
 SOLVER_ARMS = Section("contact", "rotation", "bodies spin", **{name: _fields.pop(name) for name in ARM_COLUMNS})
 SOLVER_SPINS = Section("body at rest", "rotation", "bodies spin", **{name: _fields.pop(name) for name in TURN_COLUMNS})
 SOLVER_SURFACES = Section("contact", "contacts at rest", "surfaces run", surface_slip=_fields.pop("surface_slip"))

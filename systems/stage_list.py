@@ -95,19 +95,11 @@ ON_DEMAND = (
         ("position", "rotation"), ("lower", "upper", "grid"), "queries of many bodies",
     ),
     Stage(
-        box_rest_of_step,
-        "boxes around the rest of the paths",
-        ("path_velocity",),
-        ("lower", "upper"),
-        "swept bodies",
+        box_rest_of_step, "boxes around the rest of the paths", ("path_velocity",), ("lower", "upper"), "swept bodies",
     ),
     Stage(
-        merge_pairs,
-        "the pairs of the rest of the step, and the queue that is left",
-        ("pairs", "candidates"),
-        ("merged", "impacts"),
-        "swept bodies",
-        room=ROOM_TO_MERGE,
+        merge_pairs, "the pairs of the rest of the step, and the queue that is left", ("pairs", "candidates"),
+        ("merged", "impacts"), "swept bodies", room=ROOM_TO_MERGE,
     ),
     Stage(
         finish_found, "contacts where free flight leads, for code that reads them", ("pairs",), ("pairs",),

@@ -13,6 +13,7 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import dot
 from ..ccd.time_of_impact import clear_of_rounding
 from ..codes import NEED_ROOM, OK
+from ..contacts.solving.passes import sort_by
 from ..integration.trajectory import rate_along, relative_path
 from ..joints.groups import is_joined
 from ..parts.rows import owner_of
@@ -130,21 +131,6 @@ def link_members(state, members):
 
 
 @part
-def sort_group(impacts, count):
-    """Canonical order, for the log: Shell's sort."""
-    group, stride = impacts.group, count // 2
-    while stride > 0:
-        for g in range(stride, count):
-            m, place = group[g], g
-            key = impacts.event_key[impacts.member[m]]
-            while place >= stride and impacts.event_key[impacts.member[group[place - stride]]] > key:
-                group[place] = group[place - stride]
-                place -= stride
-            group[place] = m
-        stride //= 2
-
-
-@part
 def find_group(state, m):
     """Write into ``group`` member m and all that bodies which can be moved connect with it; returns how many."""
     impacts, pairs, inverse_mass, done, reached = state.impacts, state.pairs, state.bodies.inverse_mass, 0, 1
@@ -160,7 +146,9 @@ def find_group(state, m):
                     impacts.group[reached] = entry // 2
                     reached += 1
                 entry = impacts.next_member[entry]
-    sort_group(impacts, reached)
+    for g in range(reached):  # canonical order, for the log
+        impacts.terms[impacts.group[g]] = impacts.event_key[impacts.member[impacts.group[g]]]
+    sort_by(impacts.group, reached, impacts.terms)
     return reached
 
 

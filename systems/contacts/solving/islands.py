@@ -14,6 +14,7 @@ import math
 
 from ....framework.compilation import inlined, part
 from ....framework.jit.records.record_type import zero_of
+from ....framework.jit.stack_arrays import stack_array
 from ....framework.vectors import add, dot, length, sub
 from ...bits import lowest_bit
 from ...codes import OK
@@ -41,6 +42,7 @@ from .passes import most_repeats
 from .records import ROW_CHUNK
 
 COLOURS = 62  # bits of a mask; pairs of a body beyond them share the last one
+STARTS = 2 * COLOURS + 2  # where rows of each colour begin, with one point or several
 STREAMS = 4  # of joints: more are no faster
 
 
@@ -266,7 +268,7 @@ def choose_substeps(solver, t, usual, dt):
 @part
 def place_rows(state):
     """``slot`` of each row by (range, colour), and the bodies by range: the ordinary islands are range 0."""
-    solver, bodies, pairs, starts = state.solver, state.bodies, state.pairs, state.solver.starts
+    solver, bodies, pairs, starts = state.solver, state.bodies, state.pairs, stack_array(STARTS, 0)
     row, island, number, range_of = solver.body_row, solver.island, solver.open_body, solver.range_of
     ends, body_ends = solver.row_ends, solver.body_ends
     slot, colour, contacts, listed = solver.slot, solver.colour, solver.contacts, solver.listed

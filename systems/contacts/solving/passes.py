@@ -65,22 +65,20 @@ def solve_passes(solver, pushes, passes, stiff, h, span, arms):
 
 
 @part
-def list_by_gap(solver, span):
-    """The rows of a range into ``listed``, what is nearest first; Shell's sort."""
-    start, count, listed, opening = span[0], span[1] - span[0], solver.listed, solver.target_speed
-    for e in range(count):
-        listed[e] = start + e
+def sort_by(places, count, keys):
+    """The first ``count`` of some places in the order of their keys, the lower one first where these are equal; Shell's
+    sort."""
     stride = count // 2
     while stride > 0:
         for e in range(stride, count):
-            k, place = listed[e], e
-            while place >= stride and (
-                opening[listed[place - stride]] > opening[k]
-                or (opening[listed[place - stride]] == opening[k] and listed[place - stride] > k)
+            k, at = places[e], e
+            while at >= stride and (
+                keys[places[at - stride]] > keys[k]
+                or (keys[places[at - stride]] == keys[k] and places[at - stride] > k)
             ):
-                listed[place] = listed[place - stride]
-                place -= stride
-            listed[place] = k
+                places[at] = places[at - stride]
+                at -= stride
+            places[at] = k
         stride //= 2
 
 
@@ -92,8 +90,10 @@ def close_nearest_first(solver, h, span, arms):
     Activating all rows at once does not converge: a pass takes back of an impulse no more than what is open, and the
     impulse of a row which another one should have held before is as high as a whole fall.
     """
-    list_by_gap(solver, span)
     count, work = span[1] - span[0], ISLAND_WORK
+    for e in range(count):
+        solver.listed[e] = span[0] + e
+    sort_by(solver.listed, count, solver.target_speed)
     for e in range(count):
         k = solver.listed[e]
         new = closing_speed(solver, k, arms) > solver.target_speed[k]

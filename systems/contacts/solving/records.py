@@ -82,7 +82,6 @@ SOLVER = Schema(
     chunks=integer(),
     first_chunk=integer(),  # of a range
     visits=integer(),  # rows solved in this step
-    starts=ints(),  # where each colour begins
     # bodies, in the order of their ranges
     bodies=integer(),
     body_row=ints("int32"),
