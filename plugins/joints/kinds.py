@@ -12,18 +12,7 @@ from ...framework.data.columns import special_column
 from ...framework.matrices import magnitude, matrix_product, unit
 from ...framework.typing import Vector
 from ...framework.units import warn_of_degrees
-from ...systems.joints.records import (
-    CONE,
-    DRIVE,
-    HOLD,
-    LIMIT,
-    POINT,
-    ROD,
-    SERVO,
-    SLIDE,
-    SPRING,
-    TWIST,
-)  # fmt: skip
+from ...systems.joints.records import CONE, DRIVE, HOLD, LIMIT, POINT, ROD, SERVO, SLIDE, SPRING, TWIST
 from .joint import LEAST, MOST, UNLIMITED, WORLD, Driven, Joint, Place, Row, ends_of, optional
 
 SQUARE = 1e-6  # cosine between directions that are at right angles

@@ -15,15 +15,7 @@ from ...framework.elementary import power
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, item, length, replace, sub
 from ..codes import OK
-from ..integration.trajectory import (
-    along,
-    bend_of,
-    centre_at,
-    path_of,
-    rate_along,
-    relative_path,
-    travel_of,
-)
+from ..integration.trajectory import along, bend_of, centre_at, path_of, rate_along, relative_path, travel_of
 from ..linking.parts import FIRST_TOUCH, call_first_touch
 from ..parts.rows import owner_of
 from ..shapes.dispatch import restitution_of

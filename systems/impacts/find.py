@@ -13,14 +13,7 @@ from ...framework.vectors import add, add_scaled, divided, dot, length, negative
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST, is_swept, limits_of_sweep, rest_edge, turns_far
 from ..ccd.time_of_impact import APART, AT_CORNER, TOUCHES, bounds_stay_disjoint, clear_of_rounding
 from ..ccd.turning_touch import UNFOLLOWED
-from ..integration.trajectory import (
-    ROUNDING,
-    along,
-    centre_at,
-    rate_along,
-    relative_path,
-    travel_of,
-)
+from ..integration.trajectory import ROUNDING, along, centre_at, rate_along, relative_path, travel_of
 from ..integration.turning import arms_to, closing_by_spin, is_turned
 from ..linking.parts import FIRST_TOUCH, TURNING_RESPONSE, call_first_touch, call_turning_response
 from ..narrow_phase.manifolds import is_at_manifold

@@ -3,17 +3,7 @@
 from __future__ import annotations
 
 from ....framework.compilation import inlined
-from ....framework.jit.records.schema import (
-    Schema,
-    Section,
-    flag,
-    flags,
-    floats,
-    integer,
-    ints,
-    table,
-    vectors,
-)  # fmt: skip
+from ....framework.jit.records.schema import Schema, Section, flag, flags, floats, integer, ints, table, vectors
 from ...joints.records import DIRECT, JOINTS
 
 # What has gone wrong in a step, of which faults will tell: how many bodies or joints of each kind, and the first.
