@@ -156,12 +156,15 @@ class Window(ABC):
     def run(self, seconds: float = math.inf) -> None:
         """Advance and show the world until the window is closed, or until so many ``seconds`` are simulated.
 
-        What a step raises is shown, and time stands.
+        What a step raises is shown, and time stands; with ``seconds``, which would never pass, it is raised.
         """
         for passed in self:
             try:
-                self.world.advance(passed)
+                if passed > 0.0:  # else a step that has failed is due again, in each frame
+                    self.world.advance(passed)
             except (StepError, FaultError) as error:
+                if seconds < math.inf:
+                    raise
                 self.paused = True
                 self.say(str(error), seconds=math.inf)
             if self.world.time >= seconds:

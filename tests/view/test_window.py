@@ -17,6 +17,7 @@ from carom import (
     Settings,
     SphereCollider,
     Spin,
+    StepError,
     System,
     Transform,
     World,
@@ -96,12 +97,16 @@ def test_back_in_time_and_forth(player):
 
 def test_what_a_step_raises_is_shown_and_time_stands():
     class Fails(System):
+        tries = 0
+
         def process(self, dt):
             if self.world.step_count == 3:
+                self.tries += 1
                 raise RuntimeError("three is too many")
 
     world, _ = floor_and_ball()
-    world.add_system(Fails())
+    fails = Fails()
+    world.add_system(fails)
     view = View(world, (320, 200), real_time=False)
     seen = []
 
@@ -112,9 +117,11 @@ def test_what_a_step_raises_is_shown_and_time_stands():
 
     view.above = look
     view.run()
-    assert world.step_count == 3
+    assert (world.step_count, fails.tries) == (3, 1)
     assert "three is too many" in seen[-1][0]
     assert seen[-1][1]
+    with pytest.raises(StepError, match="three is too many"):
+        View(world, (320, 200), real_time=False).run(seconds=1.0)
     world.close()
 
 
