@@ -22,7 +22,8 @@ from .custom import speed_of_custom
 from .order import NO_BLOCK, block_of, freedoms
 from .records import CUSTOM, HELD_AT_ONCE, LIMIT, LIMITED_AT_ONCE, POINT, TURN
 
-PUSH_PASS, RELAX_PASS, RESULT_OF = 0, 1, 2  # what is asked of rows; even: errors are pushed out
+# What is asked of rows: to push errors out, to hold without that, to hold what is left; RESULT_OF: of the solution.
+PUSH_PASS, RELAX_PASS, REFINE_PASS, RESULT_OF = 0, 1, 2, 3
 
 
 @part
@@ -247,10 +248,11 @@ def speed_of(solver, j):
 def note_rows(solver, what):
     """What rows ask for, as impulses of their bodies; in the end these are the impulses that they get.
 
-    what: PUSH_PASS and RELAX_PASS with the velocities as they are; RESULT_OF either with those of the solution.
+    Impulses are found anew: what several rows that push the same bodies apart have borne against each other is gone
+    when they only hold. A REFINE_PASS adds to them what they lack.
     """
     joints, direct = solver.joints, solver.direct
-    pushes, ends = what % 2 == 0, what >= RESULT_OF
+    pushes, anew, ends = what % RESULT_OF == PUSH_PASS, what % RESULT_OF != REFINE_PASS, what >= RESULT_OF
     for q in range(direct.begin, direct.end):
         direct.push[direct.body[q]] = direct.twist[direct.body[q]] = scale(solver.velocity[solver.bodies], 0.0)
     for e in range(joints.begin, joints.end):
@@ -263,7 +265,7 @@ def note_rows(solver, what):
             if pushes:
                 speed = add_scaled(speed, joints.gap[j], joints.push_rate[j])
             change = scale(speed, -weight)
-            if pushes:
+            if anew:
                 change = sub(change, joints.push[j])
             if ends:
                 joints.push[j] = add(joints.push[j], change)
@@ -272,7 +274,7 @@ def note_rows(solver, what):
             continue
         asked = joints.pushing[j] if pushes else joints.target_speed[j]
         change = weight * (asked - speed_of(solver, j))
-        if pushes:
+        if anew:
             change -= joints.impulse[j]
         if ends:
             joints.impulse[j] += change
@@ -316,9 +318,9 @@ def back_substitute(solver, n):
 
 
 @part
-def solve_direct(solver, pushes):
-    """The joints of a range that are solved at once."""
-    direct, zero, what = solver.direct, scale(solver.velocity[solver.bodies], 0.0), PUSH_PASS if pushes else RELAX_PASS
+def solve_direct(solver, what):
+    """The joints of a range that are solved at once, see note_rows."""
+    direct, zero = solver.direct, scale(solver.velocity[solver.bodies], 0.0)
     velocity, spins = solver.velocity, solver.spin
     note_rows(solver, what)
     back_substitute(solver, freedoms(zero))

@@ -122,27 +122,6 @@ def most_pushed(solver, j, size):
     return FULL_PUSH_OVERLAP * (reach + size)
 
 
-@inlined
-def note_share(solver, j, error, bound):
-    """Of rows that are solved at once all push out the same share of their errors, as the one that is torn open the
-    most: to ask each for another one is to ask for what cannot be, and stiff ones bear that. Returns the bound."""
-    shares, g = solver.direct.share, solver.joints.group[j]
-    shares[g] = min(shares[g], bound / error if error > bound else 1.0)
-    return math.inf
-
-
-@part
-def push_alike(solver):
-    """See note_share."""
-    joints, shares = solver.joints, solver.direct.share
-    for e in range(joints.begin, joints.end):
-        j = joints.order[e]
-        if joints.at_once[j] == HELD_AT_ONCE:
-            share = shares[joints.group[j]]
-            joints.pushing[j] *= share
-            joints.push_rate[j] = joints.rate * share if joints.kind[j] == POINT else joints.push_rate[j]
-
-
 @part
 def update_joint_targets(solver, j, value):
     """What a row asks of the speed of its value, m/s or rad/s, and the impulses that it may have."""
@@ -155,8 +134,6 @@ def update_joint_targets(solver, j, value):
         pushing = low - value  # see servo_speed
     elif rule != LIMIT:
         bound = most_pushed(solver, j, max(abs(value), abs(low)))
-        if joints.at_once[j] == HELD_AT_ONCE:
-            bound = note_share(solver, j, abs(value - low), bound)
         pushing = -joints.push_rate[j] * max(-bound, min(bound, value - low))
     else:
         below, above = value - low, joints.high[j] - value
@@ -187,9 +164,6 @@ def measure_joints(solver, moved_for):
     between, arms_a, arms_b, gap = joints.between, joints.arm_a, joints.arm_b, joints.gap
     usual = 1.0 / joints.stiffness
     usual_mass, usual_impulse = 1.0 / (1.0 + usual), usual / (1.0 + usual)  # divisions cost more than all else of a row
-    at_once = solver.direct.begin < solver.direct.end
-    for e in range(joints.begin, joints.end if at_once else joints.begin):
-        solver.direct.share[joints.group[order[e]]] = 1.0
     for e in range(joints.begin, joints.end):
         j = order[e]
         kind, a, b = kinds[j], first[j], second[j]
@@ -214,8 +188,6 @@ def measure_joints(solver, moved_for):
             if is_holding(joints, j):
                 wide = length(way)
                 bound = most_pushed(solver, j, wide)
-                if joints.at_once[j] == HELD_AT_ONCE:
-                    bound = note_share(solver, j, wide, bound)
                 joints.push_rate[j] = joints.rate * (bound / wide if bound < wide else 1.0)
                 gives, mass_scale, impulse_scale = compliance_of(solver, j, usual), usual_mass, usual_impulse
                 if gives < usual:
@@ -237,8 +209,6 @@ def measure_joints(solver, moved_for):
         j = order[e]
         if has_coupling(joints, j) and not has_coupling(joints, j - 1) and not is_idle(joints, j - 1):
             couple(solver, j - 1)
-    if at_once:
-        push_alike(solver)
     for e in range(joints.begin, joints.end):
         if joints.rule[order[e]] == SERVO:
             servo_speed(joints, order[e])

@@ -126,7 +126,6 @@ DIRECT = Schema(
     light=floats(unit="1/kg"),  # inverse mass of the lightest body,
     heavy=floats(unit="1/kg"),  # of the heaviest that a joint holds,
     swing=floats(unit="1/(kg m)"),  # and the largest one of a joint over its length
-    share=floats(unit="1"),  # of their errors that rows push out, see measuring
     welds=ints("int32"),
     freedom=ints("int32"),  # twice of what joints leave free, less one for each body
     # in a range

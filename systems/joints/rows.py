@@ -21,10 +21,20 @@ from ..contacts.constants import FREQUENCY, JOINT_DAMPING_RATIO, TURNING_FREQUEN
 from ..contacts.solving.records import TORN_OPEN, note_fault
 from ..integration.turning import change_of_spin, cross_spin, symmetric, twist
 from .coupling import couple, first_of, has_coupling, is_holding, is_soft_spring, response_at, symmetric_product
-from .direct import apply_to_bodies, factorise, solve_all_limited, solve_direct, speed_between, speed_of
+from .direct import (
+    PUSH_PASS,
+    REFINE_PASS,
+    RELAX_PASS,
+    apply_to_bodies,
+    factorise,
+    solve_all_limited,
+    solve_direct,
+    speed_between,
+    speed_of,
+)
 from .measuring import reach_at
 from .order import is_rigid
-from .records import BY_PASSES, CUSTOM, POINT, TURN
+from .records import BY_PASSES, CUSTOM, HELD_AT_ONCE, POINT, TURN
 
 LEAST_SHARE = 1e-9  # of its mass that a spring without damping takes part with
 TORN = 0.2  # of the reach of a body from its centre: a joint that is open by more is told
@@ -227,11 +237,11 @@ def solve_joints(solver, pushes):
     solve_joint_pass(solver, pushes)
     if solver.direct.begin < solver.direct.end:
         factorise(solver, pushes)
-        solve_direct(solver, pushes)
+        solve_direct(solver, PUSH_PASS if pushes else RELAX_PASS)
         if solver.direct.mixed:
             solve_all_limited(solver, pushes)
             solve_joint_pass(solver, pushes)
-            solve_direct(solver, pushes)
+            solve_direct(solver, PUSH_PASS if pushes else REFINE_PASS)
             solve_all_limited(solver, pushes)
 
 
@@ -255,22 +265,19 @@ def relax_open(solver):
         joints.push[j] = new
         push_apart(columns, (a, b), (joints.arm_a[j], joints.arm_b[j]), sub(new, old))
     if solver.direct.begin < solver.direct.end:
-        solve_direct(solver, False)
+        solve_direct(solver, REFINE_PASS)
         solve_all_limited(solver, False)
 
 
 @part
 def add_joints(solver):
-    """What the joints of a range have done in a substep. What is solved at once and torn open begins the next one
-    without: its rows may press against each other, as they would not where bodies are then, nor if passes come next."""
+    """What the joints of a range have done in a substep."""
     joints, order, impulse, push = solver.joints, solver.joints.order, solver.joints.impulse, solver.joints.push
-    total, thrust, shares = joints.total, joints.thrust, solver.direct.share
+    total, thrust = joints.total, joints.thrust
     for e in range(joints.begin, joints.end):
         j = order[e]
         total[j] += impulse[j]
         thrust[j] = add(thrust[j], push[j])
-        if joints.at_once[j] != BY_PASSES and shares[joints.group[j]] < 1.0:
-            impulse[j], push[j] = 0.0, scale(push[j], 0.0)
 
 
 @inlined
@@ -285,7 +292,8 @@ def is_torn(solver, j):
 
 @part
 def keep_joints(solver, dt):
-    """The forces of the last substep, for the next step, no larger than their means: what is more was a blow."""
+    """The forces of the last substep, for the next step, no larger than their means: what is more was a blow. Where all
+    is found at once that needs none, and passes, which may be next, could not undo what is gone by then."""
     joints = solver.joints
     by = 1.0 / joints.step
     for e in range(joints.begin, joints.end):
@@ -294,6 +302,8 @@ def keep_joints(solver, dt):
         joints.load[j] = min(mean, max(-mean, last))
         pull, most = scale(joints.push[j], by), length(joints.thrust[j]) / dt
         size = length(pull)
+        if joints.at_once[j] == HELD_AT_ONCE:
+            joints.load[j], most = 0.0, 0.0
         joints.pull[j] = scale(pull, most / size) if size > most else pull
         if joints.kind[j] < TURN and is_torn(solver, j):
             note_fault(solver, TORN_OPEN, joints.joint[j])

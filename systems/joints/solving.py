@@ -8,7 +8,7 @@ from ..contacts.solving.turning import integrate_rotation_of_joined
 from ..integration.turning import cross_spin
 from . import calls
 from .custom import rates_of_custom
-from .direct import solve_direct
+from .direct import PUSH_PASS, REFINE_PASS, solve_direct
 from .measuring import measure_joints
 from .records import CUSTOM, POINT, TURN
 from .rows import add_joints, keep_joints, relax_open, solve_joints, start_joints, warm_start_joints
@@ -65,8 +65,9 @@ def solve_joined_range(solver, what, numbers, span):
         measure_joints(solver, h)
         solve_joints(solver, False)
     elif what in (calls.PUSH_AGAIN, calls.RELAX_AGAIN):  # after the contacts
-        if solver.direct.begin < solver.direct.end and span[0] < span[1]:
-            solve_direct(solver, what == calls.PUSH_AGAIN)
+        pushes = what == calls.PUSH_AGAIN
+        if solver.direct.begin < solver.direct.end and (span[0] < span[1] or not pushes):
+            solve_direct(solver, PUSH_PASS if pushes else REFINE_PASS)
     elif what == calls.TURN_BODIES:
         integrate_rotation_of_joined(solver, span[2], span[3], h)
     elif what == calls.ADD:
