@@ -172,7 +172,7 @@ class Bodies:
             values = fields.of.setdefault(RigidBody, {})
             if driven and prefab is None:
                 values.setdefault("kind", "kinematic")
-            if values.get("kind") == "static":
+            if values.get("kind") == "static" and prefab is None:
                 del fields.of[RigidBody]
                 return None
             made = prefab.copy() if prefab is not None else RigidBody()
