@@ -90,6 +90,7 @@ class Vocabulary:
         for name, prefab in prefabs.items():
             if not isinstance(prefab, Prefab):
                 raise TypeError(f"maps.load: prefabs[{name!r}] must be a Prefab, got {prefab!r}")
+            self.components = {**{kind.__name__: kind for kind in prefab._components}, **self.components}
         members = getattr(layers, "__members__", layers)
         self.layers = None if members is None else {name.casefold(): int(bits) for name, bits in dict(members).items()}
         for name, material in materials.items():
@@ -226,7 +227,7 @@ class Sorter:
                     self.known.unknown.add(first)
                     return
                 raise RefusedError(f"no component is named {first!r}{did_you_mean(first, self.known.components)}")
-            if issubclass(component, Collider):
+            if issubclass(component, Collider) and not any(component in p._components for _, p in found.prefabs):
                 raise RefusedError("the shape that was drawn makes the collider; its material has names without a dot")
             found.of.setdefault(component, {})
             self._field(component, column, given, found)
@@ -260,8 +261,11 @@ class Sorter:
             found.of.setdefault(Path, {})
             self._field(Path, name, given, found)
         elif any(name in prefab._fields for _, prefab in found.prefabs):
-            ((kind, column),) = next(prefab._fields[name] for _, prefab in found.prefabs if name in prefab._fields)
-            self._field(kind, column, given, found)
+            named = next(prefab._fields[name] for _, prefab in found.prefabs if name in prefab._fields)
+            if len(named) > 1:
+                names = " or ".join(f"{kind.__name__}.{column}" for kind, column in named)
+                raise RefusedError(f"{len(named)} components of its prefab have a field of that name: {names}")
+            self._field(*named[0], given, found)
         elif not (self.known.lenient and set(found.kinds) & self.known.unknown):
             own = [column for component in found.of for column in component._arguments]
             names = (*own, *RigidBody._arguments, *VELOCITY, *MATERIAL, *Spin._arguments, *WORDS)

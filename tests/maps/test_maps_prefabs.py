@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from helpers_maps import Ref, map_of, objects_of, thing, world_for_maps, write
+from helpers_maps import map_of, objects_of, thing, write
 
 from carom import (
     AABBCollider,
     BoxCollider,
     Component,
-    Path,
     Prefab,
     RigidBody,
     SphereCollider,
@@ -25,31 +24,48 @@ class Enemy(Component):
     target = column(default=0, dtype=int)
 
 
+class Shield(Component):
+    health = column(default=9.0)
+
+
+IT = "layer 'things', object 7 'it'"
 BODY, BALL = RigidBody(mass=3.0), SphereCollider(0.3)
 
 
 @pytest.fixture
 def loaded(tmp_path, world):
-    """loaded(prefab, ..., properties, ...): (its level, object 7 being of the prefab "it", all that check finds)."""
+    """loaded(prefab, properties, ...): the level with object 7 of that prefab, or what is wrong with it."""
 
     def loaded(prefab, given, **fields):
         drawn = thing(7, 32, 32, 16, 16, name="it", kind="it", properties=given, **fields)
-        others = thing(8, 9, 9, 8, 8, kind="Enemy"), thing(9, 9, 9, polyline=((0, 0), (32, 0)))
-        path = write(tmp_path / "map.tmx", map_of(6, 4, objects_of(drawn, *others)))
-        prefabs = {"it": prefab}
-        found = maps.check(path, (Enemy,), prefabs)
-        try:
-            return maps.load(path, world, (Enemy,), prefabs), found
-        except maps.MapError as error:
-            assert len(world.bodies) == 0
-            return error, found
+        others = thing(8, 9, 9, 8, 8, name="foe", kind="Enemy"), thing(9, 9, 9, polyline=((0, 0), (32, 0)))
+        path, known = write(tmp_path / "map.tmx", map_of(6, 4, objects_of(drawn, *others))), {"it": prefab}
+        found = [each for each in maps.check(path, (Enemy,), known, world=world) if each.place]  # no image is there
+        if not found:
+            return maps.load(path, world, (Enemy,), known)
+        with pytest.raises(maps.MapError) as told:
+            maps.load(path, world, (Enemy,), known)
+        assert told.value.findings == found
+        return [(each.place, each.text) for each in found]
 
     return loaded
 
 
 @pytest.mark.parametrize("more", [(), (BALL,), (BoxCollider((0.3, 0.3)), Spin())])
 def test_what_a_prefab_moves_stands_if_its_object_says_static(more, loaded, world):
-    it = loaded(Prefab(BODY, *more), {"kind": "static"})[0].entities["it"]
+    it = loaded(Prefab(BODY, *more), {"kind": "static"}).entities["it"]
     world.step()
     assert world.component_for_entity(it, Transform).position.tolist() == [2.5, 1.5]
     assert world.component_for_entity(it, RigidBody).linear_velocity.tolist() == [0, 0]
+
+
+def test_a_field_that_two_components_of_a_prefab_have_is_refused(loaded, world):
+    two = Prefab(BODY, BALL, AABBCollider((0.1, 0.1)), Enemy(), Shield())
+    text = "2 components of its prefab have a field of that name"
+    assert loaded(two, {"health": 1.0, "offset": "0, 1"}) == [
+        (f"{IT}, property 'health'", f"{text}: Enemy.health or Shield.health"),
+        (f"{IT}, property 'offset'", f"{text}: SphereCollider.offset or AABBCollider.offset"),
+    ]
+    it = loaded(two, {"Shield.health": 1.0, "AABBCollider.offset": "0, 0.1"}).entities["it"]
+    assert world.component_for_entity(it, Shield).health == 1.0
+    assert world.component_for_entity(it, AABBCollider).offset.tolist() == [0, 0.1]
