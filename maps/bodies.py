@@ -195,14 +195,7 @@ class Bodies:
                     setattr(made[kind], field, value)
         for kind, values in fields.of.items():
             references = [each for each in fields.references if each.component is kind]
-            if kind in made:
-                for field, value in values.items():
-                    setattr(made[kind], field, value)
-                if references:
-                    name = f"{kind.__name__}.{references[0].field}"
-                    raise RefusedError(f"{name}: a field of a prefab cannot refer to an object")
-                continue
-            late = Late(kind, values, references)
+            late = Late(kind, values, references, made.get(kind))
             try:
                 trial = late.made(dict.fromkeys(each.field for each in references))
             except (ValueError, TypeError) as error:

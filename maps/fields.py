@@ -318,7 +318,7 @@ class Sorter:
                 value = self.place_of(value)
             else:
                 found.references.append(Reference(component, name, value))
-                found.of[component].pop(name, None)
+                found.of.setdefault(component, {}).pop(name, None)
                 return
         elif column.layers:
             value = self.known.bits(value)

@@ -31,16 +31,22 @@ class Chain:
 
 @dataclass
 class Late:
-    """A component that holds the entities of other objects."""
+    """A component that holds the entities of other objects; of a prefab, ``like`` that one."""
 
     kind: type[Component]
     values: dict[str, Any]
     references: list[Reference]
+    like: Component | None = None
 
     def made(self, entities: dict[str, int | None]) -> Component:
         """With these entities; in place of those that are not there yet any others, no two of them the same."""
         known = {name: k if entity is None else entity for k, (name, entity) in enumerate(entities.items(), 1)}
-        return self.kind(**self.values, **known)
+        if self.like is None:
+            return self.kind(**self.values, **known)
+        made = self.like.copy()
+        for name, value in (self.values | known).items():
+            setattr(made, name, value)
+        return made
 
 
 @dataclass

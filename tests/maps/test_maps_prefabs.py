@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from helpers_maps import map_of, objects_of, thing, write
+from helpers_maps import Ref, map_of, objects_of, thing, write
 
 from carom import (
     AABBCollider,
@@ -69,3 +69,14 @@ def test_a_field_that_two_components_of_a_prefab_have_is_refused(loaded, world):
     it = loaded(two, {"Shield.health": 1.0, "AABBCollider.offset": "0, 0.1"}).entities["it"]
     assert world.component_for_entity(it, Shield).health == 1.0
     assert world.component_for_entity(it, AABBCollider).offset.tolist() == [0, 0.1]
+
+
+@pytest.mark.parametrize("name", ["target", "Enemy.target"])
+def test_a_field_of_a_prefab_refers_to_an_object(name, loaded, world):
+    """Before that is made, or after it: of itself too."""
+    for target in (7, 8):
+        level = loaded(Prefab(BODY, BALL, Enemy(health=9.0)), {name: Ref(target), "mass": 2.0})
+        enemy = world.component_for_entity(level.entities["it"], Enemy)
+        assert (enemy.health, enemy.target) == (9.0, level.object(target).entity)
+    where, text = f"{IT}, property 'Enemy.target'", "it refers to object 55, which is not in the map"
+    assert loaded(Prefab(BODY, BALL, Enemy()), {name: Ref(55)}) == [(where, text)]
