@@ -146,7 +146,7 @@ class Bodies:
             raise RefusedError(f"a body in a layer with parallax {layer.parallax}: class Decoration makes it a picture")
         path = self._path(fields)
         rigid = self._rigid(fields)
-        if any(issubclass(kind, Collider) for _, prefab in fields.prefabs for kind in prefab._components):
+        if any(issubclass(kind, Collider) for each in _parts_of(fields) for kind in each):
             shapes = []  # the prefab has its own
         angle, origin = -math.radians(thing.angle), self.world_place(thing, layer)
         if rigid is not None or not shapes:
@@ -164,15 +164,19 @@ class Bodies:
 
     def _rigid(self, fields: Fields) -> RigidBody | None:
         """Whether it moves: its RigidBody, which is among its fields then."""
-        prefab: Any = next((p._components[RigidBody] for _, p in fields.prefabs if RigidBody in p._components), None)
+        prefab: Any = next((each[RigidBody] for each in _parts_of(fields) if RigidBody in each), None)
         if fields.words.get("spins"):
             fields.of.setdefault(Spin, {})
-        driven = Path in fields.of or Character in fields.of
+        driven = any(kind in each for kind in (Path, Character) for each in (fields.of, *_parts_of(fields)))
         if RigidBody in fields.of or Spin in fields.of or driven:
             values = fields.of.setdefault(RigidBody, {})
-            if driven and prefab is None:
-                values.setdefault("kind", "kinematic")
-            if values.get("kind") == "static" and prefab is None:
+            kind = values.setdefault("kind", "kinematic") if driven else values.get("kind")
+            with self.sorter.findings.at("property 'kind'"):
+                if driven and kind != "kinematic":
+                    raise RefusedError(f"what has a path or is a Character is kinematic, got {kind!r}")
+                if Spin in fields.of and kind == "static":
+                    raise RefusedError("what spins, or has a property of Spin, cannot be static")
+            if kind == "static" and prefab is None and not driven and Spin not in fields.of:
                 del fields.of[RigidBody]
                 return None
             made = prefab.copy() if prefab is not None else RigidBody()
@@ -214,7 +218,7 @@ class Bodies:
         if any(shape.kind == "line" for shape in shapes):
             raise RefusedError("a polyline is a chain, which is static: it has no body")
         pieces = [piece for shape in shapes for piece in _convex(shape)]
-        turns = Spin in fields.of or any(Spin in prefab._components for _, prefab in fields.prefabs)
+        turns = Spin in fields.of or any(Spin in each for each in _parts_of(fields))
         turns = turns or len(pieces) > 1 or fields.words.get("shape") == "box" or bool(angle % (0.5 * math.pi))
         if len(pieces) == 1:
             collider, centre, own = collider_of(pieces[0], fields.material, turns)
@@ -271,7 +275,7 @@ class Bodies:
                 values.setdefault("mode", "loop")
         if Path not in fields.of:
             return {}
-        prefab = next((p._components[Path] for _, p in fields.prefabs if Path in p._components), None)
+        prefab = next((each[Path] for each in _parts_of(fields) if Path in each), None)
         found = {name: getattr(prefab, name) for name in Path._arguments if prefab is not None} | fields.of[Path]
         if "points" not in found:
             raise RefusedError("its Path needs points: property 'path', of type object, that refers to a polyline")
@@ -310,6 +314,11 @@ def _convex(shape: Shape) -> list[Shape]:
     except (ValueError, ImportError) as error:
         raise RefusedError(f"the polygon is not convex: {error}") from error
     return [Shape("polygon", outline.centre + piece.position + piece.vertices) for piece in outline.pieces]
+
+
+def _parts_of(fields: Fields) -> list[dict[type[Any], Any]]:
+    """The components of each of its prefabs, by type."""
+    return [prefab._components for _, prefab in fields.prefabs]
 
 
 def _plain(given: Property) -> Any:

@@ -12,7 +12,7 @@ from ..components import Collider, Prefab
 from ..framework import CaromError, Component, Plugin, Settings, World
 from ..framework.plugins.discovery import find
 from ..plugins import Physics
-from ..systems.shapes.geometry_levels import in_order
+from ..systems.shapes.geometry_levels import LevelCheck, check_beside, in_order
 from .bodies import Bodies
 from .contents import LevelLayer
 from .errors import Finding, Findings, MapError, RefusedError
@@ -22,7 +22,7 @@ from .formats.model import MapData, MapLayer, MapObject
 from .formats.reading import Property, document
 from .formats.tiled import read_tiled
 from .level import Level
-from .plan import Maker, Planned
+from .plan import Late, Maker, Planned
 from .tiles import TileLayers
 
 
@@ -152,6 +152,9 @@ class Plan:
             with findings.at(f"layer {layer.name!r}"):
                 self._layer(layer, base, bodies, tiles, scale)
         self._check_references(objects)
+        for each in self.planned:
+            with findings.at(each.place):
+                self._check_body(each)
         self._check_world()
 
     @classmethod
@@ -215,6 +218,27 @@ class Plan:
             for component in each.types:
                 found.setdefault(component, each.place)
         return found
+
+    def _check_body(self, planned: Planned) -> None:
+        """What no step takes: components that cannot be together."""
+        world = self.known.world
+        check = None
+        if world is not None and world.physics is not None:
+            check = LevelCheck(world.physics.table, world.registry)
+        for body in planned.bodies:
+            of: dict[Any, Any] = {}
+            for each in (*body, *planned.beside):
+                of[each.kind if isinstance(each, Late) else type(each)] = each
+            levels = {kind: each.copy() for kind, each in of.items() if issubclass(kind, Collider)}
+            try:
+                for kind in of:
+                    check_beside(kind, of, "it")
+                if check is not None and world is not None and len(levels) > 1:
+                    for each in levels.values():
+                        each.take_bits(each.bits_by_name(world._layer_names))
+                    check({0: levels})
+            except (ValueError, CaromError) as error:
+                raise RefusedError(str(error).removeprefix("entity 0: ")) from error
 
     def _check_world(self) -> None:
         """What the world has no plugin for."""

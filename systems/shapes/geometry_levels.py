@@ -63,6 +63,17 @@ def arrange(has: np.ndarray) -> np.ndarray:
     return levels
 
 
+def check_beside(component: type[Component], types: Iterable[type[Component]], who: str) -> None:
+    """ValueError if it cannot be with these others, or needs another one; ``who`` has them, for the message."""
+    for other in component.needs:
+        if other not in types:
+            name = component.__name__
+            raise ValueError(f"{who} has {name}, but no {other.__name__}, which {name} needs")
+    for other, cure in component.excludes.items():
+        if other in types:
+            raise ValueError(f"{who} has {component.__name__}, which no {other.__name__} can have: {cure}")
+
+
 class LevelCheck:
     """Called before colliders are adopted: ValueError if those of one entity cannot be its levels."""
 
@@ -73,15 +84,7 @@ class LevelCheck:
     def check_types(self, types: Iterable[type[Component]], entity: int) -> None:
         """Whether these may be together, and colliders are shapes of this world; the entity is for messages."""
         for component in types:
-            for other in component.needs:
-                if other not in types:
-                    name = component.__name__
-                    raise ValueError(f"entity {entity} has {name}, but no {other.__name__}, which {name} needs")
-            for other, cure in component.excludes.items():
-                if other in types:
-                    raise ValueError(
-                        f"entity {entity} has {component.__name__}, which no {other.__name__} can have: {cure}"
-                    )
+            check_beside(component, types, f"entity {entity}")
             self._registry.require(component, entity)
             if issubclass(component, Collider):
                 self._check_dimensions(component, entity)

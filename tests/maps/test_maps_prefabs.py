@@ -8,7 +8,10 @@ from helpers_maps import Ref, map_of, objects_of, thing, write
 from carom import (
     AABBCollider,
     BoxCollider,
+    Character,
+    Characters,
     Component,
+    Path,
     Prefab,
     RigidBody,
     SphereCollider,
@@ -30,6 +33,7 @@ class Shield(Component):
 
 IT = "layer 'things', object 7 'it'"
 BODY, BALL = RigidBody(mass=3.0), SphereCollider(0.3)
+PATH = {"path": Ref(9), "speed": 1.0}
 
 
 @pytest.fixture
@@ -80,3 +84,34 @@ def test_a_field_of_a_prefab_refers_to_an_object(name, loaded, world):
         assert (enemy.health, enemy.target) == (9.0, level.object(target).entity)
     where, text = f"{IT}, property 'Enemy.target'", "it refers to object 55, which is not in the map"
     assert loaded(Prefab(BODY, BALL, Enemy()), {name: Ref(55)}) == [(where, text)]
+
+
+@pytest.mark.parametrize(
+    ("parts", "given"),
+    [((RigidBody(), BALL), PATH), ((BALL,), PATH), ((RigidBody(), BALL, Path(((1, 1), (2, 1)), 1.0)), {}),
+     ((RigidBody(), BALL, Character()), {})],
+)  # fmt: skip
+def test_what_has_a_path_or_is_a_character_is_kinematic_whatever_its_prefab_says(parts, given, loaded, world):
+    world.add_plugin(Characters())
+    it = loaded(Prefab(*parts), given).entities["it"]
+    world.step()
+    assert world.component_for_entity(it, RigidBody).kind == "kinematic"
+
+
+@pytest.mark.parametrize(
+    ("parts", "given", "where", "text"),
+    [
+        ((BODY, BALL), {**PATH, "kind": "dynamic"}, ", property 'kind'", "what has a path or is a Character is kine"),
+        ((BALL,), {**PATH, "kind": "static"}, ", property 'kind'", "what has a path or is a Character is kinematic"),
+        ((BALL,), {"spins": True, "kind": "static"}, ", property 'kind'", "what spins, or has a property of Spin"),
+        ((BODY, AABBCollider((0.3, 0.3))), {"spins": True}, "", "it has Spin, which no AABBCollider can have"),
+        ((BODY, SphereCollider(2.0), AABBCollider((0.5, 0.5))), {"radius": 0.2}, "",
+         "its SphereCollider is the cheaper level and must enclose its AABBCollider"),
+        ((BODY, SphereCollider(2.0, layer="foe"), AABBCollider((0.5, 0.5))), {}, "",
+         "SphereCollider.layer: 'foe' names a layer"),
+    ],
+)  # fmt: skip
+def test_what_a_step_would_refuse_is_not_loaded(parts, given, where, text, loaded):
+    ((place, told),) = loaded(Prefab(*parts), given)
+    assert place == IT + where
+    assert told.startswith(text)
