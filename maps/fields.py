@@ -161,15 +161,16 @@ class Sorter:
     def sort(self, kinds: str, properties: Mapping[str, Property], base: Fields | None = None) -> Fields:
         """Fields of something of these classes, with these properties, on top of those of ``base``."""
         found = Fields()
-        if base is not None:
-            found.of = {kind: dict(values) for kind, values in base.of.items()}
-            found.material, found.words = dict(base.material), dict(base.words)
-            found.references, found.prefabs = list(base.references), list(base.prefabs)
-            found.kinds = list(base.kinds)
         for name in (each.strip() for each in kinds.split(",")):
             if name:
                 with self.findings.at(f"class {name!r}"):
                     self._class(name, found)
+        if base is not None:  # what has come first is nearest
+            found.of |= {kind: dict(values) for kind, values in base.of.items()}
+            found.material, found.words = base.material | found.material, base.words | found.words
+            found.references = list(base.references)
+            found.prefabs += [each for each in base.prefabs if each not in found.prefabs]
+            found.kinds = [*dict.fromkeys((*base.kinds, *found.kinds))]
         if found.marks:
             found.words.pop("solid", None)  # that of its layer
         elif base is not None:
@@ -184,7 +185,7 @@ class Sorter:
         if name in (SOLID, ONE_WAY, DECORATION):
             found.marks.add(name)
             return
-        if name in found.kinds:  # its layer is one too
+        if name in found.kinds:
             return
         found.kinds.append(name)
         if name in known.prefabs:

@@ -41,6 +41,10 @@ class Enemy(Component):
     team = column(default="red", choices=("red", "blue"))
 
 
+class Boss(Component):
+    health = column(default=5.0)
+
+
 class Layers(enum.IntFlag):
     GROUND, PLAYER = 1, 4
 
@@ -49,7 +53,7 @@ GOOM = Prefab(RigidBody(mass=3.0), SphereCollider(0.3, friction=0.5), Enemy(heal
 
 
 def load(path, world, **options):
-    return maps.load(path, world, (Coin, Enemy), {"goom": GOOM}, **options)
+    return maps.load(path, world, (Coin, Enemy, Boss), {"goom": GOOM}, **options)
 
 
 @FORMATS
@@ -116,6 +120,7 @@ def test_groups_give_their_layers_classes_and_fields(tmp_path, world):
                 "properties": properties(fields.pop("properties", {}))}  # fmt: skip
 
     things = objects_of(thing(1, 0, 0, 8, 8), thing(2, 0, 0, 8, 8, kind="Enemy", properties={"health": 7.0}),
+                        thing(3, 0, 0, 8, 8, kind="Boss", properties={"health": 9.0}),
                         properties={"sensor": True})  # fmt: skip
     inner = group("inner", things, properties={"health": 2.0, "_note": "inner"})
     enemies = group("enemies", inner, properties={"health": 1.0, "speed": 4.0}, **{"class": "Enemy"})
@@ -127,9 +132,11 @@ def test_groups_give_their_layers_classes_and_fields(tmp_path, world):
     tiles = tileset(tile(0, "Solid"), tile(2, "Air"))
     path = write(tmp_path / "map.tmx", map_of(2, 2, enemies, sky, bare, tilesets=[tiles]))
     level = load(path, world, materials={"Air": None})
+    boss = world.component_for_entity(level.object(3).entity, Boss)
+    assert (boss.health, world.component_for_entity(level.object(3).entity, Enemy).health) == (9.0, 2.0)
     enemies = [world.component_for_entity(level.object(k).entity, Enemy) for k in (1, 2)]
     assert [(each.health, each.speed) for each in enemies] == [(2.0, 4.0), (7.0, 4.0)]
-    assert level.of_class["Enemy"] == [level.object(k).entity for k in (1, 2)]
+    assert level.of_class["Enemy"] == [level.object(k).entity for k in (1, 2, 3)]
     assert world.component_for_entity(level.object(1).entity, AABBCollider).sensor
     shown = level.layers["things"]
     assert shown.kinds == ("Enemy",)
