@@ -101,7 +101,8 @@ class Bodies:
             kinds, properties = kinds or thing.tile.kinds, {**thing.tile.properties, **properties}
         is_place = thing.shape in ("point", "text")
         fielded = any("." in name or isinstance(given.value, dict) for name, given in properties.items())
-        if is_place and not kinds and not fielded:
+        of_layer = base.prefabs or base.of.keys() - {RigidBody, Spin}
+        if is_place and not (kinds or fielded or of_layer):
             return None  # what it says is for the game
         fields = self.sorter.sort(kinds, properties, base)
         if thing.id in self.paths and thing.id is not None:

@@ -92,6 +92,15 @@ def test_classes_and_properties_are_components_and_fields(suffix, tmp_path, worl
     assert level.points["spot"] == (1.5, 3.5) == tuple(of(6, Transform).position)
 
 
+def test_points_of_a_layer_with_a_class_are_entities(tmp_path, world):
+    layers = [objects_of(thing(k, 16, 16, point=True), name=name, properties={"mass": 2.0}, **{"class": name})
+              for k, name in enumerate(("Enemy", "goom", ""), 1)]  # fmt: skip
+    level = load(write(tmp_path / "map.tmx", map_of(2, 2, *layers)), world)
+    found = [world.component_for_entity(level.object(k).entity, Enemy).health for k in (1, 2)]
+    assert found == [3.0, 9.0]
+    assert level.object(3).entity is None
+
+
 def test_layers_give_their_objects_classes_and_fields(tmp_path, world):
     layer = objects_of(thing(1, 0, 0, 8, 8), thing(2, 9, 9, 8, 8, properties={"health": 1.0, "solid": False}),
                        properties={"health": 2.0, "sensor": True}, **{"class": "Enemy"})  # fmt: skip
