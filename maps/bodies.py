@@ -11,6 +11,7 @@ import numpy as np
 from ..components import Collider, RigidBody, Transform
 from ..components.spin import Spin
 from ..plugins.character import Character
+from ..plugins.joints import Joint
 from ..plugins.parts import parts_from_outline
 from ..plugins.paths import MODES, Legs, Path
 from .contents import LevelLayer, LevelObject, LevelSprite
@@ -150,6 +151,9 @@ class Bodies:
         if any(issubclass(kind, Collider) for each in _parts_of(fields) for kind in each):
             shapes = []  # the prefab has its own
         angle, origin = -math.radians(thing.angle), self.world_place(thing, layer)
+        for kind in fields.of:
+            if issubclass(kind, Joint):
+                self._joint(kind, fields, origin + turned(self._middle(thing), angle))
         if rigid is not None or not shapes:
             mass = 1.0 if rigid is None else rigid.mass
             centre, own, rotation = self._moving(made, thing, shapes, fields, angle, mass)
@@ -185,6 +189,14 @@ class Bodies:
                 setattr(made, name, value)
             return made
         return prefab
+
+    def _joint(self, kind: type[Joint], fields: Fields, place: np.ndarray) -> None:
+        """Unless it says something else, a joint is where it was drawn, and joins to the world."""
+        of_prefab = any(kind in each for each in _parts_of(fields))
+        given = {each.field for each in fields.references if each.component is kind}
+        for name, value in (("anchor", tuple(place.tolist())), ("a", None)):
+            if name in kind._arguments and name not in given and not of_prefab:
+                fields.of[kind].setdefault(name, value)
 
     def _components(self, fields: Fields) -> list[Any]:
         """All but place and shape: of prefabs, with changes, and of classes."""

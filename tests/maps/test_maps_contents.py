@@ -12,6 +12,7 @@ from carom import (
     AABBCollider,
     CapsuleCollider,
     Component,
+    Distance,
     Hinge,
     Joints,
     Path,
@@ -202,11 +203,18 @@ def test_a_point_is_a_joint_of_two_objects(tmp_path):
     drawn = [
         thing(1, 48, 48, kind="Hinge", point=True, properties={"a": Ref(2), "b": Ref(3), "anchor": Ref(1)}),
         thing(2, 40, 40, 8, 8), thing(3, 48, 46, 32, 4, properties={"spins": True}),
+        thing(4, 80, 16, kind="Hinge", point=True, properties={"b": Ref(3), "lower": -1.0, "upper": 2.0}),
+        thing(5, 80, 16, kind="Distance", point=True, properties={"b": Ref(3), "least": 0.0, "most": 4.0}),
     ]  # fmt: skip
     level = load(write(tmp_path / "map.tmx", map_of(6, 6, objects_of(*drawn))), world)
     hinge = world.component_for_entity(level.object(1).entity, Hinge)
     assert (hinge.a, hinge.b) == (level.object(2).entity, level.object(3).entity)
     assert np.array_equal(hinge.anchor, (3, 3))
+    own, rope = (world.component_for_entity(level.object(k).entity, kind) for k, kind in ((4, Hinge), (5, Distance)))
+    assert (own.anchor.tolist(), own.limits, rope.length) == ([5.0, 5.0], (-1.0, 2.0), (0.0, 4.0))
+    assert own.b == rope.b == level.object(3).entity
+    for _ in range(3):  # to the world
+        world.step()
     world.close()
 
 
