@@ -17,6 +17,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import click
 import numpy as np
 
 from ... import maps, scenes
@@ -125,23 +126,26 @@ def stdout_kept_clean() -> contextlib.AbstractContextManager[Any]:
     return contextlib.redirect_stdout(sys.stderr)
 
 
-def load(target: str) -> Loaded:
-    """The scene named ``target``, with hyphens if one likes, or the file at that path; Problem if neither exists."""
+def load(target: str, level: str | None = None) -> Loaded:
+    """The scene named ``target``, with hyphens if one likes, or the file at that path, of an LDtk project a ``level``;
+    Problem if neither exists."""
     name, path = target.replace("-", "_"), Path(target)
+    if path.suffix in MAPS:
+        return _load_map(path, level)
+    if level is not None:
+        raise Problem(f"--level is for maps of LDtk, {target!r} is none")
     if name in scenes.names():
         scene = scenes.get(name)
         return Loaded(scene.name, scene.build, seconds=scene.seconds, view=scene.view, settings=scene.settings)
     if path.suffix == ".py":
         return _load_file(path)
-    if path.suffix in MAPS:
-        return _load_map(path)
     if path.exists() or path.parent != Path():
         raise Problem(f"{target!r} is no scene, and no Python file: its name ends in .py")
     raise Problem(f"no scene named {target!r}{did_you_mean(target, scenes.names())} (a file of one's own ends in .py)")
 
 
-def _load_map(path: Path) -> Loaded:
-    """A map, in a world with the plugins that it needs; of an LDtk project its first level."""
+def _load_map(path: Path, level: str | None) -> Loaded:
+    """A map, in a world with the plugins that it needs; of an LDtk project that level, None: its first one."""
 
     levels: weakref.WeakKeyDictionary[World, maps.Level] = weakref.WeakKeyDictionary()
 
@@ -150,7 +154,10 @@ def _load_map(path: Path) -> Loaded:
         return world
 
     try:
-        level = next(iter(maps.levels_of(path)), None)
+        first, *more = maps.levels_of(path)
+        if level is None and more:
+            click.echo(f"carom: {path}: level {first!r}, the first of {1 + len(more)}: --level chooses one", err=True)
+        level = level or first
         size = maps.world_of(path, level=level)[1].size
     except maps.MapError as error:
         raise Problem(one_line(error)) from error

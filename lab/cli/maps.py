@@ -40,13 +40,15 @@ def check_command(files: tuple[Path, ...], game: Path | None, level: str | None)
     count = 0
     for file in files:
         unknown: set[str] = set()
-        for name in (level,) if level is not None else maps.levels_of(file):
+        names = [level] if level is not None else maps.levels_of(file)
+        for name in names:
             words = Vocabulary(lenient=game is None, **known)
             found = look_at(file, words, name)
             unknown |= words.unknown
             count += len(found)
             for each in found:
-                click.echo(str(each))
+                place = f"level {name!r}, {each.place}".removesuffix(", ")
+                click.echo(str(each._replace(place=place) if len(names) > 1 else each))
         if unknown:
             click.echo(f"carom: {file}: not looked at without --with game.py: {', '.join(sorted(unknown))}", err=True)
     return FOUND if count else 0

@@ -39,6 +39,7 @@ DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
 )
 @click.option("--window", is_flag=True, help="Show it in a window instead, with tools that F1 lists there.")
 @click.option("--view", type=View(), metavar="X0,Y0,X1,Y1", help="What the pictures show: two corners.")
+@click.option("--level", help="Of a map of LDtk with several levels (default: the first).")
 @json_option
 @click.option("--no-pictures", is_flag=True, help="Draw nothing.")
 @click.option("--profile", is_flag=True, help="Time every kernel, and show where the step's time goes.")
@@ -46,7 +47,7 @@ DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
 def run_command(
     target: str, steps: int | None, seconds: float | None, settings: Settings | None, changes: dict[str, Any],
     seed: int, plugins: tuple[str, ...], out: Path, record: Path | None, window: bool, view: Corners | None,
-    as_json: bool, no_pictures: bool, profile: bool,
+    level: str | None, as_json: bool, no_pictures: bool, profile: bool,
 ) -> None:  # fmt: skip
     """Run a scene of the library, or a file that defines build(settings, seed=0), and show what happened."""
     if steps is not None and seconds is not None:
@@ -55,7 +56,7 @@ def run_command(
         if window and given:
             raise Problem(f"--window and {name} exclude each other")
     added = [plugin_named(name) for name in plugins]
-    loaded = load(target)
+    loaded = load(target, level)
     view = view or loaded.view
     if window:
         world = loaded.build(settings, changes, seed, added)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import helpers_cli
+import helpers_maps_ldtk as ldtk
 import numpy as np
 import pytest
 from helpers_cli import refusal, report_of
@@ -67,3 +68,23 @@ def test_a_map_runs_with_the_plugins_that_it_needs(carom, level):
     level.write_text("<map")
     assert "is no XML that can be read" in refusal(carom("run", "level.tmx"))
     assert "none.tmx is missing" in refusal(carom("run", "none.tmx"))
+
+
+def test_levels_of_a_project_are_told_and_chosen(carom, tmp_path):
+    wrong = ldtk.entity("a", "Player", 16, 16, fields=[ldtk.field("mas", "Float", 1.0)])
+    crates = [ldtk.entity(k, "Crate", 16, 16, fields=[ldtk.field("mass", "Float", 1.0)]) for k in "bc"]
+    levels = ldtk.level("one", ldtk.CELLS), ldtk.level("two", ldtk.CELLS, *crates)
+    ldtk.write(tmp_path / "good.ldtk", ldtk.project(*levels))
+    run = "run", "good.ldtk", "--steps", "1", "--no-pictures", "--json"
+    first, second = carom(*run), carom(*run, "--level", "two")
+    assert first.stderr == "carom: good.ldtk: level 'one', the first of 2: --level chooses one\n"
+    assert [report_of(each)["bodies"]["dynamic"] for each in (first, second)] == [0, 2]
+    assert "no level is named 'three'; there are one, two" in refusal(carom(*run, "--level", "three"))
+    assert "--level is for maps of LDtk, 'billiards' is none" in refusal(carom("run", "billiards", "--level", "one"))
+    ldtk.write(tmp_path / "bad.ldtk", ldtk.project(levels[0], ldtk.level("two", ldtk.CELLS, wrong)))
+    (tmp_path / "tiles.png").touch()
+    (tmp_path / "game.py").write_text("from carom import Component\nclass Player(Component): ...\n")
+    (line,) = carom("maps", "check", "bad.ldtk", "--with", "game.py").stdout.splitlines()
+    assert line.startswith("bad.ldtk: level 'two', layer 'Things', object a 'Player', property 'mas': it is no field")
+    alone = carom("maps", "check", "bad.ldtk", "--with", "game.py", "--level", "two").stdout
+    assert alone == line.replace("level 'two', ", "") + "\n"
