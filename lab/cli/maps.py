@@ -30,7 +30,7 @@ def maps_command() -> None:
 @click.argument("files", metavar="MAP...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
     "--with", "game", type=click.Path(path_type=Path), metavar="FILE.py",
-    help="The game's components, prefabs, layers and MATERIALS, for classes and properties of the map.",
+    help="The game's components, prefabs, LAYERS or IntFlag, and MATERIALS, for classes and properties of the map.",
 )  # fmt: skip
 @click.option("--level", help="Of an LDtk project with several levels (default: all of them).")
 @traceback_option
@@ -65,9 +65,11 @@ def names_of(file: Path) -> dict[str, Any]:
     for value in values.values():
         if isinstance(value, Mapping) and value and all(isinstance(each, Prefab) for each in value.values()):
             found["prefabs"].update(value)
-    flags = [value for value in values.values() if _is(value, enum.IntFlag) and value.__module__ == module.__name__]
-    if len(flags) == 1:
-        found["layers"] = flags[0]
+    flags = [value for value in values.values() if _is(value, enum.IntFlag)]
+    own = [value for value in flags if value.__module__ == module.__name__]
+    layers = [value for name, value in values.items() if name.casefold() == "layers"] or own or flags
+    if len(layers) == 1 and (_is(layers[0], enum.IntFlag) or isinstance(layers[0], Mapping)):
+        found["layers"] = layers[0]
     if isinstance(values.get("MATERIALS"), Mapping):
         found["materials"] = values["MATERIALS"]
     return found

@@ -7,7 +7,7 @@ import helpers_maps_ldtk as ldtk
 import numpy as np
 import pytest
 from helpers_cli import refusal, report_of
-from helpers_maps import map_of, objects_of, thing, tiles_of, write
+from helpers_maps import Ref, map_of, objects_of, thing, tiles_of, write
 
 carom = helpers_cli.carom  # a fixture
 
@@ -88,3 +88,30 @@ def test_levels_of_a_project_are_told_and_chosen(carom, tmp_path):
     assert line.startswith("bad.ldtk: level 'two', layer 'Things', object a 'Player', property 'mas': it is no field")
     alone = carom("maps", "check", "bad.ldtk", "--with", "game.py", "--level", "two").stdout
     assert alone == line.replace("level 'two', ", "") + "\n"
+
+
+@pytest.mark.parametrize("layers", [
+    'from flags import Flags', 'from flags import Flags as Layers', 'LAYERS = {"wall": 1, "foe": 2}',
+])  # fmt: skip
+def test_layers_of_a_game_are_found(layers, carom, level, tmp_path):
+    (tmp_path / "flags.py").write_text("import enum\nclass Flags(enum.IntFlag):\n    WALL, FOE = 1, 2\n")
+    own = GAME[GAME.index("class Layers") : GAME.index("class Enemy")]
+    (tmp_path / "game.py").write_text(GAME.replace(own, layers + "\n"))
+    (line,) = carom("maps", "check", "level.tmx", "--with", "game.py").stdout.splitlines()
+    assert "property 'mas': " in line
+
+
+def test_a_joint_of_what_the_game_knows_is_not_looked_at_without_it(carom, tmp_path):
+    """A point of a prefab; that it is none of this game is told."""
+    drawn = [thing(1, 20, 10, kind="Hinge", point=True, properties={"a": Ref(2), "b": Ref(3)}),
+             thing(2, 20, 10, kind="goom", point=True), thing(3, 20, 10, 8, 8, properties={"mass": 1.0})]  # fmt: skip
+    (tmp_path / "basic.png").touch()
+    write(tmp_path / "level.tmx", map_of(6, 4, objects_of(*drawn)))
+    (tmp_path / "game.py").write_text(GAME)
+    (tmp_path / "other.py").write_text(GAME.replace("Prefab(RigidBody(), SphereCollider(0.5))", "None"))
+    alone = carom("maps", "check", "level.tmx")
+    assert (alone.exit_code, alone.stdout) == (0, "")
+    assert alone.stderr == "carom: level.tmx: not looked at without --with game.py: goom\n"
+    assert carom("maps", "check", "level.tmx", "--with", "game.py").exit_code == 0
+    told = carom("maps", "check", "level.tmx", "--with", "other.py").stdout
+    assert "property 'Hinge.a': it refers to object 2 '', which has no entity" in told
