@@ -29,6 +29,7 @@ WORDS: dict[str, tuple[type, ...]] = {
 }  # fmt: skip
 THICKNESS = Column(minimum=0.0, owner="create_chain", name="thickness")
 SHAPES = ("box", "capsule", "ellipse")
+NO_REFERENCE = "it takes no reference to an object"
 NO_OBJECT = 0  # an object property that is not set
 
 
@@ -120,6 +121,7 @@ class Vocabulary:
         """Of layers: a number, or names with commas."""
         if isinstance(value, (int, float)) and not isinstance(value, bool) and value == value // 1:
             return int(value)
+        value = ",".join(map(str, value)) if isinstance(value, list) else value  # of LDtk
         names = [name.strip() for name in str(value).replace("|", ",").split(",") if name.strip()]
         if self.layers is None:
             known = None if self.world is None else self.world._layer_names
@@ -241,6 +243,8 @@ class Sorter:
 
     def _plain(self, name: str, given: Property, found: Fields) -> None:
         """A name without a dot, of no component of the object."""
+        if given.type == "object" and name != "path" and name in (*VELOCITY, *MATERIAL, *WORDS):
+            raise RefusedError(NO_REFERENCE)
         if name in RigidBody._arguments:
             found.of.setdefault(RigidBody, {})
             self._field(RigidBody, name, given, found)
@@ -309,12 +313,17 @@ class Sorter:
             value = self.to_world(value)
             if not len(value):
                 raise RefusedError("it has no points")
-            value = value if isinstance(column, ArrayColumn) else tuple(value[0].tolist())
+            if not isinstance(column, ArrayColumn):
+                if len(value) > 1:
+                    raise RefusedError(f"it takes one point, got {len(value)}")
+                value = tuple(value[0].tolist())
         elif given.type == "object":
             if value == NO_OBJECT:
                 return
             if isinstance(column, ArrayColumn):
                 value = self.points_of(value)[0]
+            elif column.choices or column.dtype is bool or column.unit not in ("", "m" * (column.item == "vector")):
+                raise RefusedError(NO_REFERENCE)
             elif column.item == "vector":
                 value = self.place_of(value)
             else:

@@ -123,3 +123,20 @@ def test_what_is_wrong_is_told(change, told, tmp_path, world):
     with pytest.raises(maps.MapError, match=told):
         maps.load(path, world, (Enemy,))
     assert len(world.bodies) == 0
+
+
+def test_what_takes_no_reference_or_list_says_so(tmp_path, world):
+    ref, two = {"entityIid": "x"}, [{"cx": 1, "cy": 1}, {"cx": 2, "cy": 1}]
+    names = "mass", "kind", "angular_velocity", "linear_velocity", "velocity_x", "friction", "solid", "speed"
+    fields = [field(name, "EntityRef", ref) for name in names]
+    lift = [field("path", "Array<Point>", two), *fields, field("home", "Array<Point>", two)]
+    path = write(tmp_path / "world.ldtk", project(level("L", CELLS, entity("x", "Enemy", 0, 0, fields=lift))))
+    found = {each.place.rpartition(" ")[2]: each.text for each in maps.check(path, (Enemy,))}
+    assert {found.get(f"'{name}'") for name in names} == {"it takes no reference to an object"}
+    assert found["'home'"] == "it takes one point, got 2"
+    mask = [field("mask", "Array<LocalEnum.Layer>", ["WALL", "FOE"])]
+    write(path, project(level("L", CELLS, entity("x", "Enemy", 0, 0, fields=mask))))
+    made = maps.load(path, world, (Enemy,), layers={"wall": 1, "foe": 4})
+    assert world.component_for_entity(made.object("x").entity, AABBCollider).mask == 5
+    with pytest.raises(maps.MapError, match="no layer is named 'FOE'"):
+        maps.load(path, world, (Enemy,), layers={"wall": 1})
