@@ -231,14 +231,15 @@ class Plan:
             of: dict[Any, Any] = {}
             for each in (*body, *planned.beside):
                 of[each.kind if isinstance(each, Late) else type(each)] = each
-            levels = {kind: each.copy() for kind, each in of.items() if issubclass(kind, Collider)}
+            levels = [each for kind, each in of.items() if issubclass(kind, Collider)]
             try:
                 for kind in of:
                     check_beside(kind, of, "it")
                 if check is not None and world is not None and len(levels) > 1:
-                    for each in levels.values():
+                    levels = [each.copy() for each in levels]
+                    for each in levels:
                         each.take_bits(each.bits_by_name(world._layer_names))
-                    check({0: levels})
+                    check({0: {type(each): each for each in levels}})
             except (ValueError, CaromError) as error:
                 raise RefusedError(str(error).removeprefix("entity 0: ")) from error
 
