@@ -7,8 +7,7 @@ from __future__ import annotations
 import math
 
 from ...framework.jit.stack_arrays import stack_array
-from ...framework.vectors import absolute, add, add_scaled, dot, item, negative, replace, row, scale, store, sub
-from ...systems.shapes.convex.gjk import cross
+from ...framework.vectors import absolute, add, add_scaled, cross, dot, item, negative, replace, row, scale, store, sub
 from ...systems.shapes.convex.pair import SUPPORT_TILT
 from ...systems.shapes.convex.points import POINT_ROOM, clip
 from ..corners import along_axes, in_world
