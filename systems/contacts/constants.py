@@ -25,7 +25,7 @@ FRICTION_OVERRELAXATION = 1.5  # of the impulse that stops a row from sliding, i
 # a stored impulse is a spring without a damper, so columns sway, and only passes take energy; below 2 they do
 REFINED_PASSES = 8  # of each substep of an island with more: columns under heavy bodies sway with 2, pyramids with 12
 MOST_REPEATS = 1024  # substeps of an island, beyond which the heaviest count as lighter, and a fault says so; and
-# passes over rows that are not solved and islands that have gained energy, or until hard islands agree;
+# turns of passes over rows that are not solved, or passes until hard islands agree;
 ISLAND_WORK = 20_000  # rows at most in all of these, and in all substeps of an island, if they are more than usual
 FINER_PASSES = 32  # an island for which that is more passes is solved as much better
 STRUCK_EXCESS = 0.01  # extents per step: an island with a row whose speed is wrong by more is solved further, what

@@ -61,8 +61,7 @@ JOINTS = Schema(
     stream=ints("int32"),  # of each place: what holds points of an island, or all else of it
     at_once=ints("int8"),  # BY_PASSES, or with all such of its island: HELD_AT_ONCE, LIMITED_AT_ONCE; see direct
     group=ints("int32"),  # of its bodies, as that was numbered first
-    open_row=ints("int32"),  # of these, those that further passes go over: so many
-    opened=integer(),
+    open_row=ints("int32"),  # some of these
     first=ints("int32"),  # places of the two bodies
     second=ints("int32"),
     base_a=vectors(unit="m"),  # anchors where the step has turned the bodies

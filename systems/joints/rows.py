@@ -246,24 +246,34 @@ def solve_joints(solver, pushes):
 
 
 @part
-def relax_open(solver):
-    """A pass without pushing over the joints of islands whose contacts have further passes, as they have."""
-    joints, columns = solver.joints, columns_of(solver)
-    for e in range(joints.opened):
-        j = joints.open_row[e]
-        a, b = joints.first[j], joints.second[j]
-        if is_soft_spring(joints, j) or joints.at_once[j] != BY_PASSES:
-            continue
-        if joints.kind[j] != POINT:
-            solve_row(solver, j, False)
-            continue
-        old, speed = joints.push[j], speed_between(solver, j)
-        new, limit = sub(old, symmetric_product(joints.inverse[j], joints.inverse_products[j], speed)), joints.most[j]
-        size = length(new)
-        if size > limit * joints.step:
-            new = scale(new, limit * joints.step / size)
-        joints.push[j] = new
-        push_apart(columns, (a, b), (joints.arm_a[j], joints.arm_b[j]), sub(new, old))
+def island_of_joint(solver, j):
+    """The island of row j."""
+    return max(solver.island[solver.joints.first[j]], solver.island[solver.joints.second[j]])
+
+
+@part
+def relax_listed(solver):
+    """A pass without pushing over the joints of islands with listed rows; in order they stand island by island."""
+    joints, columns, e = solver.joints, columns_of(solver), solver.joints.begin
+    while e < joints.end:
+        t = island_of_joint(solver, joints.order[e])
+        begin, e = e, e + solver.links[t]
+        for one in range(begin, e if solver.listed_of[t] > 0 else begin):
+            j = joints.order[one]
+            a, b = joints.first[j], joints.second[j]
+            if is_soft_spring(joints, j) or joints.at_once[j] != BY_PASSES:
+                continue
+            if joints.kind[j] != POINT:
+                solve_row(solver, j, False)
+                continue
+            old, speed = joints.push[j], speed_between(solver, j)
+            change = symmetric_product(joints.inverse[j], joints.inverse_products[j], speed)
+            new, limit = sub(old, change), joints.most[j]
+            size = length(new)
+            if size > limit * joints.step:
+                new = scale(new, limit * joints.step / size)
+            joints.push[j] = new
+            push_apart(columns, (a, b), (joints.arm_a[j], joints.arm_b[j]), sub(new, old))
     if solver.direct.begin < solver.direct.end:
         solve_direct(solver, REFINE_PASS)
         solve_all_limited(solver, False)

@@ -11,26 +11,7 @@ from .custom import rates_of_custom
 from .direct import PUSH_PASS, REFINE_PASS, solve_direct
 from .measuring import measure_joints
 from .records import CUSTOM, POINT, TURN
-from .rows import add_joints, keep_joints, relax_open, solve_joints, start_joints, warm_start_joints
-
-
-@part
-def island_of_joint(solver, j):
-    """The island of row j."""
-    return max(solver.island[solver.joints.first[j]], solver.island[solver.joints.second[j]])
-
-
-@part
-def list_open_joints(solver):
-    """Further passes go over the joints of islands with rows in ``listed``: in order they stand island by island."""
-    joints, opened, e = solver.joints, 0, solver.joints.begin
-    while e < joints.end:
-        t = island_of_joint(solver, joints.order[e])
-        for k in range(solver.links[t] if solver.listed_of[t] > 0 else 0):
-            joints.open_row[opened + k] = joints.order[e + k]
-        opened += solver.links[t] if solver.listed_of[t] > 0 else 0
-        e += solver.links[t]
-    joints.opened = opened
+from .rows import add_joints, island_of_joint, keep_joints, relax_listed, solve_joints, start_joints, warm_start_joints
 
 
 @part
@@ -74,13 +55,11 @@ def solve_joined_range(solver, what, numbers, span):
         add_joints(solver)
     elif what == calls.KEEP:
         keep_joints(solver, dt)
-    elif what == calls.OPEN:
-        list_open_joints(solver)
-    elif what == calls.RELAX_OPEN:
-        relax_open(solver)
+    elif what == calls.RELAX_LISTED:
+        relax_listed(solver)
     elif what == calls.ADD_WORK:
-        for e in range(joints.opened if solver.movers > 0 else 0):
-            j = joints.open_row[e]
+        for e in range(joints.begin, joints.end if solver.movers > 0 else joints.begin):
+            j = joints.order[e]
             solver.slope[island_of_joint(solver, j)] += work_of_joint(solver, j)
     elif what == calls.SUM_WORK:
         for e in range(joints.begin, joints.end if solver.movers > 0 else joints.begin):

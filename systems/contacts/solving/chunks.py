@@ -266,19 +266,13 @@ def solve_chunks(solver, bias, pushes, span):
 
 
 @part
-def relax_pairs(solver, count, span):
-    """One pass over the pairs of the first rows of ``listed``, which ascend; all points of a pair as in a chunk, so
-    that what lands flat stays so."""
-    start, c = span[0], solver.first_chunk
+def relax_pair(solver, k, start, c):
+    """A pass over the pair of row k, of chunk c, which begins at ``start``; all its points as in a chunk, so that what
+    lands flat stays so."""
     chunk = make_chunk(scale(solver.velocity[0], 0.0))
-    for e in range(count):
-        k = solver.listed[e]
-        while solver.ends[c] <= k:
-            start, c = solver.ends[c], c + 1
-        points = solver.points[c]
-        pairs = (solver.ends[c] - start) // points
-        one = start + (k - start) % pairs
-        gather_motion(solver, chunk, one, 1)
-        solve_rows(solver, chunk, solver.target_speed, 0.0, one, 1, (points, pairs))
-        scatter_motion(solver, chunk, one, 1)
-    solver.visits += count
+    points = solver.points[c]
+    pairs = (solver.ends[c] - start) // points
+    one = start + (k - start) % pairs
+    gather_motion(solver, chunk, one, 1)
+    solve_rows(solver, chunk, solver.target_speed, 0.0, one, 1, (points, pairs))
+    scatter_motion(solver, chunk, one, 1)

@@ -1,8 +1,8 @@
-"""What the usual passes of a substep leave undone: further passes, and a bound on the energy that rows give.
+"""What the usual passes of a substep leave undone: further passes over rows that are not solved, and a bound on the
+energy that rows give.
 
-Contacts at rest take energy from their island. Impulses that were those of another moment may give some: passes go on
-over the rows of such islands, and over rows that are not solved. What energy is left after these, but for a
-bounded push, is taken back: of all that the contacts have changed only the share acts that takes the most.
+Contacts at rest take energy from their island. Impulses that were those of another moment may give some. What is more
+than a bounded push is taken back: of all that the contacts have changed only the share acts that takes the most.
 """
 
 from __future__ import annotations
@@ -23,11 +23,12 @@ from ..constants import (
     ISLAND_WORK,
     STRUCK_EXCESS,
 )  # fmt: skip
-from .chunks import relax_pairs
+from .chunks import relax_pair
 from .passes import most_repeats
-from .rows import excess_speed, relax_listed, velocity_at
+from .rows import excess_speed, relax_row, velocity_at
 
 NO_NUMBERS = 0.0, 0.0
+LISTED_NOT = -1
 
 
 @part
@@ -42,28 +43,6 @@ def islands_of(solver, span):
     if span[2] == 0:
         return 0, solver.islands
     return solver.island[span[2]], solver.island[span[2]] + 1
-
-
-@part
-def list_open(solver, span, arms):
-    """Islands with rows in ``listed`` are open: further passes go over their joints, and their energy is weighed."""
-    opened = 0
-    for q in range(span[2], span[3]):
-        t = solver.island[q]
-        solver.open_body[opened] = q
-        opened += t >= 0 and solver.listed_of[t] > 0
-    solver.opened = opened
-    for_joints(solver, calls.OPEN, NO_NUMBERS, span, arms)
-
-
-@part
-def open_all(solver, listed, span, arms):
-    """All islands of a range are open. listed: what is in them is so already."""
-    islands = islands_of(solver, span)
-    for t in range(islands[0], islands[1]):
-        solver.listed_of[t] = 1
-    if not listed:
-        list_open(solver, span, arms)
 
 
 @part
@@ -84,26 +63,16 @@ def work_of_row(solver, k, arms):
 
 
 @part
-def add_work(solver, span, arms):
-    """What moves by itself gives its work to open islands: it is no gain of contacts."""
-    for k in range(span[0], span[1] if solver.movers > 0 or solver.surfaces_run else span[0]):
-        t = island_of(solver, k)
-        if solver.listed_of[t] > 0:
-            solver.slope[t] += work_of_row(solver, k, arms)
-    for_joints(solver, calls.ADD_WORK, NO_NUMBERS, span, arms)
-
-
-@part
 def measure_energy(solver, span, arms, islands):
-    """What contacts do to the energy of each open island if a share s of all that they have changed acts: E(s) =
-    slope s + curvature s^2 / 2, which is exact, and without the work that is done on the island."""
+    """What contacts do to the energy of each island if a share s of all that they have changed acts: E(s) = slope s +
+    curvature s^2 / 2, which is exact, without the work of what moves by itself: that is no gain of contacts."""
     slope, curvature, energy, island = solver.slope, solver.curvature, solver.energy, solver.island
     for t in range(islands[0], islands[1]):
-        if solver.listed_of[t] > 0:
-            slope[t] = curvature[t] = energy[t] = 0.0
-    for e in range(solver.opened):
-        q = solver.open_body[e]
+        slope[t] = curvature[t] = energy[t] = 0.0
+    for q in range(span[2], span[3]):
         t, v, m = island[q], solver.velocity_before[q], solver.solver_mass[q]
+        if t < 0:
+            continue
         change = sub(solver.velocity[q], v)
         slope[t] += m * dot(v, change)
         curvature[t] += m * dot(change, change)
@@ -115,7 +84,9 @@ def measure_energy(solver, span, arms, islands):
             slope[t] += dot(momentum, change)
             curvature[t] += dot(momentum_of_spin(solver, q, change), change)
             energy[t] += dot(momentum, before)
-    add_work(solver, span, arms)
+    for k in range(span[0], span[1] if solver.movers > 0 or solver.surfaces_run else span[0]):
+        slope[island_of(solver, k)] += work_of_row(solver, k, arms)
+    for_joints(solver, calls.ADD_WORK, NO_NUMBERS, span, arms)
 
 
 @part
@@ -142,39 +113,68 @@ def energy_budget(solver, bias_rate, h, dt, span, islands):
 
 
 @inlined
-def gains_by_contacts(solver, t):
-    """Whether further passes may take what island t has gained: those of contacts do not take what joints give."""
-    return exceeds_budget(solver, t) and solver.links[t] == 0
-
-
-@inlined
 def excess_scale(solver, t):
     """How many times better than STRUCK_EXCESS the rows of a struck island are solved."""
     return max(1.0, ISLAND_WORK / (FINER_PASSES * (solver.size_of[t] + solver.links[t])))
 
 
+@inlined
+def is_unsolved(solver, k, t, dt, arms):
+    """Whether the speed of row k, of a struck island t, is still wrong."""
+    return excess_speed(solver, k, arms) * dt * excess_scale(solver, t) > STRUCK_EXCESS * solver.extent[k]
+
+
 @part
-def find_unsolved_rows(solver, turn, any_struck, dt, span, arms, islands):
-    """The rows of struck islands that are not solved, and all of islands that gain, come first in ``listed``; returns
-    how many. An island has as many passes as its own size allows: what is solved elsewhere changes none of its bits."""
-    struck, extent, any_gain, finest, count = solver.struck, solver.extent, False, 0.0, 0
+def find_unsolved_rows(solver, turn, dt, span, arms):
+    """How many rows of struck islands are not solved. They are listed from the first one on, which is returned as well;
+    so are those without joints that were listed before, as what is solved at one spoils its neighbours. An island has
+    as many turns as its own size allows: what is solved elsewhere changes none of its bits."""
+    islands, following, stop = islands_of(solver, span), solver.listed, span[1]
+    count, head, last, finest = 0, stop, -1, 0.0
     for t in range(islands[0], islands[1]):
+        left = solver.struck[t] and (turn == 0 or solver.listed_of[t] > 0)
+        solver.struck[t] = left and turn <= most_repeats(solver.size_of[t] + solver.links[t])
         solver.listed_of[t] = 0
-        any_gain |= gains_by_contacts(solver, t)
-        finest = max(finest, excess_scale(solver, t) if struck[t] else 0.0)
-    for k in range(span[0], span[1] if any_gain or any_struck else span[0]):
-        excess, least = excess_speed(solver, k, arms) * dt, STRUCK_EXCESS * extent[k]
-        if excess * finest > least or any_gain:  # seldom
+        finest = max(finest, excess_scale(solver, t) if solver.struck[t] else 0.0)
+    for k in range(span[0], stop if finest > 0.0 else span[0]):
+        before, wrong = turn > 0 and following[k] > LISTED_NOT, excess_speed(solver, k, arms) * dt * finest
+        following[k] = LISTED_NOT
+        if before or wrong > STRUCK_EXCESS * solver.extent[k]:  # seldom
             t = island_of(solver, k)
-            wrong = struck[t] and excess * excess_scale(solver, t) > least
-            rows = solver.size_of[t] + solver.links[t]
-            if (wrong or gains_by_contacts(solver, t)) and turn <= most_repeats(rows):
-                solver.listed[count] = k
+            new = solver.struck[t] and is_unsolved(solver, k, t, dt, arms)
+            count += new
+            if new or (before and solver.struck[t] and solver.links[t] == 0):
                 solver.listed_of[t] += 1
-                count += 1
-    if count > 0:
-        list_open(solver, span, arms)
-    return count
+                if last < 0:
+                    head = k
+                else:
+                    following[last] = k
+                last, following[k] = k, stop
+    return count, head
+
+
+@part
+def relax_unsolved(solver, head, dt, span, arms):
+    """A pass over the rows that are listed from ``head`` on, and the joints of their islands; where there are none more
+    passes over those that are not solved, of about as much work as to look at all rows of the island again."""
+    for_joints(solver, calls.RELAX_LISTED, NO_NUMBERS, span, arms)
+    passes, any_relaxed = 0, True
+    while any_relaxed:
+        any_relaxed, k, start, c = False, head, span[0], solver.first_chunk
+        while k < span[1]:
+            t = island_of(solver, k)
+            more = passes == 0 or (solver.links[t] == 0 and passes * solver.listed_of[t] < solver.size_of[t])
+            if more and is_unsolved(solver, k, t, dt, arms):
+                any_relaxed = True
+                solver.visits += 1
+                if len(arms) > 0 and not solver.surfaces_run:
+                    while solver.ends[c] <= k:
+                        start, c = solver.ends[c], c + 1
+                    relax_pair(solver, k, start, c)
+                else:
+                    relax_row(solver, k, arms)
+            k = solver.listed[k]
+        passes += 1
 
 
 @part
@@ -223,26 +223,18 @@ def carry_budget(solver, islands):
 
 @part
 def finish_substep(solver, bias_rate, any_struck, h, dt, span, arms):
-    """Further passes over the islands of a range that gain or are struck, then the bound on their energy."""
-    islands, any_gain = islands_of(solver, span), False
+    """Further passes over the struck islands of a range, then the bound on the energy of all."""
+    islands, turn, count, any_gain = islands_of(solver, span), 0, int(any_struck), False
+    while count > 0:
+        count, head = find_unsolved_rows(solver, turn, dt, span, arms)
+        turn += 1
+        if count > 0:
+            relax_unsolved(solver, head, dt, span, arms)
     measure_energy(solver, span, arms, islands)
     for t in range(islands[0], islands[1]):
         solver.allowed[t], solver.share[t] = solver.credit[t], 1.0
         any_gain |= exceeds_budget(solver, t)
-    if not (any_gain or any_struck):
-        carry_budget(solver, islands)
-        return
-    energy_budget(solver, bias_rate, h, dt, span, islands)
-    turn, count = 0, find_unsolved_rows(solver, 0, any_struck, dt, span, arms, islands)
-    while count > 0:
-        for_joints(solver, calls.RELAX_OPEN, NO_NUMBERS, span, arms)
-        if len(arms) > 0 and not solver.surfaces_run:
-            relax_pairs(solver, count, span)
-        else:
-            relax_listed(solver, count, arms)
-        measure_energy(solver, span, arms, islands)
-        turn += 1
-        count = find_unsolved_rows(solver, turn, any_struck, dt, span, arms, islands)
-    limit_energy(solver, span, arms, islands)
+    if any_gain:
+        energy_budget(solver, bias_rate, h, dt, span, islands)
+        limit_energy(solver, span, arms, islands)
     carry_budget(solver, islands)
-    open_all(solver, turn == 0, span, arms)

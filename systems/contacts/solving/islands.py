@@ -147,7 +147,7 @@ def number_islands(state, dt, ordered):
     moved. It is that already if rows are ``ordered``. What is known of its bodies is summed up."""
     solver, bodies, island, count = state.solver, state.bodies, state.solver.island, 0
     velocity, start, warm_started = bodies.linear_velocity, bodies.start_velocity, bodies.warm_started
-    number = solver.open_body
+    number = solver.number
     for q in range(solver.bodies):
         i = solver.body_row[q]
         w = bodies.inverse_mass[i]
@@ -269,7 +269,7 @@ def choose_substeps(solver, t, usual, dt):
 def place_rows(state):
     """``slot`` of each row by (range, colour), and the bodies by range: the ordinary islands are range 0."""
     solver, bodies, pairs, starts = state.solver, state.bodies, state.pairs, stack_array(STARTS, 0)
-    row, island, number, range_of = solver.body_row, solver.island, solver.open_body, solver.range_of
+    row, island, number, range_of = solver.body_row, solver.island, solver.number, solver.range_of
     ends, body_ends = solver.row_ends, solver.body_ends
     slot, colour, contacts, listed = solver.slot, solver.colour, solver.contacts, solver.listed
     for k in range(2 * COLOURS + 1):
@@ -346,7 +346,7 @@ def order_joints(state):
     The rows of a joint stand together, and its neighbours in a chain apart: they would wait for each other.
     """
     solver, joints, ground = state.solver, state.solver.joints, state.solver.bodies
-    island, begins, begin = solver.island, solver.open_body, 0
+    island, begins, begin = solver.island, solver.number, 0
     island[ground] = -1
     for s in range(solver.ranges):
         one = 0 if s == 0 else island[solver.body_ends[s - 1]]

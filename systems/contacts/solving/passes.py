@@ -5,7 +5,7 @@ from __future__ import annotations
 from ....framework.compilation import inlined, part
 from ..constants import FRICTION_OVERRELAXATION, ISLAND_WORK, MOST_REPEATS, NEGLIGIBLE
 from .chunks import solve_chunks
-from .rows import closing_speed, look_ahead, relax_listed, solve_friction, solve_normals, solve_rolling
+from .rows import closing_speed, look_ahead, relax_row, solve_friction, solve_normals, solve_rolling
 
 
 @part
@@ -99,6 +99,8 @@ def close_nearest_first(solver, h, span, arms):
         new = closing_speed(solver, k, arms) > solver.target_speed[k]
         while new and work > 0:
             note_impulses(solver, span)
-            relax_listed(solver, e + 1, arms)
+            for i in range(e + 1):
+                relax_row(solver, solver.listed[i], arms)
+            solver.visits += e + 1
             work -= e + 1
             new = not agrees(solver, h, span)

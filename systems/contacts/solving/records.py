@@ -23,7 +23,7 @@ SOLVER = Schema(
     pair=ints("int32"),  # its pair,
     point=ints("int8"),  # and which of the points of that
     colour=ints("int8"),  # of contact r: twice that of its pair, one more if that has several points
-    listed=ints("int32"),  # some rows
+    listed=ints("int32"),  # some rows; or after each that is listed the next one
     first=ints("uint32"),  # places of the two bodies
     second=ints("uint32"),
     normal=vectors(unit="1"),
@@ -96,8 +96,7 @@ SOLVER = Schema(
     frame=table("float64", 4, unit="1"),  # principal axes, a quaternion, with joints in space: see turning
     inverse_moments=vectors(unit="1/(kg m^2)"),  # about these
     reach=floats(unit="m"),  # of its shape from its centre of mass
-    open_body=ints("int32"),  # those of islands that further passes go over: so many; before that a number of each
-    opened=integer(),
+    number=ints("int32"),
     mover=ints("int32"),  # bodies that move by themselves
     movers=integer(),
     held=floats(unit="N s"),  # by its strongest hard contact; above 0 before that: something presses on it

@@ -298,11 +298,8 @@ def solve_rolling(solver, span):
 
 
 @part
-def relax_listed(solver, count, arms):
-    """One pass over the first rows of ``listed``, which may close as fast as what is open lets them."""
-    for e in range(count):
-        k = solver.listed[e]
-        solve_normal_of(solver, k, solver.target_speed, False, arms)
-        if solver.friction[k] != 0.0:
-            solve_friction_of(solver, k, 1.0, arms, solver.surfaces_run)
-    solver.visits += count
+def relax_row(solver, k, arms):
+    """Solve row k, which may close as fast as what is open lets it, and its friction."""
+    solve_normal_of(solver, k, solver.target_speed, False, arms)
+    if solver.friction[k] != 0.0:
+        solve_friction_of(solver, k, 1.0, arms, solver.surfaces_run)

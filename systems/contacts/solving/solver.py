@@ -32,7 +32,7 @@ from ..constants import (
     TURNING_RELAX_PASSES,
 )  # fmt: skip
 from .chunks import find_chunks, load_masses, measure_chunks
-from .guard import finish_substep, island_of, islands_of, open_all
+from .guard import finish_substep, island_of, islands_of
 from .hard import select_rigid
 from .islands import is_hard_island
 from .overload import cap_mass_ratio, restore_mass
@@ -238,7 +238,6 @@ def solve_range(solver, s, dt, span, arms):
     if capped:
         cap_mass_ratio(solver, solver.island[span[2]], dt, span, arms)
     springs = contact_spring(solver, 1.0, substeps, h), contact_spring(solver, STATIC_STIFFNESS, substeps, h)
-    open_all(solver, False, span, arms)
     if len(arms) > 0:
         find_chunks(solver, span)
         load_masses(solver, span)
@@ -273,7 +272,8 @@ def count_work(state, dt):
         if taken > 0.0:
             state.restrained_counted += 1
             state.restrained_energy += taken
-            step = math.sqrt(2.0 * taken / solver.mass_of[t]) * dt * solver.own[t]
+            each = 2.0 * taken / solver.substeps_of[t]  # pushing out, which is held back as well, gives no more
+            step = math.sqrt(each / solver.mass_of[t]) * dt * solver.own[t]
             if taken > 0.5 * solver.energy[t] and step > STRUCK_EXCESS:
                 q = 0
                 while solver.island[q] != t:
