@@ -11,11 +11,11 @@ import pytest
 from carom import scenes
 
 HASHES = {
-    "pile2d": ({"n": 40}, "cd7509a1e0ebf3e8dd650f971ed439fba1a9b4cd4e1653bde781d6d0e52ec160"),
-    "pile3d": ({"n": 27}, "209d2ed3b3a57a71d14a8cbbb6a538736b091f19cab922dc3fa4766712647a2b"),
+    "pile2d": ({"n": 40}, "e1f24cf748c2498c94db16321141435a51433acf680f5b48024c365de7b970a9"),
+    "pile3d": ({"n": 27}, "cab0d89851ae420ef135f53298726e508c298dcf1f3f717bb124baaf2908392b"),
     "tumbler": ({"n": 12}, "0c1980139e89fde1c589cce28d44e01f52c316eeab435314c4e599fccb103c62"),
-    "bridge": ({"n": 8, "crates": 2}, "3bbdbc989a745f5000ceb692967d1f8ecab7b283a805ba952c2a92361a33e3a6"),
-    "ragdoll": ({"n": 1}, "72b6f74d1b488d07880bc6b6263df96570b0936e178aa2cc37630a937483eb8a"),
+    "bridge": ({"n": 8, "crates": 2}, "270c6350c00fa6e7196c7a3fb757fbd0cb88b2ed20329b787a54db8347c79439"),
+    "ragdoll": ({"n": 1}, "de743f5efcba4ed41888d4a8590839b475e44f4c8fe3caadd0b6517e8826df34"),
 }
 STEPS = 60
 
