@@ -16,6 +16,7 @@ from .contacts.events import ContactEvents
 from .contacts.points import lay_arms
 from .contacts.response import Response
 from .contacts.solving.islands import measure_joined_islands
+from .contacts.solving.turning import tumble, turn_back
 from .forces.accumulation import ForceAccumulation
 from .impacts.jointed import bend_struck, respond_joined, strike_joined
 from .impacts.together import resolve_simultaneous
@@ -38,6 +39,8 @@ from .linking.parts import (
     JOINED_SUPPORT,
     TAKE_TOGETHER,
     TOUCH_OF_TURN,
+    TUMBLE,
+    TURN_BACK,
     TURN_BY_IMPACT,
     TURNING_RESPONSE,
     TURNING_TOUCH,
@@ -160,7 +163,7 @@ LINKED_PARTS = {
     CLOSING_POINT: closing_point, ARMS_AT_REST: lay_arms, TURNING_RESPONSE: respond_at_arms,
     TURN_BY_IMPACT: turn_by_impact, JOINED_ISLANDS: measure_joined_islands, JOINED_BODIES: gather_joined,
     JOINED_RESPONSE: respond_joined, JOINED_IMPACT: strike_joined, JOINED_START: bend_struck,
-    JOINED_RANGE: solve_joined_range, JOINED_SUPPORT: mark_joined,
+    JOINED_RANGE: solve_joined_range, JOINED_SUPPORT: mark_joined, TURN_BACK: turn_back, TUMBLE: tumble,
 }  # fmt: skip
 
 # The system of each stage; "" for those that open and close a step.

@@ -240,7 +240,8 @@ def take_spins(state, dt, spin):
         struck = state.impacts.logged > 0 and bodies.impact_count[i] > 0
         if struck and has_unequal_moments(state, i):
             read_axes(state, i)  # as impacts have turned it
-        if state.solver.joints.active > 0 and not struck:  # its spin is that of its inertia as it is turned now
+        tumbled = state.solver.joints.active > 0 or state.solver.lopsided
+        if tumbled and not struck:  # its spin is that of its inertia as it is turned now
             turn_about(state, i, further)
         else:
             turn_with_contacts(state, spin, i, further)

@@ -13,7 +13,7 @@ from ..integration.turning import size_of_turn
 from ..joints.bodies import build_joint_rows
 from ..joints.order import order_direct
 from ..joints.records import DIRECT_BODIES
-from ..linking.parts import JOINED_BODIES, JOINED_START, call_of_step
+from ..linking.parts import JOINED_BODIES, JOINED_START, TURN_BACK, call_of_step
 from ..parts.rows import next_row, owner_of
 from ..parts.stages import copy_to_parts
 from ..records import (
@@ -32,7 +32,6 @@ from .points import points_of
 from .solving.islands import order_joints, order_rows
 from .solving.prediction import drop_support
 from .solving.rows import rotate_body
-from .solving.turning import NOT_TUMBLING, integrate_rotation_of_joined, note_frame
 
 
 @part
@@ -141,13 +140,9 @@ def gather(state, dt):
 
 def gather_joined(state, dt):
     """The order of joints, where they hold their bodies, and how these turn by themselves in space."""
-    solver, nothing = state.solver, zero_of(state)
-    for q in range(solver.bodies if len(nothing) == 3 else 0):
-        note_frame(state, q)
-        solver.spin_before[q] = nothing
-        if solver.frame[q, 0] != NOT_TUMBLING:
-            rotate_body(solver, q, nothing)
-            integrate_rotation_of_joined(solver, q, q + 1, -dt)
+    solver = state.solver
+    if len(zero_of(state)) == 3:
+        call_of_step(state.links[TURN_BACK], state, dt)
     if state.impacts.active and state.impacts.logged > 0:
         call_of_step(state.links[JOINED_START], state, dt)
     order_joints(state)

@@ -12,7 +12,7 @@ from ..ccd.search_bounds import FAST, turns_far
 from ..ccd.turning_touch import FOLLOWED_TURN, turn_of_path
 from ..codes import OK
 from ..integration.turning import cross_spin, is_turned, size_of_turn, turn_of_arm
-from ..linking.parts import TOUCH_OF_TURN, call_touch_of_turn
+from ..linking.parts import TOUCH_OF_TURN, TURN_BACK, call_of_step, call_touch_of_turn
 from ..narrow_phase.manifolds import centre_offset_at_start, evaluate_pair, forget_manifold, has_manifold
 from ..shapes.convex.points import MOST_POINTS, contact_points, is_same
 from ..shapes.linking.convex_by_address import convex_at, rounding_by_address, support_by_address
@@ -253,6 +253,8 @@ def lay_arms(state, dt):
                 lay_first_touch(state, dt, r)
     for r in range(solver.contacts if solver.lopsided else 0):
         note_middles(state, r, True)
+    if solver.lopsided and solver.joints.active == 0 and len(zero_of(state)) == 3:
+        call_of_step(state.links[TURN_BACK], state, dt)
     for r in range(solver.contacts if solver.has_rolling else 0):
         c = solver.pair[r]
         solver.rolling[solver.slot[r]] = rolling_between(state.bodies, pairs.a[c], pairs.b[c])

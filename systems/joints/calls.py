@@ -7,8 +7,8 @@ from ..linking.parts import call_joined_range
 
 # See solving.solve_joined_range, which does it.
 (
-    START, START_WARM, PUSH, RELAX, PUSH_AGAIN, RELAX_AGAIN, TURN_BODIES, ADD, KEEP, RELAX_LISTED, ADD_WORK, SUM_WORK,
-) = range(12)  # fmt: skip
+    START, START_WARM, PUSH, RELAX, PUSH_AGAIN, RELAX_AGAIN, ADD, KEEP, RELAX_LISTED, ADD_WORK, SUM_WORK,
+) = range(11)  # fmt: skip
 
 
 @inlined

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from ...framework.compilation import packed, part
 from ...framework.vectors import add, dot, scale
-from ..contacts.solving.turning import integrate_rotation_of_joined
 from ..integration.turning import cross_spin
 from . import calls
 from .custom import rates_of_custom
@@ -49,8 +48,6 @@ def solve_joined_range(solver, what, numbers, span):
         pushes = what == calls.PUSH_AGAIN
         if solver.direct.begin < solver.direct.end and (span[0] < span[1] or not pushes):
             solve_direct(solver, PUSH_PASS if pushes else REFINE_PASS)
-    elif what == calls.TURN_BODIES:
-        integrate_rotation_of_joined(solver, span[2], span[3], h)
     elif what == calls.ADD:
         add_joints(solver)
     elif what == calls.KEEP:

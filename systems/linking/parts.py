@@ -17,13 +17,13 @@ from ..shapes.linking.signatures import call_in_dimension
 (
     BOUND_SEARCHES, FIRST_TOUCH, TAKE_TOGETHER, FREE_TURN, TURNING_TOUCH, TOUCH_OF_TURN, CLOSING_POINT, ARMS_AT_REST,
     TURNING_RESPONSE, TURN_BY_IMPACT, JOINED_ISLANDS, JOINED_BODIES, JOINED_RESPONSE, JOINED_IMPACT,
-    JOINED_START, JOINED_RANGE, JOINED_SUPPORT,
-) = PLACES = range(17)  # fmt: skip
+    JOINED_START, JOINED_RANGE, JOINED_SUPPORT, TURN_BACK, TUMBLE,
+) = PLACES = range(19)  # fmt: skip
 SWEPT_PARTS, IMPACT_PARTS = (BOUND_SEARCHES, FIRST_TOUCH), (FIRST_TOUCH,)
-TURNING_PARTS = (FREE_TURN, TURNING_TOUCH, TOUCH_OF_TURN, CLOSING_POINT, ARMS_AT_REST, TURNING_RESPONSE, TURN_BY_IMPACT)
-JOINT_PARTS = (JOINED_SUPPORT, JOINED_ISLANDS, JOINED_BODIES, JOINED_RANGE)
+IN_SPACE = (FREE_TURN, TURN_BACK, TUMBLE)  # in a plane nothing calls them
+TURNING_PARTS = (*IN_SPACE, TURNING_TOUCH, TOUCH_OF_TURN, CLOSING_POINT, ARMS_AT_REST, TURNING_RESPONSE, TURN_BY_IMPACT)
+JOINT_PARTS = (JOINED_SUPPORT, JOINED_ISLANDS, JOINED_BODIES, JOINED_RANGE, TURN_BACK, TUMBLE)
 JOINT_IMPACT_PARTS = (JOINED_RESPONSE, JOINED_IMPACT, JOINED_START)
-IN_SPACE = (FREE_TURN,)  # in a plane nothing calls it
 
 
 @cache
@@ -32,6 +32,7 @@ def signature_of(place: int, dimensions: int) -> Signature:
     state, vector, i, f = record_kind(STATE, dimensions), floats(dimensions), INT, FLOAT
     path = tuple_of(*(vector,) * 4)  # (x0, x1, x2, x3), see trajectory
     touch = tuple_of(f, vector, vector, vector)  # (time, normal, point, from a's centre to b's)
+    solver, span = record_kind(SOLVER, dimensions), tuple_of(i, i, i, i)
     of_step, turn_by_impact = i(state, f), i(state, i, f, vector, f)
     response = tuple_of(f, vector)(state, tuple_of(i, i), touch, tuple_of(vector, f), f, f)
     return (
@@ -44,15 +45,17 @@ def signature_of(place: int, dimensions: int) -> Signature:
         tuple_of(f, vector)(state, i, i, vector, tuple_of(f, vector, vector), f, vector),
         of_step, response, turn_by_impact,
         of_step, of_step, response, turn_by_impact, of_step,
-        f(record_kind(SOLVER, dimensions), i, floats(2), tuple_of(i, i, i, i)),
-        of_step,
+        f(solver, i, floats(2), span),
+        of_step, of_step, i(solver, f, span),
     )[place]  # fmt: skip
 
 
 (
     call_bound_searches, call_first_touch, call_take_together, call_free_turn, call_turning_touch, call_touch_of_turn,
-    call_closing_point, call_of_step, call_turning_response, call_turn_by_impact, call_joined_range,
-) = (call_in_dimension(partial(signature_of, place)) for place in (*PLACES[:JOINED_ISLANDS], JOINED_RANGE))  # fmt: skip
+    call_closing_point, call_of_step, call_turning_response, call_turn_by_impact, call_joined_range, call_tumble,
+) = (
+    call_in_dimension(partial(signature_of, place)) for place in (*PLACES[:JOINED_ISLANDS], JOINED_RANGE, TUMBLE)
+)  # fmt: skip
 
 
 def needed_places(dimensions: int, sweeps: bool, bounces: bool, turns: bool, joined: bool) -> list[int]:

@@ -213,7 +213,7 @@ def limit_energy(solver, span, arms, islands):
 @part
 def carry_budget(solver, islands):
     """What joints have taken in a substep they may give back later in the step."""
-    for t in range(islands[0], islands[1]):
+    for t in range(islands[0], islands[1] if solver.joints.active > 0 or solver.lopsided else islands[0]):
         s = solver.share[t]
         if solver.links[t] > 0:
             solver.credit[t] = max(0.0, solver.credit[t] - s * (solver.slope[t] + 0.5 * s * solver.curvature[t]))

@@ -95,6 +95,7 @@ SOLVER = Schema(
     inverse_products=vectors(flat=0, unit="1/(kg m^2)"),
     frame=table("float64", 4, unit="1"),  # principal axes, a quaternion, with joints in space: see turning
     inverse_moments=vectors(unit="1/(kg m^2)"),  # about these
+    tumbling=integer(),  # address of what turns bodies in space, see turning
     reach=floats(unit="m"),  # of its shape from its centre of mass
     number=ints("int32"),
     mover=ints("int32"),  # bodies that move by themselves

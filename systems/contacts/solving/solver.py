@@ -17,7 +17,7 @@ from ....framework.vectors import add, add_scaled, dot, scale
 from ...codes import OK
 from ...joints import calls
 from ...joints.calls import for_joints
-from ...linking.parts import JOINED_RANGE, call_joined_range
+from ...linking.parts import JOINED_RANGE, TUMBLE, call_tumble
 from ..constants import (
     DAMPING_RATIO,
     FREQUENCY,
@@ -115,8 +115,8 @@ def integrate_positions(solver, h, span, arms):
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], h)
         if len(arms) > 0:
             rotate_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], h))
-    if len(arms) > 0 and solver.joints.active > 0 and len(solver.velocity[span[2]]) == 3:
-        call_joined_range(solver.joints.solver, solver, calls.TURN_BODIES, (h, h), span)
+    if len(arms) > 0 and len(solver.velocity[span[2]]) == 3 and (solver.joints.active > 0 or solver.lopsided):
+        call_tumble(solver.tumbling, solver, h, span)
         load_masses(solver, span)
     elif len(arms) > 0:
         integrate_rotation(solver, span[2], span[3], h)
@@ -322,7 +322,7 @@ def solve_contacts(state, dt):
 def solve_turning_contacts(state, dt):
     """The contacts and joints of bodies of which some spin."""
     joints = state.solver.joints
-    joints.solver = state.links[JOINED_RANGE]
+    joints.solver, state.solver.tumbling = state.links[JOINED_RANGE], state.links[TUMBLE]
     if state.solver.contacts > 0 or joints.active > 0:
         solve_substeps(state, dt, ARMS)
     return OK

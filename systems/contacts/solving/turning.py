@@ -1,6 +1,6 @@
-"""Where there are joints, bodies in space turn within the step as they do by themselves: in each substep about their
-angular momentum, and their inertia with them. What joints give to one of two bodies they take from the other, so the
-momentum of both stays what it is, and their turning changes no energy.
+"""Where there are joints, or a ball with its mass off the middle touches, bodies in space turn within the step as they
+do by themselves: in each substep about their angular momentum, and their inertia with them. What joints give to one of
+two bodies they take from the other, so the momentum of both stays what it is, and their turning changes no energy.
 
 The flight has turned the bodies to the end of the step. They go back to its start and come on from there.
 """
@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import math
 
-from ....framework.compilation import part
+from ....framework.compilation import packed, part
 from ....framework.elementary import atan2
+from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add_scaled, components, dot, length, scale, triple
+from ...codes import OK
 from ...integration.turning import SERIES, change_of_spin, quaternion_of
 from ...shapes.free_rotation import diagonalised, energy_of, turn_freely, turn_to_energy
 from ...shapes.poses import NO_INERTIA, has_unequal_moments, momentum_along
@@ -98,11 +100,25 @@ def integrate_free_rotation(solver, q, h):
     rotate_body(solver, q, rotation_vector(spin, product(by, quaternion_of(solver.turn[q]))))
 
 
-@part
-def integrate_rotation_of_joined(solver, begin, end, h):
-    """Bodies go on turning for a time where there are joints in space."""
-    for q in range(begin, end):
+@packed
+def tumble(solver, h, span):
+    """The bodies of a range go on turning for a time."""
+    for q in range(span[2], span[3]):
         if solver.frame[q, 0] == NOT_TUMBLING:
             rotate_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], h))
         elif length(solver.spin[q]) > 0.0:
             integrate_free_rotation(solver, q, h)
+    return OK
+
+
+def turn_back(state, dt):
+    """Bodies that tumble turn by themselves to where the step starts."""
+    solver, nothing = state.solver, zero_of(state)
+    for q in range(solver.bodies):
+        note_frame(state, q)
+        solver.spin_before[q] = nothing
+        if solver.frame[q, 0] != NOT_TUMBLING:
+            rotate_body(solver, q, nothing)
+            if length(solver.spin[q]) > 0.0:
+                integrate_free_rotation(solver, q, -dt)
+    return OK
