@@ -401,6 +401,7 @@ STATE = Schema(
     statics_version=integer(),  # another whenever a static body may have changed; and the one that these are of:
     read_version=integer(),  # inverse masses, checked columns,
     boxed_version=integer(),  # boxes,
+    shared_version=integer(),  # with the version: spins,
     frame=floats(unit="m"),  # extent of the moving bodies' boxes
     pair_search=integer(),  # what finds candidates in this step, see broad_phase.stages
     response_idle=flag(),  # nothing is near anything, and nothing rested

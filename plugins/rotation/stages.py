@@ -163,15 +163,17 @@ def write_inverse_inertia(state, spin, i):
 )  # fmt: skip
 def share_spins(state, dt, spin):
     """how fast bodies spin, and how contacts turn them"""
-    bodies, zero = state.bodies, zero_of(state)
-    state.spinning = True
+    bodies, zero, versions = state.bodies, zero_of(state), state.version + state.statics_version  # both only grow
+    every = state.has_parts or state.shared_version != versions
+    state.spinning, state.shared_version = True, versions
     for i in range(state.count):
+        bodies.rolling_friction[i] = spin.rolling_friction[i] if spin.present[i] else 0.0
+    for i in range(0 if every else state.first, state.count if every else state.moving):
         w, moves = zero, state.first <= i < state.moving and spin.present[i] and not bodies.quarantined[i]
         if moves:
             w = spin_of(state, spin, i)
         bodies.spin[i], bodies.turn[i] = w, scale(w, dt)
         bodies.inverse_inertia[i], bodies.inverse_products[i], bodies.rolling_radius[i] = zero, zero, 0.0
-        bodies.rolling_friction[i] = spin.rolling_friction[i] if spin.present[i] else 0.0
         if moves and i < state.dynamic:
             write_inverse_inertia(state, spin, i)
 

@@ -30,7 +30,7 @@ def join_held(state):
         a, b = joints.row_a[joints.order[e]], joints.row_b[joints.order[e]]
         if may_move(state, a) and may_move(state, b):
             join_roots(joined, owner_of(state, a), owner_of(state, b))
-    for i in range(state.count):
+    for i in range(state.dynamic):
         if joined[i] >= 0:
             joined[i] = root_of(joined, i)
     for e in range(joints.active - 1, -1, -1):
