@@ -222,12 +222,13 @@ def still_bounces(state, dt, c, depth, normal):
 def is_resting(state, dt, c):
     """Whether a solid pair's gap is below the margin after the impacts and it is not bouncing."""
     pairs, bodies, count = state.pairs, state.bodies, state.bodies.impact_count
+    near_contact = pairs.near_contact
     a, b = pairs.a[c], pairs.b[c]
     if count[a] >= STOPPED or count[b] >= STOPPED:
-        pairs.near_contact[c] = True  # they may touch where they are now
+        near_contact[c] = True  # they may touch where they are now
         return False
     hit, carried = count[a] > 0 or count[b] > 0, bodies.warm_started[a] or bodies.warm_started[b]
-    if not pairs.near_contact[c] and not hit and not carried:
+    if not near_contact[c] and not hit and not carried:
         return False
     d = centre_offset(bodies, a, b)
     turns = state.spinning and turns_far(state, a, b)
@@ -246,11 +247,11 @@ def is_resting(state, dt, c):
                 _, before, across, _ = evaluate_pair(state, a, b, start)
                 if before >= -margin:
                     depth, normal, far = before, across, True
-    was_near = pairs.near_contact[c] and has_manifold(pairs, c)  # not so pairs that were found within the step
+    was_near = near_contact[c] and has_manifold(pairs, c)  # not so pairs that were found within the step
     if depth < 0.0 and (hit or turns or not was_near) and depth < -turning_margin(state, dt, a, b):
         return False  # else it may have been pushed too much by the prediction
     if depth >= 0.0:
-        pairs.near_contact[c] = True
+        near_contact[c] = True
     pairs.parting[c] = STATIONARY
     if state.impacts.active and still_bounces(state, dt, c, depth, normal):
         return False

@@ -102,20 +102,20 @@ def penetration_of(state, dt, c, a, b):
 def push_out(state, dt, c, a, b):
     """Move the one of a and b that can be moved out of the other, where it is deeper than it may, and take the speed
     that leads there; returns how far it was moved."""
-    bodies = state.bodies
+    bodies, velocities = state.bodies, state.bodies.linear_velocity
     far, normal = penetration_of(state, dt, c, a, b)
     if not far > 0.0:
         return 0.0
     i, fixed, sign = (b, a, 1.0) if bodies.inverse_mass[b] > 0.0 else (a, b, -1.0)
-    velocity = bodies.linear_velocity[i]
+    velocity = velocities[i]
     if fixed < state.moving:
-        velocity = sub(velocity, bodies.linear_velocity[fixed])
+        velocity = sub(velocity, velocities[fixed])
     closing = sign * dot(velocity, normal)
     k = owner_of(state, i)
     while k >= 0:
         bodies.position[k] = add_scaled(bodies.position[k], normal, sign * far)
         if closing < 0.0:
-            bodies.linear_velocity[k] = add_scaled(bodies.linear_velocity[k], normal, -sign * closing)
+            velocities[k] = add_scaled(velocities[k], normal, -sign * closing)
         k = next_row(state, k)
     return far
 
@@ -134,11 +134,12 @@ def may_penetrate(state, c, i):
     """Whether body i of pair c may be deeper than it may: the solver has moved it, or has left it on its path, which is
     not quite that of the substeps; what has struck it turns on, or so many impacts in which it turns have stopped it:
     from one to the next it sinks in a little."""
-    rests = state.impacts.sweeps and state.solver.contacts > 0 and state.pairs.rests[c]
+    pairs = state.pairs
+    rests = state.impacts.sweeps and state.solver.contacts > 0 and pairs.rests[c]
     if rests or is_moved_by_solver(state, i):
         return True
-    struck = state.spinning and state.pairs.impulse[c] > 0.0
-    if struck and turns_far(state, state.pairs.a[c], state.pairs.b[c]):
+    struck = state.spinning and pairs.impulse[c] > 0.0
+    if struck and turns_far(state, pairs.a[c], pairs.b[c]):
         return True
     return state.spinning and state.bodies.impact_count[i] >= STOPPED
 

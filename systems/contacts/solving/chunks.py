@@ -7,14 +7,18 @@ the pairs are solved.
 
 from __future__ import annotations
 
+import math
+
 from ....framework.compilation import inlined, part
 from ....framework.jit.records.schema import Schema, floats, vectors
 from ....framework.jit.records.stack_record import stack_record
 from ....framework.vectors import add, add_scaled, dot, scale, sub
 from ...integration.turning import cross_spin, end_of_turn, symmetric, twist
+from ..constants import TURNING_FREQUENCY
 from .records import ROW_CHUNK
 from .rows import pull_along_surface, update_targets
 
+SAG_OF_SHARE = 0.25 / (2.0 * math.pi * TURNING_FREQUENCY) ** 2  # kg m/s, of a contact's spring, per N s on four of them
 SEVERAL = 1.0 + 1e-9  # times the masses that two points of a pair move: they are solved at once even if they are one
 
 # What the rows of a chunk need of the bodies of its pairs.
@@ -143,12 +147,11 @@ def terms_at(solver, one, k, motion, bias, softly):
 
 
 @inlined
-def rub_at(solver, one, k, impulse, motion):
-    """The motion after the impulse along the surface at row k, which has that along its normal, of the pair whose first
-    row is ``one``."""
+def rub_at(solver, one, k, motion):
+    """The motion after the impulse along the surface at row k, of the pair whose first row is ``one``."""
     n, arm_a, arm_b, tangent = solver.normal[k], solver.arm_a[k], solver.arm_b[k], solver.tangent[k]
     slip = parting_at(motion, arm_a, arm_b)
-    pull = pull_along_surface(tangent, slip, n, solver.tangent_mass[k], solver.friction[k] * impulse)
+    pull = pull_along_surface(tangent, slip, n, solver.tangent_mass[k], solver.friction[k] * solver.impulse[k])
     solver.tangent[k] = pull
     return pushed(solver, one, motion, arm_a, arm_b, sub(pull, tangent))
 
@@ -187,16 +190,44 @@ def solve_one(solver, one, motion, bias, softly):
     excess -= softly * softness(solver, one) * (excess + old)
     new = old + excess if old + excess > 0.0 else 0.0
     solver.impulse[one] = new
-    return rub_at(solver, one, one, new, pushed(solver, one, motion, arm_a, arm_b, scale(n, new - old)))
+    return rub_at(solver, one, one, pushed(solver, one, motion, arm_a, arm_b, scale(n, new - old)))
 
 
 @inlined
-def rub_rows(solver, chunk, impulses, start, first, pairs):
+def rub_rows(solver, chunk, start, first, pairs):
     """The rows of one point of some pairs along their surfaces."""
     for q in range(pairs):
-        impulse = impulses[q]
-        solver.impulse[first + q] = impulse
-        store_motion(chunk, q, rub_at(solver, start + q, first + q, impulse, chunk_motion(chunk, q)))
+        k = first + q
+        store_motion(chunk, q, rub_at(solver, start + q, k, chunk_motion(chunk, q)))
+
+
+@inlined
+def area_between(a, b, c, n):
+    """Twice the area of a triangle, seen along n; below 0 the other way round."""
+    return dot(cross_spin(sub(b, a), sub(c, a)), n)
+
+
+@inlined
+def spread_load(solver, p, stride):
+    """Four points of a pair, of which p is the first row, share its load as four equal springs do: their impulses lose
+    what adds up to no force and no torque, so that nothing moves otherwise; friction has its limits from them. Where
+    one is open by more than a spring sags under its share they stay as they are."""
+    rows, n, push, by = (p, p + stride, p + 2 * stride, p + 3 * stride), solver.normal[p], solver.impulse, 1.0
+    (a, b, c, d), at, load, more, square = rows, solver.arm_a, 0.0, 0.0, 0.0
+    a, b, c, d = at[a], at[b], at[c], at[d]
+    weights = area_between(b, c, d, n), -area_between(a, c, d, n), area_between(a, b, d, n), -area_between(a, b, c, n)
+    for e in range(4):
+        pushed, w = push[rows[e]], weights[e]
+        load, more, square = load + pushed, more + w * pushed, square + w * w
+    more /= square if square > 0.0 else 1.0
+    for e in range(4):
+        k, less = rows[e], weights[e] * more
+        if less > push[k]:
+            by = min(by, push[k] / less)
+        if solver.target_speed[k] * solver.mass[k] > SAG_OF_SHARE * load:
+            by = 0.0
+    for e in range(4):
+        push[rows[e]] -= by * more * weights[e]
 
 
 @part
@@ -207,6 +238,7 @@ def solve_rows(solver, chunk, bias, softly, start, pairs, layout):
     if points == 1:
         for q in range(pairs):
             store_motion(chunk, q, solve_one(solver, start + q, chunk_motion(chunk, q), bias, softly))
+        return
     for e in range(points // 2):
         first, second = start + e * stride, start + (e + points // 2) * stride
         for q in range(pairs):  # it stores nothing where it reads: else no two pairs would be solved together
@@ -215,8 +247,12 @@ def solve_rows(solver, chunk, bias, softly, start, pairs, layout):
                 solver, start + q, first + q, second + q, motion, bias, softly
             )
             store_motion(chunk, q, motion)
-        rub_rows(solver, chunk, chunk.impulse, start, first, pairs)
-        rub_rows(solver, chunk, chunk.other, start, second, pairs)
+        for q in range(pairs):
+            solver.impulse[first + q], solver.impulse[second + q] = chunk.impulse[q], chunk.other[q]
+    for q in range(pairs if points == 4 else 0):
+        spread_load(solver, start + q, stride)
+    for e in range(points):
+        rub_rows(solver, chunk, start, start + e * stride, pairs)
 
 
 @part

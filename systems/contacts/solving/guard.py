@@ -113,37 +113,33 @@ def energy_budget(solver, bias_rate, h, dt, span, islands):
 
 
 @inlined
-def excess_scale(solver, t):
-    """How many times better than STRUCK_EXCESS the rows of a struck island are solved."""
-    return max(1.0, ISLAND_WORK / (FINER_PASSES * (solver.size_of[t] + solver.links[t])))
-
-
-@inlined
 def is_unsolved(solver, k, t, dt, arms):
-    """Whether the speed of row k, of a struck island t, is still wrong."""
-    return excess_speed(solver, k, arms) * dt * excess_scale(solver, t) > STRUCK_EXCESS * solver.extent[k]
+    """Whether the speed of row k is still wrong, of an island t with a ``share``, see ``find_unsolved_rows``."""
+    return excess_speed(solver, k, arms) * dt * solver.share[t] > STRUCK_EXCESS * solver.extent[k]
 
 
 @part
 def find_unsolved_rows(solver, turn, dt, span, arms):
     """How many rows of struck islands are not solved. They are listed from the first one on, which is returned as well;
     so are those without joints that were listed before, as what is solved at one spoils its neighbours. An island has
-    as many turns as its own size allows: what is solved elsewhere changes none of its bits."""
-    islands, following, stop = islands_of(solver, span), solver.listed, span[1]
-    count, head, last, finest = 0, stop, -1, 0.0
+    as many turns as its own size allows: what is solved elsewhere changes none of its bits; small ones are solved as
+    many times better as their ``share`` says."""
+    islands, following, share, stop = islands_of(solver, span), solver.listed, solver.share, span[1]
+    count, head, last, largest = 0, stop, -1, 0.0
     for t in range(islands[0], islands[1]):
-        left = solver.struck[t] and (turn == 0 or solver.listed_of[t] > 0)
-        solver.struck[t] = left and turn <= most_repeats(solver.size_of[t] + solver.links[t])
+        rows, left = solver.size_of[t] + solver.links[t], solver.struck[t] if turn == 0 else solver.listed_of[t] > 0
+        left &= turn <= most_repeats(rows)
+        share[t] = max(1.0, ISLAND_WORK / (FINER_PASSES * rows)) if left else 0.0
         solver.listed_of[t] = 0
-        finest = max(finest, excess_scale(solver, t) if solver.struck[t] else 0.0)
-    for k in range(span[0], stop if finest > 0.0 else span[0]):
-        before, wrong = turn > 0 and following[k] > LISTED_NOT, excess_speed(solver, k, arms) * dt * finest
+        largest = max(largest, share[t])
+    for k in range(span[0], stop if largest > 0.0 else span[0]):
+        before, excess = turn > 0 and following[k] > LISTED_NOT, excess_speed(solver, k, arms)
         following[k] = LISTED_NOT
-        if before or wrong > STRUCK_EXCESS * solver.extent[k]:  # seldom
+        if before or excess * dt * largest > STRUCK_EXCESS * solver.extent[k]:  # seldom
             t = island_of(solver, k)
-            new = solver.struck[t] and is_unsolved(solver, k, t, dt, arms)
+            new = is_unsolved(solver, k, t, dt, arms)
             count += new
-            if new or (before and solver.struck[t] and solver.links[t] == 0):
+            if new or (before and share[t] > 0.0 and solver.links[t] == 0):
                 solver.listed_of[t] += 1
                 if last < 0:
                     head = k
@@ -163,8 +159,8 @@ def relax_unsolved(solver, head, dt, span, arms):
         any_relaxed, k, start, c = False, head, span[0], solver.first_chunk
         while k < span[1]:
             t = island_of(solver, k)
-            more = passes == 0 or (solver.links[t] == 0 and passes * solver.listed_of[t] < solver.size_of[t])
-            if more and is_unsolved(solver, k, t, dt, arms):
+            more = passes == 0 or solver.links[t] == 0
+            if more and passes * solver.listed_of[t] < solver.size_of[t] and is_unsolved(solver, k, t, dt, arms):
                 any_relaxed = True
                 solver.visits += 1
                 if len(arms) > 0 and not solver.surfaces_run:
@@ -181,29 +177,27 @@ def relax_unsolved(solver, head, dt, span, arms):
 def limit_energy(solver, span, arms, islands):
     """In islands that still gain only the share acts that takes the most energy: the least of E(s). Where there are
     joints the largest share acts that gives no more than is allowed."""
-    start, stop, begin, end = span
-    share, any_gain = solver.share, False
+    share, island, any_gain = solver.share, solver.island, False
     for t in range(islands[0], islands[1]):
-        share[t] = 1.0
         if exceeds_budget(solver, t):
-            slope, curvature = solver.slope[t] - solver.allowed[t], solver.curvature[t]
-            most = -slope / curvature
+            slope, curvature, allowed = solver.slope[t], solver.curvature[t], solver.allowed[t]
+            gain = slope - allowed
+            most = -gain / curvature
             if solver.links[t] > 0:  # all that is allowed, as joints are to hold
-                root = math.sqrt(solver.slope[t] * solver.slope[t] + 2.0 * curvature * solver.allowed[t])
-                most = (root - solver.slope[t]) / curvature
-            share[t] = min(1.0, max(0.0, most)) if curvature < math.inf else 0.0
-            solver.taken[t] += slope + 0.5 * curvature - share[t] * (slope + 0.5 * share[t] * curvature)
-            any_gain = True
-    for q in range(begin, end if any_gain else begin):
-        t = solver.island[q]
+                most = (math.sqrt(slope * slope + 2.0 * curvature * allowed) - slope) / curvature
+            kept = min(1.0, max(0.0, most)) if curvature < math.inf else 0.0
+            solver.taken[t] += gain + 0.5 * curvature - kept * (gain + 0.5 * kept * curvature)
+            share[t], any_gain = kept, True
+    velocity, spin = solver.velocity, solver.spin
+    for q in range(span[2], span[3] if any_gain else span[2]):
+        t = island[q]
         if t >= 0 and share[t] < 1.0:
             before = solver.velocity_before[q]
-            change = sub(solver.velocity[q], before)
-            solver.velocity[q] = add_scaled(before, change, share[t]) if share[t] > 0.0 else before
+            velocity[q] = add_scaled(before, sub(velocity[q], before), share[t]) if share[t] > 0.0 else before
             if len(arms) > 0:
-                turned = sub(solver.spin[q], solver.spin_before[q])
-                solver.spin[q] = add_scaled(solver.spin_before[q], turned, share[t])
-    for k in range(start, stop if any_gain else start):
+                spun = solver.spin_before[q]
+                spin[q] = add_scaled(spun, sub(spin[q], spun), share[t])
+    for k in range(span[0], span[1] if any_gain else span[0]):
         kept = share[island_of(solver, k)]
         if kept < 1.0:
             solver.impulse[k] *= kept
@@ -215,10 +209,8 @@ def carry_budget(solver, islands):
     """What joints have taken in a substep they may give back later in the step."""
     for t in range(islands[0], islands[1] if solver.joints.active > 0 or solver.lopsided else islands[0]):
         s = solver.share[t]
-        if solver.links[t] > 0:
-            solver.credit[t] = max(0.0, solver.credit[t] - s * (solver.slope[t] + 0.5 * s * solver.curvature[t]))
-        else:
-            solver.credit[t] = 0.0
+        left = solver.credit[t] - s * (solver.slope[t] + 0.5 * s * solver.curvature[t])
+        solver.credit[t] = max(0.0, left) if solver.links[t] > 0 else 0.0
 
 
 @part

@@ -270,7 +270,7 @@ def place_rows(state):
     """``slot`` of each row by (range, colour), and the bodies by range: the ordinary islands are range 0."""
     solver, bodies, pairs, starts = state.solver, state.bodies, state.pairs, stack_array(STARTS, 0)
     row, island, number, range_of = solver.body_row, solver.island, solver.number, solver.range_of
-    ends, body_ends = solver.row_ends, solver.body_ends
+    ends, body_ends, count = solver.row_ends, solver.body_ends, solver.bodies
     slot, colour, contacts, listed = solver.slot, solver.colour, solver.contacts, solver.listed
     for k in range(2 * COLOURS + 1):
         starts[k] = 0
@@ -282,7 +282,7 @@ def place_rows(state):
         e = starts[colour[r]]
         starts[colour[r]] += 1
         slot[r], listed[e] = e, r
-    ends[0], body_ends[0] = contacts, solver.bodies
+    ends[0], body_ends[0] = contacts, count
     if solver.ranges == 1:
         return
     for s in range(solver.ranges):
@@ -292,7 +292,7 @@ def place_rows(state):
         t = island_of_rows(state, pairs.a[c], pairs.b[c])
         slot[r] = range_of[t]
         ends[range_of[t]] += 1
-    for q in range(solver.bodies):
+    for q in range(count):
         body_ends[range_of[island[q]] if island[q] >= 0 else 0] += 1
     rows = places = 0
     for s in range(solver.ranges):  # from how many to where each begins
@@ -303,14 +303,14 @@ def place_rows(state):
         s = slot[r]
         slot[r] = ends[s]
         ends[s] += 1
-    for q in range(solver.bodies):
+    for q in range(count):
         s = range_of[island[q]] if island[q] >= 0 else 0
         number[q] = body_ends[s]
         body_ends[s] += 1
-    for q in range(solver.bodies):
+    for q in range(count):
         bodies.place[row[q]] = number[q]
         solver.used[number[q]], solver.mover[number[q]] = row[q], island[q]
-    for q in range(solver.bodies):
+    for q in range(count):
         row[q], island[q] = solver.used[q], solver.mover[q]
 
 

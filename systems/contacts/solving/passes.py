@@ -90,17 +90,17 @@ def close_nearest_first(solver, h, span, arms):
     Activating all rows at once does not converge: a pass takes back of an impulse no more than what is open, and the
     impulse of a row which another one should have held before is as high as a whole fall.
     """
-    count, work = span[1] - span[0], ISLAND_WORK
+    count, work, listed = span[1] - span[0], ISLAND_WORK, solver.listed
     for e in range(count):
-        solver.listed[e] = span[0] + e
-    sort_by(solver.listed, count, solver.target_speed)
+        listed[e] = span[0] + e
+    sort_by(listed, count, solver.target_speed)
     for e in range(count):
-        k = solver.listed[e]
+        k = listed[e]
         new = closing_speed(solver, k, arms) > solver.target_speed[k]
         while new and work > 0:
             note_impulses(solver, span)
             for i in range(e + 1):
-                relax_row(solver, solver.listed[i], arms)
+                relax_row(solver, listed[i], arms)
             solver.visits += e + 1
             work -= e + 1
             new = not agrees(solver, h, span)

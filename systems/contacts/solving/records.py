@@ -118,7 +118,7 @@ SOLVER = Schema(
     curvature=floats(unit="J"),
     energy=floats(unit="J"),
     allowed=floats(unit="J"),
-    share=floats(unit="1"),
+    share=floats(unit="1"),  # before that how many times better the rows of a struck island are solved than others
     taken=floats(unit="J"),  # that the guard has taken in this step
     struck=flags(),  # some row is far from solved
     listed_of=ints("int32"),  # rows of it that further passes go over

@@ -195,17 +195,17 @@ def leave_open_rows(solver, h, span, arms):
 @inlined
 def apply_impulse(solver, k, impulse, arms):
     """Push the second body of row k by an impulse, a vector, and the first one back."""
-    velocity, inverse_mass = solver.velocity, solver.inverse_mass
+    velocity, spin, inverse_mass = solver.velocity, solver.spin, solver.inverse_mass
     a, b = solver.first[k], solver.second[k]
     v_a, v_b, w_a, w_b = velocity[a], velocity[b], inverse_mass[a], inverse_mass[b]
     if w_a > 0.0:  # storing what stays as it is would make rows with one floor wait for each other
         velocity[a] = add_scaled(v_a, impulse, -w_a)
         if len(arms) > 0:
-            solver.spin[a] = sub(solver.spin[a], change_of_spin(solver, a, twist(solver.arm_a[k], impulse)))
+            spin[a] = sub(spin[a], change_of_spin(solver, a, twist(solver.arm_a[k], impulse)))
     if w_b > 0.0:
         velocity[b] = add_scaled(v_b, impulse, w_b)
         if len(arms) > 0:
-            solver.spin[b] = add(solver.spin[b], change_of_spin(solver, b, twist(solver.arm_b[k], impulse)))
+            spin[b] = add(spin[b], change_of_spin(solver, b, twist(solver.arm_b[k], impulse)))
 
 
 @inlined

@@ -46,6 +46,13 @@ def row_of(state, wanted):
 
 
 @part
+def shaped_row_of(state, entity):
+    """The row of an entity; -1 if it is no body, or has no shape."""
+    row = row_of(state, entity)
+    return row if row >= 0 and state.bodies.shape[row] >= 0 else -1
+
+
+@part
 def find_rows(state):
     """The rows of the remembered pairs, -1 for bodies that are gone, or have lost their shape. They hold until rows
     move or shapes go."""
@@ -53,9 +60,8 @@ def find_rows(state):
     if memory.rows_version[now] == state.version:
         return
     for m in range(memory.counts[now]):
-        for rows, entity in ((memory.first, memory.entity_a[now, m]), (memory.second, memory.entity_b[now, m])):
-            row = row_of(state, entity)
-            rows[now, m] = row if row >= 0 and state.bodies.shape[row] >= 0 else -1
+        memory.first[now, m] = shaped_row_of(state, memory.entity_a[now, m])
+        memory.second[now, m] = shaped_row_of(state, memory.entity_b[now, m])
     memory.rows_version[now] = state.version
 
 
