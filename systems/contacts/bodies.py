@@ -61,7 +61,7 @@ def list_rows(state):
     solver, pairs, r, same = state.solver, state.pairs, 0, True
     for h in range(pairs.resting_count):
         c = pairs.resting[h]
-        for e in range(points_of(state, c) if solver.tips else 1):
+        for e in range(points_of(state, c) if solver.any_tips else 1):
             same &= solver.point[r] == e
             solver.pair[r], solver.point[r] = c, e
             r += 1
@@ -154,23 +154,24 @@ def gather_joined(state, dt):
 def put_back(state, dt):
     """Bodies that some contact pushed take what the solver says; without the predicted support they fly free."""
     solver, pairs, bodies, joints = state.solver, state.pairs, state.bodies, state.solver.joints
+    held = bodies.held
     for r in range(solver.contacts):
         k = solver.slot[r]
         pairs.impulse[solver.pair[r]] += solver.total[k]
         if solver.peak[k] > 0.0:
             for q in (solver.first[k], solver.second[k]):
-                bodies.held[solver.body_row[q]] = True
+                held[solver.body_row[q]] = True
     for e in range(joints.active):
         j = joints.order[e]
         for i in (joints.row_a[j], joints.row_b[j]):
             if i >= 0:
-                bodies.held[owner_of(state, i)] = True
+                held[owner_of(state, i)] = True
     for q in range(solver.bodies if solver.contacts + joints.active > 0 else 0):
         i = solver.body_row[q]
         bodies.place[i] = -1
         if state.spinning:
             bodies.contact_travel[i] = size_of_turn(solver.turn[q]) * solver.reach[q]
-        if bodies.held[i] and solver.inverse_mass[q] > 0.0:
+        if held[i] and solver.inverse_mass[q] > 0.0:
             bodies.position[i] = add(bodies.previous_position[i], solver.shift[q])
             bodies.linear_velocity[i] = solver.velocity[q]
             gained = scale(sub(solver.velocity[q], bodies.start_velocity[i]), 1.0 / dt)

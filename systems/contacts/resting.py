@@ -267,7 +267,7 @@ def find_resting(state, dt):
             if pairs.rests[c]:
                 pairs.resting[count], pairs.near_contact[c] = c, True
                 count, rows = count + 1, rows + (points_of(state, c) if state.spinning else 1)
-    pairs.resting_count, state.solver.contacts, state.solver.tips = count, rows, rows > count
+    pairs.resting_count, state.solver.contacts, state.solver.any_tips = count, rows, rows > count
     state.resting_counted += count
     return OK if count == 0 or state.rest_ready else NEED_REST
 

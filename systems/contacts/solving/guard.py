@@ -98,7 +98,7 @@ def exceeds_budget(solver, t):
 
 
 @part
-def energy_budget(solver, bias_rate, h, dt, span, islands):
+def energy_budget(solver, springs, h, dt, span, islands):
     """What each island may gain in a substep: what its joints have taken before in the step, what forces give from
     rest, more of that where it is pushed out, and without joints, which would use it in each substep, a small share of
     the energy at the speed of pushing."""
@@ -107,8 +107,9 @@ def energy_budget(solver, bias_rate, h, dt, span, islands):
         force, rate = solver.force_of[t] * h / dt, dt / h if solver.size_of[t] > 0 else 1.0
         allowed[t] = solver.credit[t] + (0.5 + GAIN_WEIGHT * rate) * force * force / solver.mass_of[t]
     for k in range(span[0], span[1]):
-        t, speed = island_of(solver, k), bias_rate * FULL_PUSH_OVERLAP * solver.extent[k]
+        t = island_of(solver, k)
         if solver.links[t] == 0:
+            speed = springs[1 if solver.tips[t] else 0][1] * FULL_PUSH_OVERLAP * solver.extent[k]
             allowed[t] += h / dt * GAIN_PUSH * solver.mass[k] * speed * speed
 
 
@@ -214,7 +215,7 @@ def carry_budget(solver, islands):
 
 
 @part
-def finish_substep(solver, bias_rate, any_struck, h, dt, span, arms):
+def finish_substep(solver, springs, any_struck, h, dt, span, arms):
     """Further passes over the struck islands of a range, then the bound on the energy of all."""
     islands, turn, count, any_gain = islands_of(solver, span), 0, int(any_struck), False
     while count > 0:
@@ -227,6 +228,6 @@ def finish_substep(solver, bias_rate, any_struck, h, dt, span, arms):
         solver.allowed[t], solver.share[t] = solver.credit[t], 1.0
         any_gain |= exceeds_budget(solver, t)
     if any_gain:
-        energy_budget(solver, bias_rate, h, dt, span, islands)
+        energy_budget(solver, springs, h, dt, span, islands)
         limit_energy(solver, span, arms, islands)
     carry_budget(solver, islands)

@@ -162,7 +162,7 @@ def number_islands(state, dt, ordered):
             solver.stiff[t] = solver.own[t] = solver.approach_extents[t] = solver.taken[t] = 0.0
             solver.size_of[t] = solver.substeps_of[t] = 0
             solver.credit[t] = 0.0
-            solver.at_once[t], solver.sway[t], solver.links[t] = False, 0.0, 0
+            solver.at_once[t], solver.tips[t], solver.sway[t], solver.links[t] = False, False, 0.0, 0
         number[q] = t
         change = sub(velocity[i], start[i])
         if warm_started[i]:
@@ -194,7 +194,7 @@ def measure_islands(state, dt):
     velocity, inverse_mass, t = bodies.start_velocity, bodies.inverse_mass, -1
     for r in range(solver.contacts):
         if solver.point[r] > 0:  # asks for nothing else
-            solver.size_of[t] += 1
+            solver.size_of[t], solver.tips[t] = solver.size_of[t] + 1, True
             continue
         c = solver.pair[r]
         a, b = pairs.a[c], pairs.b[c]
@@ -317,7 +317,8 @@ def place_rows(state):
 @part
 def build_chunks(state):
     """Divide the rows of each range and colour into chunks, and place those of a chunk point by point."""
-    solver, listed, colour, ends = state.solver, state.solver.listed, state.solver.colour, state.solver.row_ends
+    solver = state.solver
+    listed, colour, ends = solver.listed, solver.colour, solver.row_ends
     for r in range(solver.contacts):
         listed[solver.slot[r]] = r
     start = s = 0

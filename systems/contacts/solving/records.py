@@ -45,7 +45,7 @@ SOLVER = Schema(
     peak=floats(unit="N s"),  # largest impulse in this step, that it starts with counts
     hard=flags(),  # before that: its normal does not stand for several faces
     has_friction=flag(),
-    tips=flag(),  # some pair has several points
+    any_tips=flag(),  # some pair has several points
     has_rolling=flag(),
     lopsided=flag(),  # some body has such a middle
     # where bodies spin:
@@ -120,6 +120,7 @@ SOLVER = Schema(
     allowed=floats(unit="J"),
     share=floats(unit="1"),  # before that how many times better the rows of a struck island are solved than others
     taken=floats(unit="J"),  # that the guard has taken in this step
+    tips=flags(),  # some pair has several points
     struck=flags(),  # some row is far from solved
     listed_of=ints("int32"),  # rows of it that further passes go over
     credit=floats(unit="J"),  # that joints have taken in this step, and may give back; inf: motors or springs give any

@@ -49,14 +49,14 @@ def rotate_body(solver, q, turn):
 @part
 def integrate_rotation(solver, begin, end, h):
     """Bodies go on turning for a time; several at once where none has turned far."""
-    any_far = False
+    turns, any_far = solver.turn, False
     for q in range(begin, end):
-        turn = add_scaled(solver.turn[q], solver.spin[q], h)
-        solver.turn[q] = turn
+        turn = add_scaled(turns[q], solver.spin[q], h)
+        turns[q] = turn
         solver.sine[q], solver.versine[q] = shares_of_small_turn(turn)
         any_far |= not dot(turn, turn) < SERIES
     for q in range(begin, end if any_far else begin):
-        rotate_body(solver, q, solver.turn[q])
+        rotate_body(solver, q, turns[q])
 
 
 @inlined
@@ -185,11 +185,12 @@ def update_targets(solver, k, room, closing, ahead, dt):
 def leave_open_rows(solver, h, span, arms):
     """What was open when the step began, and has pushed nothing in it, is left to the next one when it ends: by then
     what slides may have passed that corner."""
+    extent = solver.extent
     for k in range(span[0], span[1]):
         least = 0.0 if solver.hard[k] and solver.apart[k] else STRUCK_EXCESS
-        was_open = solver.peak[k] == 0.0 and solver.gap[k] > least * solver.extent[k]
-        if was_open and separation(solver, k, arms) > -NEGLIGIBLE * solver.extent[k]:
-            solver.target_speed[k] = UNREACHED * solver.extent[k] / h
+        was_open = solver.peak[k] == 0.0 and solver.gap[k] > least * extent[k]
+        if was_open and separation(solver, k, arms) > -NEGLIGIBLE * extent[k]:
+            solver.target_speed[k] = UNREACHED * extent[k] / h
 
 
 @inlined

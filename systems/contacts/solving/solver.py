@@ -53,6 +53,9 @@ from .rows import (
     update_targets,
 )
 
+TURN, TIPPING_TURN = 2.0 * math.pi * FREQUENCY, 2.0 * math.pi * TURNING_FREQUENCY  # rad of a spring in a substep
+SQUARE_OF_TURN = TURN * TURN, TIPPING_TURN * TIPPING_TURN
+
 
 @part
 def measure(solver, h, dt, ends, span, arms):
@@ -158,7 +161,7 @@ def solve_substep(solver, springs, times, rule, ends, span, arms):
     for_joints(solver, calls.RELAX, times, span, arms)
     solve_passes(solver, False, last if ends else passes, stiff, h, span, arms)
     for_joints(solver, calls.RELAX_AGAIN, times, span, arms)
-    finish_substep(solver, springs[0][1], any_struck, h, dt, span, arms)
+    finish_substep(solver, springs, any_struck, h, dt, span, arms)
     if capped:
         restore_mass(solver, 0.0, span, arms)
     for k in range(start, stop):
@@ -197,33 +200,28 @@ def scale_impulses(solver, by, span):
         solver.tangent[k] = scale(solver.tangent[k], by)
 
 
-@inlined
-def spring_frequency(solver):
-    """That of contacts, times the rate of the substeps."""
-    return TURNING_FREQUENCY if solver.tips else FREQUENCY
-
-
 @part
-def contact_spring(solver, stiffer, substeps, h):
-    """(share of its impulse that a soft row gives back, speed per overlap at which it is pushed out).
+def contact_spring(solver, frequency, substeps, h):
+    """(share of its impulse that a soft row gives back, speed per overlap at which it is pushed out) where springs have
+    a frequency, times the rate of the substeps.
 
     Where there are more substeps than usual springs are damped by as much more: for the heavy bodies that they bear,
     and so that overlap is pushed out at the usual rate.
     """
-    omega = 2.0 * math.pi * stiffer * spring_frequency(solver) / h
+    omega = 2.0 * math.pi * frequency / h
     damping = 2.0 * DAMPING_RATIO * substeps / solver.usual + h * omega
     return 1.0 / (1.0 + h * omega * damping), omega / damping
 
 
 @inlined
 def set_spring(solver, k, springs, h, stiff, arms):
-    """How row k pushes overlap out, see ``contact_spring``: stiffer where it has several points and one of its bodies
-    cannot be moved, at once where it is hard, not at all where it parts. It sags under the impulse of the last step."""
-    hard, parting = solver.hard[k], solver.parting[k]
+    """How row k pushes overlap out, see ``contact_spring``: softer in an island where some pair has several points, but
+    less so where one of its bodies cannot be moved, at once where it is hard, not at all where it parts. It sags under
+    the impulse of the last step."""
+    hard, parting, tips = solver.hard[k], solver.parting[k], int(solver.tips[island_of(solver, k)])
     held = solver.inverse_mass[solver.first[k]] == 0.0 or solver.inverse_mass[solver.second[k]] == 0.0
-    soft, bias_rate = springs[1] if solver.tips and held else springs[0]
-    turn = 2.0 * math.pi * spring_frequency(solver)
-    sag = 0.0 if stiff else solver.impulse[k] * h / (turn * turn * solver.mass[k])
+    soft, bias_rate = springs[2 * tips if held else tips]
+    sag = 0.0 if stiff else solver.impulse[k] * h / (SQUARE_OF_TURN[tips] * solver.mass[k])
     at_once = parting or (hard and (len(arms) == 0 or len(solver.normal[k]) == 2))  # on three points it would rock on
     solver.push_rate[k] = 1.0 / h if at_once else bias_rate
     solver.most_push[k] = 0.0 if parting else -bias_rate * (FULL_PUSH_OVERLAP * solver.extent[k] + sag)
@@ -238,7 +236,11 @@ def solve_range(solver, s, dt, span, arms):
     h = dt / substeps
     if capped:
         cap_mass_ratio(solver, solver.island[span[2]], dt, span, arms)
-    springs = contact_spring(solver, 1.0, substeps, h), contact_spring(solver, STATIC_STIFFNESS, substeps, h)
+    springs = (
+        contact_spring(solver, FREQUENCY, substeps, h),
+        contact_spring(solver, TURNING_FREQUENCY, substeps, h),
+        contact_spring(solver, STATIC_STIFFNESS * TURNING_FREQUENCY, substeps, h),
+    )
     if len(arms) > 0:
         find_chunks(solver, span)
         load_masses(solver, span)

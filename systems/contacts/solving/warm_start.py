@@ -99,7 +99,7 @@ def match_warm_start(state, dt):
             stop += 1
         while r < solver.contacts and solver.pair[r] == c:
             r += 1
-        several = solver.tips and (stop - m > 1 or r - begin > 1)
+        several = stop - m > 1 or r - begin > 1
         for one in range(begin, r):
             k = solver.slot[one]
             solver.impulse[k], solver.tangent[k] = 0.0, zero
