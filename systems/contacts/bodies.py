@@ -96,13 +96,13 @@ def gather(state, dt):
 
     Neighbours of one colour share no body that moves, so that the processor can work on several at once.
     """
-    solver, bodies = state.solver, state.bodies
-    for i in range(state.first, state.moving if len(bodies.held) > 0 else 0):
+    solver, bodies, moving = state.solver, state.bodies, state.moving
+    for i in range(state.first, moving if len(bodies.held) > 0 else 0):
         bodies.held[i] = False
     if rows_at_rest(state) == 0:
         return OK
     state.kept |= KEEPS_HOLD
-    for i in range(state.first, state.moving):
+    for i in range(state.first, moving):
         bodies.kept_hold[i], bodies.kept_held_velocity[i] = bodies.hold[i], bodies.held_velocity[i]
     order_rows(state, dt, list_rows(state))
     nothing = zero_of(state)
@@ -112,7 +112,7 @@ def gather(state, dt):
         w = bodies.inverse_mass[i]
         solver.inverse_mass[q], solver.solver_mass[q] = w, 1.0 / w if w > 0.0 else 0.0
         v, x, a = nothing, nothing, nothing
-        if i < state.moving:
+        if i < moving:
             v = bodies.start_velocity[i]
             if w == 0.0 and (dot(v, v) > 0.0 or (state.spinning and size_of_turn(bodies.spin[i]) > 0.0)):
                 solver.mover[solver.movers] = q
@@ -173,9 +173,10 @@ def put_back(state, dt):
             bodies.contact_travel[i] = size_of_turn(solver.turn[q]) * solver.reach[q]
         if held[i] and solver.inverse_mass[q] > 0.0:
             bodies.position[i] = add(bodies.previous_position[i], solver.shift[q])
-            bodies.linear_velocity[i] = solver.velocity[q]
-            gained = scale(sub(solver.velocity[q], bodies.start_velocity[i]), 1.0 / dt)
-            bodies.hold[i], bodies.held_velocity[i] = sub(gained, solver.acceleration[q]), solver.velocity[q]
+            velocity = solver.velocity[q]
+            gained = scale(sub(velocity, bodies.start_velocity[i]), 1.0 / dt)
+            bodies.linear_velocity[i] = bodies.held_velocity[i] = velocity
+            bodies.hold[i] = sub(gained, solver.acceleration[q])
             if state.spinning:
                 bodies.spin[i], bodies.turn[i] = solver.spin[q], add(bodies.turn[i], solver.turn[q])
     if state.any_warm_started:

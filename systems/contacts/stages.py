@@ -19,9 +19,9 @@ def begin_response(state, dt):
     """Where the paths begin; the response is idle if nothing is near anything and nothing rested."""
     if state.collides and not state.contacts_ready:
         return RUN_NARROW
-    bodies, pairs, memory = state.bodies, state.pairs, state.warm_start
-    near = pairs.found if state.moved else pairs.count  # in a step, what is near at its end is among those found
-    unknown = state.sweeping and state.moved and state.neighbours_known_until < dt
+    bodies, pairs, memory, moved = state.bodies, state.pairs, state.warm_start, state.moved
+    near = pairs.found if moved else pairs.count  # in a step, what is near at its end is among those found
+    unknown = state.sweeping and moved and state.neighbours_known_until < dt
     solver = state.solver
     state.response_idle = near + solver.joints.active + memory.counts[memory.now] == 0 and not unknown
     for kind in range(KINDS_OF_FAULT):
@@ -33,7 +33,7 @@ def begin_response(state, dt):
     move_to_start(state)
     for c in range(pairs.count):
         pairs.impulse[c] = 0.0
-    if not state.moved:  # the phase is run alone: the bodies stand where they overlap
+    if not moved:  # the phase is run alone: the bodies stand where they overlap
         state.path_degree = 1
         for i in range(state.count):
             bodies.previous_position[i] = bodies.position[i]

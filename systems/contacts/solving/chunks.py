@@ -16,7 +16,7 @@ from ....framework.vectors import add, add_scaled, dot, scale, sub
 from ...integration.turning import cross_spin, end_of_turn, symmetric, twist
 from ..constants import TURNING_FREQUENCY
 from .records import ROW_CHUNK
-from .rows import pull_along_surface, update_targets
+from .rows import ARMS, NO_ARMS, pull_along_surface, update_targets
 
 SAG_OF_SHARE = 0.25 / (2.0 * math.pi * TURNING_FREQUENCY) ** 2  # kg m/s, of a contact's spring, per N s on four of them
 SEVERAL = 1.0 + 1e-9  # times the masses that two points of a pair move: they are solved at once even if they are one
@@ -147,10 +147,13 @@ def terms_at(solver, one, k, motion, bias, softly):
 
 
 @inlined
-def rub_at(solver, one, k, motion):
-    """The motion after the impulse along the surface at row k, of the pair whose first row is ``one``."""
+def rub_at(solver, one, k, motion, runs):
+    """The motion after the impulse along the surface at row k, of the pair whose first row is ``one``. runs: ARMS if
+    some surface does, else NO_ARMS; two variants, as one with a branch would not solve several pairs together."""
     n, arm_a, arm_b, tangent = solver.normal[k], solver.arm_a[k], solver.arm_b[k], solver.tangent[k]
     slip = parting_at(motion, arm_a, arm_b)
+    if len(runs) > 0:
+        slip = add(slip, solver.surface_slip[k])
     pull = pull_along_surface(tangent, slip, n, solver.tangent_mass[k], solver.friction[k] * solver.impulse[k])
     solver.tangent[k] = pull
     return pushed(solver, one, motion, arm_a, arm_b, sub(pull, tangent))
@@ -183,22 +186,22 @@ def solve_two(solver, one, k, m, motion, bias, softly):
 
 
 @inlined
-def solve_one(solver, one, motion, bias, softly):
+def solve_one(solver, one, motion, bias, softly, runs):
     """The only point of a pair, along its normal, then along its surface."""
     n, arm_a, arm_b, old = solver.normal[one], solver.arm_a[one], solver.arm_b[one], solver.impulse[one]
     excess = solver.mass[one] * (-dot(parting_at(motion, arm_a, arm_b), n) - bias[one])
     excess -= softly * softness(solver, one) * (excess + old)
     new = old + excess if old + excess > 0.0 else 0.0
     solver.impulse[one] = new
-    return rub_at(solver, one, one, pushed(solver, one, motion, arm_a, arm_b, scale(n, new - old)))
+    return rub_at(solver, one, one, pushed(solver, one, motion, arm_a, arm_b, scale(n, new - old)), runs)
 
 
 @inlined
-def rub_rows(solver, chunk, start, first, pairs):
+def rub_rows(solver, chunk, start, first, pairs, runs):
     """The rows of one point of some pairs along their surfaces."""
     for q in range(pairs):
         k = first + q
-        store_motion(chunk, q, rub_at(solver, start + q, k, chunk_motion(chunk, q)))
+        store_motion(chunk, q, rub_at(solver, start + q, k, chunk_motion(chunk, q), runs))
 
 
 @inlined
@@ -231,13 +234,14 @@ def spread_load(solver, p, stride):
 
 
 @part
-def solve_rows(solver, chunk, bias, softly, start, pairs, layout):
+def solve_rows(solver, chunk, bias, softly, start, pairs, layout, runs):
     """The rows of some pairs of a chunk, without a branch for single ones; of four points those across first, as on
-    two of them what lies flat is in balance. layout: (points of each pair, rows from one of these to the next)."""
+    two of them what lies flat is in balance. layout: (points of each pair, rows from one of these to the next);
+    runs: see ``rub_at``."""
     points, stride = layout
     if points == 1:
         for q in range(pairs):
-            store_motion(chunk, q, solve_one(solver, start + q, chunk_motion(chunk, q), bias, softly))
+            store_motion(chunk, q, solve_one(solver, start + q, chunk_motion(chunk, q), bias, softly, runs))
         return
     for e in range(points // 2):
         first, second = start + e * stride, start + (e + points // 2) * stride
@@ -252,7 +256,7 @@ def solve_rows(solver, chunk, bias, softly, start, pairs, layout):
     for q in range(pairs if points == 4 else 0):
         spread_load(solver, start + q, stride)
     for e in range(points):
-        rub_rows(solver, chunk, start, start + e * stride, pairs)
+        rub_rows(solver, chunk, start, start + e * stride, pairs, runs)
 
 
 @part
@@ -296,7 +300,10 @@ def solve_chunks(solver, bias, pushes, span):
         points = solver.points[c]
         pairs = (solver.ends[c] - start) // points
         gather_motion(solver, chunk, start, pairs)
-        solve_rows(solver, chunk, bias, softly, start, pairs, (points, pairs))
+        if solver.surfaces_run:
+            solve_rows(solver, chunk, bias, softly, start, pairs, (points, pairs), ARMS)
+        else:
+            solve_rows(solver, chunk, bias, softly, start, pairs, (points, pairs), NO_ARMS)
         scatter_motion(solver, chunk, start, pairs)
         start, c = solver.ends[c], c + 1
 
@@ -310,5 +317,8 @@ def relax_pair(solver, k, start, c):
     pairs = (solver.ends[c] - start) // points
     one = start + (k - start) % pairs
     gather_motion(solver, chunk, one, 1)
-    solve_rows(solver, chunk, solver.target_speed, 0.0, one, 1, (points, pairs))
+    if solver.surfaces_run:
+        solve_rows(solver, chunk, solver.target_speed, 0.0, one, 1, (points, pairs), ARMS)
+    else:
+        solve_rows(solver, chunk, solver.target_speed, 0.0, one, 1, (points, pairs), NO_ARMS)
     scatter_motion(solver, chunk, one, 1)

@@ -164,7 +164,7 @@ def relax_unsolved(solver, head, dt, span, arms):
             if more and passes * solver.listed_of[t] < solver.size_of[t] and is_unsolved(solver, k, t, dt, arms):
                 any_relaxed = True
                 solver.visits += 1
-                if len(arms) > 0 and not solver.surfaces_run:
+                if len(arms) > 0:
                     while solver.ends[c] <= k:
                         start, c = solver.ends[c], c + 1
                     relax_pair(solver, k, start, c)

@@ -13,11 +13,11 @@ def solve_pass(solver, bias, pushes, over, span, arms):
     """One pass over the rows of a range, normals and friction. over: see FRICTION_OVERRELAXATION."""
     if len(arms) > 0 and solver.has_rolling:
         solve_rolling(solver, span)
-    if len(arms) > 0 and not solver.surfaces_run:
+    if len(arms) > 0:
         solve_chunks(solver, bias, pushes, span)
     else:
         solve_normals(solver, bias, pushes, span, arms)
-        if len(arms) == 0 and solver.has_friction:
+        if solver.has_friction:
             solve_friction(solver, over, span, arms)
     solver.visits += span[1] - span[0]
 

@@ -223,15 +223,12 @@ def solve_normal_of(solver, k, bias, pushes, arms):
 
 @part
 def solve_normals(solver, bias, pushes, span, arms):
-    """One pass over the rows of a range, along their normals; where bodies spin each along its surface after that.
+    """One pass over the rows of a range, along their normals, where nothing spins.
 
     bias: speed at which each row may close, below 0 at which it is to open; softly where this pass ``pushes``.
     """
-    runs = solver.surfaces_run
     for k in range(span[0], span[1]):
         solve_normal_of(solver, k, bias, pushes, arms)
-        if len(arms) > 0 and solver.friction[k] != 0.0:
-            solve_friction_of(solver, k, 1.0, arms, runs)
 
 
 @inlined
