@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
 
@@ -404,6 +404,24 @@ class _OtherWord:
 
     def __set__(self, component: Component, value: Any) -> None:
         getattr(component, self._word)
+
+
+def listed(taker: str, given: Any) -> tuple[Any, ...]:
+    """What is given to one that takes several types; TypeError for a single one, and for what is no list."""
+    if isinstance(given, type) or not isinstance(given, Iterable):
+        name = getattr(given, "__name__", None)
+        meant = f"{name} (did you mean [{name}]?)" if name else repr(given)
+        raise TypeError(f"{taker} takes a list of types, got {meant}")
+    return tuple(given)
+
+
+def checked_types(taker: str, given: Iterable[Any]) -> tuple[type[Component], ...]:
+    """What is given to one that takes component types; TypeError for anything else."""
+    types = listed(taker, given)
+    for component in types:
+        if not (isinstance(component, type) and issubclass(component, Component)):
+            raise TypeError(f"{taker} takes component types, got {component!r}")
+    return types
 
 
 def _unpickled(component: type[Component], values: dict[str, Any]) -> Component:

@@ -11,7 +11,10 @@ from typing import Any
 from ..names import did_you_mean
 
 GROUPS = (tuple, set, frozenset)  # of names that stand for one mask
-HOW = "World(layers=Layers) with class Layers(enum.IntFlag) gives names to layers, and this world has none"
+HOW = (
+    "World(layers=Layers), or World.load(..., layers=Layers), with class Layers(enum.IntFlag) gives names to layers, "
+    "and this world has none"
+)
 
 
 class Unresolved(tuple[Any, ...]):
@@ -68,6 +71,11 @@ class LayerNames:
                 raise ValueError(f"layers: {members.__name__} has two members named {name}, in upper and lower case")
             self._bits[name.casefold()] = member.value
         self._single = {value: name for name, value in self._bits.items() if value & (value - 1) == 0}
+
+    @property
+    def single(self) -> dict[str, int]:
+        """The names of one bit each, and their bits."""
+        return {name: bit for bit, name in self._single.items()}
 
     def bits(self, name: str, what: str) -> int:
         """Those of one name; ValueError, which begins with ``what``, if there is none like it."""

@@ -443,10 +443,12 @@ def checked_support(support: Any) -> Any:
     return finite_support
 
 
-def instead_of(thing: Any) -> str:
-    """What may be meant by what is no plugin; goes behind it in a message."""
+def must_be_plugin(rule: str, thing: Any) -> None:
+    """TypeError if it is none, with what may be meant."""
+    if isinstance(thing, Plugin):
+        return
     if isinstance(thing, Settings):
-        return "; settings go by name: World(..., settings=...)"
+        raise TypeError(f"{rule}, got {thing!r}; settings go by name: World(..., settings=...)")
     names: list[str] = []
     if isinstance(thing, type) and issubclass(thing, Plugin):
         names = [f"{thing.__name__}()"]
@@ -456,7 +458,8 @@ def instead_of(thing: Any) -> str:
         names = [f"{kind.__name__}()" for kind in classes if issubclass(kind, Plugin)]
         names = names or [key for key, value in own.items() if isinstance(value, Plugin)]
         names = [f"{name.rpartition('.')[2]}.{one}" for one in names]
-    return f" (did you mean {' or '.join(names)}?)" if names else ""
+    meant = f" (did you mean {' or '.join(names)}?)" if names else ""
+    raise TypeError(f"{rule}, got {thing!r}{meant}")
 
 
-__all__ = ["Convex", "Plugin", "instead_of"]
+__all__ = ["Convex", "Plugin", "must_be_plugin"]

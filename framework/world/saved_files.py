@@ -23,6 +23,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..data.component import Component
+from ..data.layers import LayerNames
 from ..data.saved.population import LooseValues, Population, is_ours
 from ..data.saved.table import SavedTable
 from ..errors import CaromError
@@ -40,7 +41,15 @@ DAMAGE = (ArithmeticError, AttributeError, LookupError, MemoryError, TypeError, 
 # -- writing -----------------------------------------------------------------------------------------------------------
 
 
-def write(path: str | os.PathLike[str], snapshot: Snapshot, settings: Settings, leave_out: Collection[type]) -> None:
+def must_be_path(verb: str, path: Any) -> None:
+    if not isinstance(path, (str, os.PathLike)):
+        raise TypeError(f"{verb} takes the path of a file, got {path!r}")
+
+
+def write(
+    path: str | os.PathLike[str], snapshot: Snapshot, settings: Settings, layers: LayerNames | None,
+    leave_out: Collection[type],
+) -> None:  # fmt: skip
     """A file at that path, whole or not at all; CaromError if a component or a plugin keeps what no file can hold."""
     population = _without(snapshot.population, leave_out)
     types = list(dict.fromkeys((*snapshot.table.types, *population.types)))
@@ -49,6 +58,7 @@ def write(path: str | os.PathLike[str], snapshot: Snapshot, settings: Settings, 
     contents = {
         "format": FORMAT,
         "settings": dataclasses.asdict(settings),
+        "layers": {} if layers is None else layers.single,
         "components": [_described(component) for component in types],
         **{name: getattr(snapshot, name) for name in PARTS},
         "population": _population(population, number),
@@ -69,7 +79,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
 
     A link stays, and what it leads to is replaced. CaromError for what is no ordinary file.
     """
-    path = Path(os.path.realpath(path))
+    given, path = os.fspath(path), Path(os.path.realpath(path))
     if path.exists() and not path.is_file():
         raise CaromError(f"{path} is no file that can be replaced")
     for left in path.parent.glob(f"{PART}*"):  # by a process that was killed
@@ -83,8 +93,11 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         if path.exists():
             part.chmod(path.stat().st_mode)
         part.replace(path)
-    except BaseException:
-        part.unlink(missing_ok=True)
+    except BaseException as error:
+        with contextlib.suppress(OSError):
+            part.unlink()
+        if isinstance(error, OSError) and str(error.filename) == str(part):
+            error.filename = given
         raise
 
 
@@ -233,6 +246,18 @@ class SavedFile:
                     f"{dimensions}"
                 )
 
+    def check_layers(self, given: LayerNames | None) -> None:
+        """CaromError if the world gave names to layers, and none are given now, or one with other bits."""
+        saved = self.whole(lambda: dict(self._contents.get("layers", {})))
+        if saved and given is None:
+            raise CaromError(
+                f"{self.path} needs the names of its layers, {', '.join(saved)}: World.load(path, ..., layers=Layers)"
+            )
+        here = {} if given is None else given.single
+        for name, bit in saved.items():
+            if here.get(name, bit) != bit:
+                raise CaromError(f"{self.path}: layer {name!r} was {bit} when it was saved, and is {here[name]} now")
+
     def snapshot(self, known: Iterable[type[Component]]) -> Snapshot:
         """What it holds; known: the component classes there are."""
         types = self.whole(lambda: self._component_types(known))
@@ -244,14 +269,17 @@ class SavedFile:
         for component in known:
             if by_name.setdefault(component.__name__, component) is not component:
                 raise CaromError(f"two component classes are named {component.__name__}: {self.path} cannot tell them")
+        needed = {described["name"]: described["module"] for described in self._contents["components"]}
+        missing = [name for name in needed if name not in by_name]
+        if missing:
+            classes = ", ".join(f"{name} of {needed[name]}" for name in missing)
+            raise CaromError(
+                f"{self.path} needs the component class{'es' * bool(missing[1:])} {classes}: "
+                f"World.load(path, ..., components=[{', '.join(missing)}])"
+            )
         found = []
         for described in self._contents["components"]:
             name = described["name"]
-            if name not in by_name:
-                raise CaromError(
-                    f"{self.path} needs the component class {name} of {described['module']}: "
-                    f"World.load(path, ..., components=[{name}])"
-                )
             own = {field: rest for field, *rest in _described(by_name[name])["fields"]}
             saved = {field: rest for field, *rest in described["fields"]}
             other = sorted(field for field in {*own, *saved} if own.get(field) != saved.get(field))

@@ -7,9 +7,10 @@ import os
 from collections.abc import Collection, Iterable
 from typing import Any, NoReturn, Self
 
-from ..data.component import Component
+from ..data.component import Component, checked_types, listed
+from ..data.layers import LayerNames
 from ..errors import CaromError
-from ..plugins.plugin import Plugin
+from ..plugins.plugin import Plugin, must_be_plugin
 from . import saved_files, snapshots
 from .snapshots import Snapshot
 
@@ -50,8 +51,9 @@ class StateVerbs:
 
         Systems and handlers are not in it.
         """
-        snapshot = self.snapshot()
-        saved_files.write(path, snapshot, self.settings, tuple(leave_out))
+        saved_files.must_be_path("world.save", path)
+        leave_out = listed("world.save: leave_out", leave_out)
+        saved_files.write(path, self.snapshot(), self.settings, self._layer_names, leave_out)
 
     @classmethod
     def load(
@@ -69,13 +71,19 @@ class StateVerbs:
         components
             your own component classes that it had, but for those of the plugins
         name, layers
-            as for a new world; a file holds bits of layers, and no names
+            as for a new world; layers are needed if the saved world had some, with the same bits
 
         Add your systems afterwards. CaromError, and no world is made, if the file is damaged, of a newer carom or no
-        saved world, or if it needs a plugin, a component class or dimensions that are not given.
+        saved world, or if it needs a plugin, a component class, layers or dimensions that are not given.
         """
+        saved_files.must_be_path("World.load", path)
+        for plugin in plugins:
+            must_be_plugin("World.load takes plugins", plugin)
+        components = checked_types("World.load: components", components)
+        names = None if layers is None else LayerNames(layers)
         file = saved_files.SavedFile(path)
         file.check_plugins(plugins)
+        file.check_layers(names)
         world: Any = cls(*plugins, settings=file.settings(), name=name, layers=layers)  # type: ignore[call-arg]
         try:
             physics = world._services

@@ -14,12 +14,12 @@ import esper
 
 from ..data import esper_bridge
 from ..data.bodies import Bodies, counts_by_kind
-from ..data.component import Component
+from ..data.component import Component, checked_types
 from ..data.layers import LayerNames
 from ..errors import CaromError, NoPhysicsError, PluginError
 from ..jit.records.record import Record
 from ..jit.records.schema import Schema
-from ..plugins.plugin import Plugin, instead_of
+from ..plugins.plugin import Plugin, must_be_plugin
 from ..plugins.registry import Registry
 from ..schedule.clock import Clock
 from ..schedule.phases import ForceSystem, Phase, System
@@ -78,8 +78,7 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
         if settings is not None and not isinstance(settings, Settings):
             raise TypeError(f"settings must be Settings, got {settings!r}")
         for plugin in plugins:
-            if not isinstance(plugin, Plugin):
-                raise TypeError(f"World takes plugins, got {plugin!r}{instead_of(plugin)}")
+            must_be_plugin("World takes plugins", plugin)
         names = [plugin.name for plugin in plugins]
         for twice in (n for n in names if names.count(n) > 1):
             raise PluginError(f"a world takes one plugin named {twice!r}, got {names.count(twice)}")
@@ -181,8 +180,7 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
         """
         self._open()
         self._pipeline.must_be_between_steps("a plugin can be added")
-        if not isinstance(plugin, Plugin):
-            raise TypeError(f"add_plugin takes a plugin, got {plugin!r}{instead_of(plugin)}")
+        must_be_plugin("add_plugin takes a plugin", plugin)
         if any(plugin.name == other.name for other in self.plugins):
             raise PluginError(f"a plugin named {plugin.name!r} is in this world already")
         self.registry.add(plugin)
@@ -410,10 +408,7 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
         A component is registered by itself when the first body has it. TypeError for what is no Component.
         """
         self._pipeline.must_be_between_steps("components can be registered")
-        for component in component_types:
-            if not (isinstance(component, type) and issubclass(component, Component)):
-                raise TypeError(f"register takes component types, got {component!r}")
-        self._synchronized().adoption.register(component_types)
+        self._synchronized().adoption.register(checked_types("register", component_types))
 
     def record(self, schema: Schema) -> Record:
         """The record of this world for that ``schema``, as stages of plugins get it: numbers, and arrays (n, ...)."""

@@ -18,7 +18,7 @@ from ...components import AABBCollider, Collider, SphereCollider
 from ...framework.data.adoption import Adoption
 from ...framework.data.bodies import Bodies, SelectedBodies
 from ...framework.data.column_copies import copy_blocks
-from ...framework.data.component import Component
+from ...framework.data.component import checked_types
 from ...framework.data.row_moves import move_rows
 from ...framework.data.table import Table
 from ...framework.jit.background import link_in_background
@@ -137,9 +137,7 @@ def keep_ready(scene: Scene, adoption: Adoption, components: tuple[type[Any], ..
 
     The world keeps to the functions of all these shapes from now on, whether bodies of each exist or not.
     """
-    for component in components:
-        if not (isinstance(component, type) and issubclass(component, Component)):
-            raise TypeError(f"prepare takes component types, got {component!r}")
+    components = checked_types("prepare", components)
     table = scene.table
     wanted = {c for c in components if issubclass(c, Collider)}
     wanted.update(c for c in table.stacked_types(Collider.stack) if table.has_mask(c)[: table.count].any())

@@ -128,6 +128,10 @@ REFUSED = {
     "older plugin": (None, {"plugins": [*GOOD, OldSprings()]}, r"plugin 'springs' 1\.0, this one is 0\.9"),
     "dimension": (None, {"plugins": [Physics(3), *GOOD[1:], Springs()]}, "2 dimensions, and plugin 'physics' is for 3"),
     "missing component": (None, {"components": []}, r"class Bullet of data.helpers_snapshots: .*components=\[Bullet\]"),
+    "missing components": (
+        lambda path: with_entry(path, lambda c: [c["components"][i].update(name=f"Own{i}") for i in (0, 1)]), {},
+        r"component classes Own0 of \S+, Own1 of \S+: .*components=\[Own0, Own1\]",
+    ),
     "other fields": (None, {"components": [OTHER_BULLET]}, "Bullet had other fields .*: expires, power"),
     "two of a name": (None, {"components": [Bullet, OTHER_BULLET]}, "two component classes are named Bullet"),
 }
@@ -148,6 +152,27 @@ def test_what_cannot_be_loaded_is_refused_in_one_line_and_leaves_nothing_behind(
     assert set(esper.list_worlds()) <= set(worlds)
     small(path).close()
     assert len(World.load(path, *GOOD, springs, components=[Bullet]).bodies) == 2  # plugins are as free as before
+
+
+MISTAKEN = {  # in a world of its own, which nothing is wrong with
+    "a component": (lambda: World.load("none", Physics(), components=[Bullet()]), r"components takes .*, got Bullet\("),
+    "one class": (lambda: World.load("none", Physics(), components=Bullet), r"got Bullet \(did you mean \[Bullet\]\?"),
+    "a text": (lambda: World.load("none", Physics(), components="x"), "components takes component types, got 'x'"),
+    "plugin class": (lambda: World.load("none", Physics), r"load takes plugins, got .*\(did you mean Physics\(\)"),
+    "layers": (lambda: World.load("none", Physics(), layers={"a": 1}), "layers must be an enum.IntFlag class"),
+    "from no path": (lambda: World.load(3, Physics()), "World.load takes the path of a file, got 3"),
+    "to no path": (lambda: make_world().save(None), "world.save takes the path of a file, got None"),
+    "left class": (lambda: make_world().save("none", leave_out=Tag), r"leave_out .*\(did you mean \[Tag\]"),
+}
+
+
+@pytest.mark.parametrize("case", MISTAKEN)
+def test_wrong_arguments_are_told_before_a_file_is_opened(case, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    act, message = MISTAKEN[case]
+    with pytest.raises(TypeError, match=message):
+        act()
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow
@@ -307,6 +332,14 @@ def test_the_longest_name_can_be_saved(tmp_path):
     path = tmp_path / ("x" * 255)
     make_world(2).save(path)
     World.load(path, Physics(2)).close()
+
+
+def test_a_folder_that_is_missing_is_told_by_the_file_that_was_given(tmp_path):
+    (tmp_path / "file").write_bytes(b"")
+    for path in (tmp_path / "none" / "w", tmp_path / "file" / "w"):
+        with pytest.raises((FileNotFoundError, NotADirectoryError)) as told:
+            make_world(2).save(path)
+        assert told.value.filename == str(path)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")

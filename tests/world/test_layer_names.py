@@ -9,7 +9,7 @@ import esper
 import numpy as np
 import pytest
 
-from carom import Physics, Prefab, RigidBody, SphereCollider, Transform, World
+from carom import CaromError, Physics, Prefab, RigidBody, SphereCollider, Transform, World
 
 
 class Layers(enum.IntFlag):
@@ -48,6 +48,31 @@ def test_every_way_of_creating_takes_names_and_stores_their_bits(tmp_path):
     loaded = World.load(tmp_path / "saved", Physics(2), layers=Layers)
     assert repr(collider_of(loaded, made[0])) == repr(given)
     assert loaded.state_hash() == world.state_hash()
+
+
+class MoreLayers(enum.IntFlag):
+    PLAYER, WALLS, GHOST, WATER = 1, 2, 4, 8
+    SOLID = PLAYER | WALLS | WATER
+
+
+class OtherLayers(enum.IntFlag):
+    PLAYER, WALLS, GHOST = 1, 4, 2
+
+
+@pytest.mark.plain
+def test_what_a_file_needs_of_layers_is_told_when_it_is_loaded(tmp_path):
+    world, path, worlds = named_world(), tmp_path / "saved", esper.list_worlds()
+    entity = entity_of(world, layer="walls")
+    world.save(path)
+    with pytest.raises(CaromError, match=r"names of its layers, player, walls, ghost: .*layers=Layers"):
+        World.load(path, Physics(2))
+    with pytest.raises(CaromError, match="layer 'walls' was 2 when it was saved, and is 4 now"):
+        World.load(path, Physics(2), layers=OtherLayers)
+    assert set(esper.list_worlds()) <= {world.name, *worlds}
+    assert World.load(path, Physics(2), layers=MoreLayers).query_point((0, 0), mask="solid") == [entity]
+    World(Physics(2)).save(path)
+    World.load(path, Physics(2)).close()
+    World.load(path, Physics(2), layers=Layers).close()
 
 
 @pytest.mark.plain
