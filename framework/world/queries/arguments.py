@@ -15,6 +15,7 @@ import numpy as np
 from ...data.columns import or_no_rows
 
 NONE_EXCLUDED = np.empty((1, 0), np.int64)
+BY_NAME = {"query_nearest: mask": "max_distance", "query_nearests: masks": "max_distances"}  # what floats there mean
 
 
 class Wanted(NamedTuple):
@@ -101,8 +102,13 @@ def mask(value: Any, name: str) -> int:
     except TypeError:
         bits = 1 << 63
     if not -(1 << 63) <= bits < 1 << 63:
-        raise ValueError(f"{name} must be an integer of 64 bits, one for each layer, got {value!r}")
+        raise _no_bits(name, value, "", isinstance(value, float))
     return bits
+
+
+def _no_bits(name: str, value: Any, several: str, is_float: bool) -> ValueError:
+    meant = f" (did you mean {BY_NAME[name]}={value!r}?)" if is_float and name in BY_NAME else ""
+    return ValueError(f"{name} must be an integer of 64 bits, one for each layer{several}, got {value!r}{meant}")
 
 
 def masks(value: Any, name: str, count: int) -> int | np.ndarray:
@@ -111,7 +117,7 @@ def masks(value: Any, name: str, count: int) -> int | np.ndarray:
         return mask(value, name)
     made = np.asarray(value)
     if made.shape != (count,) or (count and (made.dtype.kind not in "iu" or made.max() >= 1 << 63)):
-        raise ValueError(f"{name} must be an integer of 64 bits, one for each layer, or {count} of them, got {value!r}")
+        raise _no_bits(name, value, f", or {count} of them", made.dtype.kind == "f")
     return made.astype(np.int64)
 
 
