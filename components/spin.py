@@ -60,7 +60,7 @@ class Spin(Component):
         rad/s, or None
     rolling_friction
         m, 0 or more: contacts resist rolling, and spinning about their normal, with a torque of up to this length times
-        the force between the two; the larger of both bodies counts
+        the force between the two; the larger of both bodies counts, so that of static ground, too
     constant_torque
         N m, acts always; in 3D (3,), along the world's axes
 

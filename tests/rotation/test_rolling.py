@@ -72,6 +72,32 @@ def test_rolling_friction_stops_a_ball_and_holds_it_on_a_slope(d):
             assert v[0] < 1e-3 if slope < b / r else v[0] > 4e-3  # m/s: of the first steps
 
 
+@pytest.mark.parametrize("by", ["component", "held column"])
+@pytest.mark.parametrize("d", [2, 3])
+def test_ground_with_rolling_friction_stops_what_rolls_on_it(d, by):
+    """Static ground of length b, a ball of a smaller one: it stops after v^2 / 2 a, a = (b / r) g / (1 + I / m r^2).
+    Then b is three times as long, and later 0: the ball's own is left."""
+    r, b, own, v0 = 0.5, 0.03, 0.01, 1.0
+    with turning_world(d, (0, -G, 0)[:d]) as world:
+        shape = BoxCollider((50, 1, 50)[:d], friction=1.0)
+        spin = Spin(rolling_friction=b)
+        ground = world.create_entity(Transform((0, -1, 0)[:d]), RigidBody(kind="static"), spin, shape)
+        entity = ball(world, (0, r, 0)[:d], (v0, 0, 0)[:d], -v0 / r, mass=2.0)
+        part(world, entity, Spin).rolling_friction = own
+        column = world.bodies.spin.rolling_friction
+        for length in (b, 3 * b, 0.0):
+            if by == "component":
+                part(world, ground, Spin).rolling_friction = length
+            else:
+                column[world.bodies.row_of(ground)] = length
+            start, seconds = part(world, entity, Transform).x, v0 * r * (1 + SHARE[d]) / (max(length, own) * G)
+            part(world, entity, RigidBody).linear_velocity = (v0, 0, 0)[:d]
+            part(world, entity, Spin).angular_velocity = -v0 / r if d == 2 else (0, 0, -v0 / r)
+            run(world, math.ceil(60 * seconds) + 30)
+            assert part(world, entity, Transform).x - start == pytest.approx(v0 * seconds / 2, rel=0.02)
+            assert np.abs(motion(world, entity)[0]).max() < 1e-6
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
