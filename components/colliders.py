@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, ClassVar, Self, TypedDict, Unpack
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..framework.data.columns import REQUIRED, Column, special_column
 from ..framework.data.component import Component
 from ..framework.outlines import box_outline
-from ..framework.typing import LayerField, Layers, Vector, VectorField
+from ..framework.typing import Entities, LayerField, Layers, Masks, Numbers, Vector, VectorField, Vectors
 from ..framework.vectors import item, replace, scale
 
 ALL_LAYERS = -1  # every bit set
@@ -33,6 +35,20 @@ class MaterialFields(TypedDict, total=False):
     group: int
     one_way: Vector | float
     surface_velocity: Vector | float
+
+
+class MaterialRows(TypedDict, total=False):
+    """The same fields of many colliders: one value for all, or one of each."""
+
+    restitution: Numbers
+    friction: Numbers | Sequence[float | None] | None
+    sensor: bool | Sequence[bool] | NDArray[Any]
+    enabled: bool | Sequence[bool] | NDArray[Any]
+    layer: Masks
+    mask: Masks
+    group: int | Entities
+    one_way: Vectors | Vector | float
+    surface_velocity: Vectors | Vector | float
 
 
 class ColliderFields(MaterialFields, total=False):

@@ -7,9 +7,9 @@ from typing import Any, Unpack
 import numpy as np
 
 from ...components import Transform
-from ...components.colliders import LONGEST, MaterialFields
+from ...components.colliders import LONGEST, MaterialRows
 from ...framework import Column, World
-from ...framework.typing import Vector
+from ...framework.typing import Numbers, Vector
 from .segment import ChainSegmentCollider
 
 POSITION = Column(item="vector", owner="create_chain", name="position")
@@ -20,9 +20,9 @@ def create_chain(
     points: Any,
     *,
     loop: bool = False,
-    thickness: float = 0.0,
+    thickness: Numbers = 0.0,
     position: Vector = (0.0, 0.0),
-    **material: Unpack[MaterialFields],
+    **material: Unpack[MaterialRows],
 ) -> range:
     """Create the segments of a polyline, solid on its right; the ids of their entities, which are consecutive.
     ValueError if it is none, or the world is not 2D.
@@ -35,7 +35,8 @@ def create_chain(
     thickness
         m, how far behind the line the centres of bodies may be that are still pushed out to the front
     material
-        friction, restitution, sensor, layer, mask and group, of all segments
+        friction, restitution, sensor, layer, mask, group and the like: one value for all segments, or a list with one
+        for each, in order; of vectors (n, 2). ``thickness`` too
     """
     if world.dimensions != 2:
         raise ValueError(f"create_chain: a chain is for 2D worlds, this world is {world.dimensions}D")

@@ -7,9 +7,9 @@ from typing import Any, Unpack
 import numpy as np
 
 from ...components import Transform
-from ...components.colliders import LONGEST, MaterialFields
+from ...components.colliders import LONGEST, MaterialRows
 from ...framework import Column, World
-from ...framework.typing import Vector
+from ...framework.typing import Numbers, Vector
 from .chain import bound, points_of
 from .triangle import TerrainTriangleCollider
 
@@ -22,9 +22,9 @@ def create_triangle_mesh(
     vertices: Any,
     triangles: Any,
     *,
-    thickness: float = 0.0,
+    thickness: Numbers = 0.0,
     position: Vector = (0.0, 0.0, 0.0),
-    **material: Unpack[MaterialFields],
+    **material: Unpack[MaterialRows],
 ) -> range:
     """Create the triangles of a mesh; the ids of their entities, which are consecutive. ValueError if they are none, or
     the world is not 3D.
@@ -36,7 +36,8 @@ def create_triangle_mesh(
     thickness
         m, how far behind a triangle the centres of bodies may be that are still pushed out to its front
     material
-        friction, restitution, sensor, layer, mask and group, of all triangles
+        friction, restitution, sensor, layer, mask, group and the like: one value for all triangles, or a list with one
+        for each, in order; of vectors (k, 3). ``thickness`` too
     """
     if world.dimensions != 3:
         raise ValueError(f"create_triangle_mesh: a mesh is for 3D worlds, this world is {world.dimensions}D")
@@ -58,9 +59,9 @@ def create_height_field(
     heights: Any,
     cell: float,
     *,
-    thickness: float = 0.0,
+    thickness: Numbers = 0.0,
     position: Vector = (0.0, 0.0, 0.0),
-    **material: Unpack[MaterialFields],
+    **material: Unpack[MaterialRows],
 ) -> range:
     """Create ground whose height, y, is given on a grid, two triangles for each cell; ``thickness``, ``position``,
     ``material``, ids and ValueError as of :func:`create_triangle_mesh`.

@@ -49,6 +49,23 @@ def angle(world, entity):
 
 
 @each_mode
+def test_each_segment_has_the_friction_that_the_list_says(mode):
+    """Crates, with None, slide v^2 / 2 mu g on each; what lies on the layer that they do not meet falls."""
+    frictions = [0.1, 0.3, None, 0.5]
+    world = make_world(collision=mode, substeps=8)
+    ground = create_chain(
+        world, [(-60, 0), (-20, 0), (20, 0), (60, 0), (100, 0)], friction=frictions, layer=[1, 1, 1, 2], thickness=0.1
+    )
+    assert [world.component_for_entity(e, ChainSegmentCollider).friction for e in ground] == frictions
+    crates = [throw(world, (x, 0.3), (4.0, 0.0), "crate", friction=None, mask=1) for x in (-50, -10, 30, 70)]
+    for _ in range(300):
+        world.step()
+    moved = [position(world, crate)[0] - x for crate, x in zip(crates, (-50, -10, 30, 70), strict=True)]
+    assert moved[:3] == pytest.approx([8 / (0.1 * G), 8 / (0.3 * G), 20.0], rel=0.02)
+    assert position(world, crates[3])[1] < -100
+
+
+@each_mode
 @pytest.mark.parametrize("tilt", [0.0, 0.5])
 def test_what_slides_over_a_hundred_joints_keeps_height_speed_and_angle(mode, tilt):
     """At 30 m/s without friction; lengths of segments are uneven. A world that is turned as a whole does the same."""
