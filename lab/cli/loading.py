@@ -114,7 +114,7 @@ class Loaded:
         except Problem:
             raise
         except (Exception, SystemExit) as error:
-            raise Problem(f"{self.name}{_line_in(self.file, error)}: {one_line(error)}") from error
+            raise Problem(f"{self.name}{_place_in(self.file, error)}: {one_line(error)}") from error
 
 
 def _kind(value: object) -> str:
@@ -229,21 +229,28 @@ def _execute(path: Path, source: bytes) -> ModuleType:
     except SyntaxError as error:
         raise Problem(f"{Path(error.filename or path).name}, line {error.lineno}: {error.msg}") from error
     except (Exception, SystemExit) as error:
-        raise Problem(f"{path.name}{_line_in(path.resolve(), error)}: {one_line(error)}") from error
+        raise Problem(f"{path.name}{_place_in(path.resolve(), error)}: {one_line(error)}") from error
     return module
 
 
-def _line_in(file: Path | None, error: BaseException) -> str:
-    """`, line 12`: the last line of the user's file in the traceback of the error or its first cause; else empty."""
+def _place_in(file: Path | None, error: BaseException) -> str:
+    """`, line 12`: the last line of the user's file, or of a module beside it, `, in enemies.py, line 3`, in the
+    traceback of the error or its first cause; else empty."""
+    if file is None:
+        return ""
     links: list[BaseException] = []
     link: BaseException | None = error
     while link is not None and link not in links:
         links.append(link)
         link = link.__cause__ or link.__context__
     for each in reversed(links):  # the first cause is the most precise
-        for frame in reversed(traceback.extract_tb(each.__traceback__)):
-            if file is not None and Path(frame.filename or ".").resolve() == file:
-                return f", line {frame.lineno}"
+        for frame, line in reversed([*traceback.walk_tb(each.__traceback__)]):
+            place = Path(frame.f_code.co_filename or ".").resolve()
+            if place == file:
+                return f", line {line}"
+            beside = file.parent / str(frame.f_globals.get("__name__")).partition(".")[0]
+            if beside.with_suffix(".py") == place or beside in place.parents:
+                return f", in {place.relative_to(file.parent)}, line {line}"
     return ""
 
 

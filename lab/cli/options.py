@@ -40,6 +40,12 @@ class Real(click.FloatRange):
         return super().convert(number, param, ctx)
 
 
+class Whole(click.IntRange):
+    """A whole number."""
+
+    name = "whole number"
+
+
 class Listed(click.ParamType):
     """Values with commas between them, as a tuple, each once."""
 
@@ -91,7 +97,7 @@ def corners(view: Any) -> Corners:
 
 POSITIVE = Real(min=0, min_open=True)
 NOT_NEGATIVE = Real(min=0)
-COUNT = click.IntRange(min=1)
+COUNT = Whole(min=1)
 
 
 def apply(settings: Settings, values: Mapping[str, Any]) -> Settings:
@@ -105,7 +111,7 @@ def apply(settings: Settings, values: Mapping[str, Any]) -> Settings:
 # -- worlds -----------------------------------------------------------------------------------------------
 
 seed_option = click.option(
-    "--seed", default=0, show_default=True, type=click.IntRange(min=0), metavar="NUMBER",
+    "--seed", default=0, show_default=True, type=Whole(min=0), metavar="NUMBER",
     help="Which variant of the scene: 0, 1, 2, ...",
 )  # fmt: skip
 traceback_option = click.option(  # seen by Commands.main

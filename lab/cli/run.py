@@ -19,7 +19,16 @@ from ..reporting.output import drawing_if_there
 from ..reporting.progress import Progress
 from ..reporting.text import NOTHING, TextTable, counted, jsonable, number, plain_console, values_text
 from .loading import Loaded, load, stdout_kept_clean
-from .options import NOT_NEGATIVE, Corners, View, json_option, traceback_option, world_options, writable_folder
+from .options import (
+    NOT_NEGATIVE,
+    Corners,
+    View,
+    Whole,
+    json_option,
+    traceback_option,
+    world_options,
+    writable_folder,
+)
 from .usage_errors import Problem, one_line
 
 DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
@@ -27,7 +36,7 @@ DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
 
 @click.command("run", short_help="Run a scene or a file and show what happened.")
 @click.argument("target", metavar="SCENE|FILE")
-@click.option("--steps", type=click.IntRange(min=0), help="How many steps to take.")
+@click.option("--steps", type=Whole(min=0), help="How many steps to take.")
 @click.option("--seconds", type=NOT_NEGATIVE, help="How long to simulate (default: what the scene recommends).")
 @world_options
 @click.option(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import helpers_cli
 import pytest
 from helpers_cli import refusal
@@ -25,6 +27,8 @@ carom, ball = helpers_cli.carom, helpers_cli.ball  # fixtures
     (["run", "jump", "--set", "substep=3"], ["no field 'substep'", "did you mean 'substeps'?"]),
     (["run", "jump", "--set", "substeps=three"], ["--set: Settings.substeps must be a whole number", "'three'"]),
     (["run", "jump", "--set", "dt=1/0"], ["--set: Settings.dt must be a finite number above 0", "'1/0'"]),
+    (["run", "jump", "--steps", "abc"], ["'--steps': 'abc' is not a valid whole number"]),
+    (["run", "jump", "--seed", "1.5"], ["'--seed': '1.5' is not a valid whole number"]),
     (["run", "jump", "--set", "substeps"], ["'substeps' is not NAME=VALUE"]),
     (["run", "jump", "--set", "restitution_mixing=maxx"], ["'maxx'", "did you mean 'max'"]),
     (["run", "jump", "--set", "integrator=verlet"], ["verlet", "velocity_verlet"]),
@@ -65,6 +69,27 @@ def test_wrong_files(carom, tmp_path, text, words):
     line = refusal(carom("run", "scene.py", "--no-pictures"))
     for word in words:
         assert word in line
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("import waves\nimport numppy\n", "scene.py, line 2"),
+        ("import waves\nwaves.wave(0)\n", "scene.py, in waves.py, line 4"),
+        ("import waves\nwaves.wave('a')\n", "scene.py, in waves.py, line 4"),  # inside of numpy
+        ("from foes.big import ogre\n", "scene.py, in {}, line 2"),
+        ("def build(settings=None, seed=0):\n    import waves\n    waves.wave(0)\n", "scene.py, in waves.py, line 4"),
+    ],
+)
+def test_an_error_in_a_module_beside_the_file_names_the_line_of_that(carom, tmp_path, text, place):
+    (tmp_path / "foes").mkdir()
+    (tmp_path / "foes" / "big.py").write_text("\nogre = 1 / 0\n")
+    (tmp_path / "waves.py").write_text(
+        "import numpy as np\n\ndef wave(n):\n    return np.linspace(0, 1 / n, 3) if n == 0 else np.linspace(0, 1, n)\n"
+    )
+    (tmp_path / "scene.py").write_text(text if "build" in text else f"{text}def build(settings=None, seed=0): ...\n")
+    line = refusal(carom("run", "scene.py", "--no-pictures"))
+    assert line.startswith(f"carom: {place.format(Path('foes') / 'big.py')}: ")
 
 
 def test_a_wrong_value_inside_build_names_its_line(carom, ball):
