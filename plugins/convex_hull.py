@@ -18,7 +18,7 @@ from .corners import bounds_of, support_of
 __all__ = ["ConvexHullCollider"]
 
 NARROWEST = 1e-150  # m: squares of it are not 0, which its inertia needs
-MOST_POINTS = 64
+FEWEST_POINTS, MOST_POINTS = 4, 64
 FLAT = 1e-6  # of the size: points so near to a plane lie in it
 NARROW = 1e-5  # of the size: three points within such a strip span no plane
 FIRST = 5  # row of the first corner; before: the mass centre, three vectors whose products sum to the covariance, and
@@ -79,8 +79,8 @@ def cholesky(m: np.ndarray) -> np.ndarray:
 def _hull_of(data: bytes) -> np.ndarray | str:
     """The rows of the hull of points, given as their bytes; or what is wrong with the points."""
     points = np.frombuffer(data).reshape(-1, 3)
-    if len(points) > MOST_POINTS:
-        return f"must have at most {MOST_POINTS} points"
+    if not FEWEST_POINTS <= len(points) <= MOST_POINTS:
+        return f"must have {FEWEST_POINTS} to {MOST_POINTS} points"
     size = np.abs(points).max() or 1.0  # divided by it nothing overflows, at any size
     size *= np.abs((points - points[0]) / size).max() or 1.0
     if size < NARROWEST:
@@ -144,7 +144,7 @@ class ConvexHullCollider(Collider):
     dimensions: ClassVar[tuple[int, ...]] = (3,)
     rotates: ClassVar[bool] = True
 
-    hull: ArrayField = array_column(3, rows=(4, 2**31), check=_wrong_with, convert=_rows_of)
+    hull: ArrayField = array_column(3, check=_wrong_with, convert=_rows_of)
 
     @property
     def corners(self) -> np.ndarray:

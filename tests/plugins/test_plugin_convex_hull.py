@@ -51,11 +51,11 @@ def any_turn(seed):
 @pytest.mark.parametrize(
     ("points", "rule"),
     [
-        (TETRAHEDRON[:3], "must have 4"),
+        (TETRAHEDRON[:3], "must have 4 to 64 points"),
         (np.zeros((5, 3)), "all lie in a plane"),
         (CUBE * (1, 0, 1), "all lie in a plane"),
         (any_turn(0)[:3] * np.arange(6)[:, None], "all lie in a plane"),
-        (np.random.default_rng(0).normal(size=(65, 3)), "at most 64 points"),
+        (np.random.default_rng(0).normal(size=(65, 3)), "must have 4 to 64 points"),
         ([*TETRAHEDRON, (0, 0, math.inf)], "finite"),
         (CUBE[:, :2], r"shape \(n, 3\)"),
         ([(0, 0, 0), (1, 0), (0, 1, 0), (0, 0, 1)], "numbers"),

@@ -15,13 +15,14 @@ import numpy as np
 from ..columns import Column
 from .pool import Pool
 
+ANY = 2**31  # rows: as many as one likes
 
 @dataclass(frozen=True, eq=False)
 class ArrayColumn(Column):
     """See :func:`array_column`."""
 
     width: int = 1
-    rows: tuple[int, int] = (1, 2**31)
+    rows: tuple[int, int] = (1, ANY)
     check: Callable[[np.ndarray], str | None] | None = None
     convert: Callable[[np.ndarray], np.ndarray] | None = None
     pool: Pool = field(default_factory=lambda: Pool(1))
@@ -34,7 +35,8 @@ class ArrayColumn(Column):
             raise self._error(value, f"must be an array of shape (n, {self.width})", entity)
         least, most = self.rows
         if not least <= len(array) <= most:
-            raise self._error(value, f"must have {least} to {most} rows", entity)
+            number = f"{least} to {most}" if most < ANY else f"{least} or more"
+            raise self._error(value, f"must have {number} rows", entity)
         self.check_numbers(array, array.tolist(), entity)
         wrong = None if self.check is None else self.check(array)
         if wrong is not None:
@@ -104,7 +106,7 @@ def hold_arrays(holder: Any, columns: Iterable[Column]) -> None:
 
 
 def array_column(
-    width: int, *, rows: tuple[int, int] = (1, 2**31), check: Callable[[np.ndarray], str | None] | None = None,
+    width: int, *, rows: tuple[int, int] = (1, ANY), check: Callable[[np.ndarray], str | None] | None = None,
     convert: Callable[[np.ndarray], np.ndarray] | None = None, leading: Callable[[np.ndarray], int] = len,
     kw_only: bool = False,
 ) -> Any:  # fmt: skip
