@@ -11,9 +11,14 @@ from world import helpers_world
 from world.helpers_world import Counter, Name
 from worlds import ball, make_world
 
-from carom.components import RigidBody, Transform
+from carom.components import AABBCollider, RigidBody, Transform
 from carom.framework import CaromError, NoPhysicsError, Settings, System, World
 from carom.plugins import Physics
+from carom.plugins.character import Character, Characters
+from carom.plugins.paths import Path, Paths
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
+from carom.plugins.timers import Timer, Timers
+from carom.plugins.zones import Wind, Zones
 
 pytestmark = pytest.mark.plain
 esper_is_left_as_it_was = helpers_world.esper_is_left_as_it_was  # a fixture, around every test
@@ -140,6 +145,55 @@ def test_several_worlds_side_by_side_do_not_disturb_each_other():
         for world in worlds:
             world.step()
     assert [world.state_hash() for world in worlds] == expected
+
+
+@pytest.mark.slow
+@pytest.mark.compiled
+def test_one_rotation_zones_timers_paths_characters_serve_two_worlds_at_once():
+    """Stepped in turn, worlds that differ go the same way as each with plugins of its own; so they do after each has
+    gone back, and when what one of them has is refused the other steps on."""
+
+    def plugins():
+        return Physics(2, gravity=(0, -10)), Rotation(), Zones(), Timers(), Paths(), Characters()
+
+    def filled(world, k):
+        world.gravity = (0, -10 - k)
+        world.create_entity(Transform((0, -1)), AABBCollider((50, 1), friction=0.8))
+        for x in range(4 + k):
+            shape = BoxCollider((0.4, 0.3), friction=0.5, restitution=0.2 * k)
+            world.create_entity(Transform((1.5 * x, 2 + x), 0.3 * x), RigidBody(linear_velocity=(k, 0)), Spin(k), shape)
+        world.create_entity(Transform((2, 2)), AABBCollider((3, 2), sensor=True), Wind((4 - k, 1)))
+        lift = Transform((-4, 0.5)), RigidBody(kind="kinematic"), AABBCollider((1, 0.2), friction=1.0)
+        world.create_entity(*lift, Path([(-4, 0.5), (-4, 3 + k)], 1.0))
+        body = RigidBody(kind="kinematic"), AABBCollider((0.3, 0.5))
+        world.create_entity(Transform((-9 + 2 * k, 3)), *body, Character(move=1.0 + k))
+        world.create_entity(Timer(0.2 + 0.05 * k, repeat=True))
+        log = []
+        for name in ("timer", "landed"):
+            world.on(name, lambda *args, name=name: log.append((name, world.step_count, args[0])))
+        return log
+
+    def futures(worlds):
+        logs, hashes = [filled(world, k) for k, world in enumerate(worlds)], []
+        snapshots = [world.snapshot() for world in worlds]
+        for _ in range(2):
+            for _ in range(90):
+                for world in worlds:
+                    world.step()
+            hashes += [world.state_hash() for world in worlds]
+            for world, snapshot in zip(worlds, snapshots, strict=True):
+                world.restore(snapshot)
+        assert hashes[:2] == hashes[2:]
+        assert {name for log in logs for name, *_ in log} == {"timer", "landed"}
+        worlds[0].remove_component(worlds[0].get_component(Character)[0][0], AABBCollider)
+        for _ in range(2):
+            with pytest.raises(ValueError, match="Character takes one collider"):
+                worlds[0].step()
+            worlds[1].step()
+        return hashes, logs, worlds[1].state_hash()
+
+    shared = plugins()
+    assert futures([World(*shared), World(*shared)]) == futures([World(*plugins()), World(*plugins())])
 
 
 def test_a_system_may_step_another_world():
