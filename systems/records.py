@@ -267,7 +267,7 @@ PAIR_COLUMNS = Section(
     is_solid=flags(),  # they push each other
     hit=flags(),
     near_contact=flags(),  # the response may concern them
-    crossed=flags(),
+    crossed=flags(),  # they have met on their way, and have not pushed
     impulse=floats(unit="N s"),
     struck=floats(unit="s"),  # time of its last impact in this step, where there is an impulse
     parting=ints("uint8"),
@@ -275,7 +275,7 @@ PAIR_COLUMNS = Section(
     at=vectors(unit="m"),  # this way from the centre of a's shape to that of b's; nan: of none
     depth=floats(unit="m"),
     normal=vectors(unit="1"),
-    point=vectors(unit="m"),  # relative to the centre of a's shape
+    point=vectors(unit="m"),  # relative to the centre of a's shape; if they have crossed: in the world
     early=flags(),  # it was made where the step starts, as the two rested in the step before
     found=integer(),  # contacts of the narrow phase: hits
     hits=ints("int32"),

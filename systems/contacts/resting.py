@@ -28,6 +28,7 @@ from ..narrow_phase.manifolds import (
     has_manifold,
     is_at_manifold,
     make_manifold,
+    shape_centre,
 )  # fmt: skip
 from ..parts.rows import owner_of
 from ..shapes.dispatch import (
@@ -390,7 +391,8 @@ def contact_travel(state, i):
 
 
 def find_touching(state, dt):
-    """Pairs that touch now that all is done, or pushed each other in the step or crossed.
+    """Pairs that touch now that all is done, or pushed each other in the step or crossed. Those that have parted are
+    where they met last.
 
     Those that may are near contact, rest or had an impact, or are not solid.
     """
@@ -404,7 +406,7 @@ def find_touching(state, dt):
         solid, crossed = pairs.is_solid[c], pairs.crossed[c]
         if solid and not pairs.near_contact[c] and not crossed:
             continue
-        a, b, pushed, normal = pairs.a[c], pairs.b[c], pairs.impulse[c] > 0.0, pairs.normal[c]
+        a, b, pushed, normal, met = pairs.a[c], pairs.b[c], pairs.impulse[c] > 0.0, pairs.normal[c], pairs.point[c]
         d, extent = centre_offset(bodies, a, b), smaller_extent(bodies, a, b)
         slop = slop_for(state, extent)
         known = pushed and pairs.rests[c] and is_stationary(sub(d, pairs.at[c]), slop)
@@ -417,11 +419,17 @@ def find_touching(state, dt):
         touches = pairs.hit[c] or (solid and depth >= -SAME_PLACE * extent)
         if not touches and not pushed and not crossed:
             continue
-        pairs.depth[c] = max(0.0, depth)
-        if pushed:  # along this
+        pairs.depth[c], pairs.hit[c] = max(0.0, depth), touches
+        if pushed or (crossed and not touches):  # along this
             pairs.normal[c] = normal
+        if crossed and not touches:
+            pairs.point[c] = sub(met, shape_centre(bodies, a))
         pairs.touching[count] = c
         count += 1
+    for r in range(impacts.logged):
+        c = impacts.log_pair[r]
+        if not pairs.hit[c] and not pairs.crossed[c]:
+            pairs.point[c] = sub(impacts.log_point[r], shape_centre(bodies, pairs.a[c]))
     pairs.touching_count = count
     state.contacts_counted += count
     return OK

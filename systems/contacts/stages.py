@@ -6,7 +6,7 @@ from ...framework.compilation import part
 from ...framework.schedule.stages import Rows
 from ...framework.vectors import add
 from ..codes import FAULTS, OK, RUN_NARROW
-from ..narrow_phase.manifolds import move_to_end, move_to_start
+from ..narrow_phase.manifolds import move_to_end, move_to_start, shape_centre
 from ..records import CONTACT_ROWS
 from .solving.records import KINDS_OF_FAULT
 
@@ -52,8 +52,8 @@ def write_contacts(state):
     for r in range(pairs.touching_count):
         c = pairs.touching[r]
         contacts.entity_a[new, count], contacts.entity_b[new, count] = entity[pairs.a[c]], entity[pairs.b[c]]
-        centre = add(bodies.position[pairs.a[c]], bodies.offset[pairs.a[c]])
-        contacts.point[new, count], contacts.normal[new, count] = add(centre, pairs.point[c]), pairs.normal[c]
+        contacts.point[new, count] = add(shape_centre(bodies, pairs.a[c]), pairs.point[c])
+        contacts.normal[new, count] = pairs.normal[c]
         contacts.depth[new, count], contacts.impulse[new, count] = pairs.depth[c], pairs.impulse[c]
         contacts.enabled[new, count], contacts.rested[new, count] = not pairs.disabled[c], pairs.rests[c]
         count += 1

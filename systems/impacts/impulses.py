@@ -87,6 +87,14 @@ def log_impact(state, event, impulse):
     impacts.logged += 1
 
 
+@part
+def note_crossing(state, event):
+    """Two have met whose paths that does not change: note the pair, the point in the world, and the normal."""
+    impacts, pairs, c = state.impacts, state.pairs, state.impacts.event_pair[event]
+    pairs.crossed[c], pairs.point[c], pairs.normal[c] = True, impacts.event_point[event], impacts.event_normal[event]
+    forget_manifold(pairs, c)
+
+
 @inlined
 def is_immovable(bodies, i):
     """Whether body i neither can be moved nor moves by itself."""
@@ -237,8 +245,7 @@ def hand_over(state, event, dt):
             if not landing:  # what turns may touch again at once, whatever it slides along
                 note_trapped(state, i, True)
         return
-    pairs.crossed[c] = True
-    forget_manifold(pairs, c)
+    note_crossing(state, event)
     for i in (a, b):
         if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] < STOPPED:
             stop_body(state, i, impacts.now)

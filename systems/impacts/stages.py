@@ -13,7 +13,7 @@ from ..linking.parts import FIRST_TOUCH, TAKE_TOGETHER, call_take_together
 from ..narrow_phase.stages import flag_fast_bodies
 from .find import queue_next_impact
 from .heap import heap_pop, is_current
-from .impulses import CROSSING, IMPACT, STOPPED, bounce_pair, hand_over, stop_body
+from .impulses import CROSSING, IMPACT, STOPPED, bounce_pair, hand_over, note_crossing, stop_body
 from .records import BODIES_OF_MEMBERS, EVENTS, HEADS, LOG, MEMBERS
 from .together import EQUAL, requeue
 from .worklist import list_contacts, list_landings, list_neighbours, list_pairs_of, most_listed
@@ -119,7 +119,7 @@ def take_event(state, event, dt):
     c, kind = impacts.event_pair[event], impacts.event_kind[event]
     impacts.now = impacts.event_time[event]
     if kind == CROSSING:
-        state.pairs.crossed[c] = True
+        note_crossing(state, event)
         return OK
     if kind == IMPACT and impacts.waiting > 0 and impacts.event_time[impacts.heap[0]] - impacts.now <= EQUAL * dt:
         if state.links[TAKE_TOGETHER] == 0:

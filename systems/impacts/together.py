@@ -19,7 +19,7 @@ from ..joints.groups import is_joined
 from ..parts.rows import owner_of
 from .group import LEAST_PASSES, WORK, is_shooting, is_turning_group, push_group, solve_group
 from .heap import heap_pop, heap_push, is_current
-from .impulses import HALT, HAND_OVER, IMPACT, bounce_pair
+from .impulses import HALT, HAND_OVER, IMPACT, bounce_pair, note_crossing
 from .worklist import list_landings, list_pairs_of
 
 EQUAL = 1e-6  # of the step: times that differ by more are never the same, however slow the approach
@@ -59,7 +59,7 @@ def next_at(state, now, dt):
                 list_landings(state, c, time)
                 sinks, impacts.listed = impacts.listed > 0, 0
                 return -1 if sinks else event
-            state.pairs.crossed[c] = True
+            note_crossing(state, event)
         heap_pop(impacts)
     return -1
 

@@ -17,10 +17,15 @@ from ..shapes.tolerances import FLAT_SLOPS, PLANE_SIZES, SAME_PLACE, slop_for, t
 
 
 @inlined
+def shape_centre(bodies, i):
+    """Where the centre of the shape of body i is now."""
+    return add(bodies.position[i], bodies.offset[i])
+
+
+@inlined
 def centre_offset(bodies, a, b):
     """From the centre of a's shape to that of b's, where they are now."""
-    position, offset = bodies.position, bodies.offset
-    return sub(add(position[b], offset[b]), add(position[a], offset[a]))
+    return sub(shape_centre(bodies, b), shape_centre(bodies, a))
 
 
 @inlined
