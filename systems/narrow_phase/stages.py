@@ -11,8 +11,9 @@ from ..codes import OK, RUN_BROAD
 from ..integration.turning import size_of_turn
 from ..records import HALVES, PAIR_COLUMNS, SORTED
 from ..shapes.dispatch import evaluate, evaluate_batch
+from ..shapes.linking.batches import centres_apart
 from ..shapes.tolerances import contact_margin
-from .manifolds import centre_offset, is_near_manifold, mark_early
+from .manifolds import is_near_manifold, mark_early
 
 # Candidates are sorted by comparison if there are so many times more bodies, else by counting.
 BODIES_PER_CANDIDATE = 64
@@ -166,7 +167,7 @@ def find_fast_turns(state):
 
 def select_pairs(state, dt):
     """The candidates whose layers and groups let them meet become pairs, counted by the shapes of the two bodies."""
-    candidates, pairs, bodies, shapes = state.candidates, state.pairs, state.bodies, state.shapes
+    candidates, pairs, bodies, shapes = state.candidates, state.pairs, state.bodies, state.shapes.count
     velocity, start = bodies.linear_velocity, bodies.start_velocity
     changed = state.moved and (state.limits_speed or not state.drifted)
     for i in range(state.first, state.moving):  # that of static bodies is always 0
@@ -176,9 +177,9 @@ def select_pairs(state, dt):
     if state.spinning:
         find_fast_turns(state)
     shape, kind, starts = bodies.shape, candidates.kind, candidates.bucket_starts
-    for k in range(shapes.count * shapes.count + 2):
+    for k in range(shapes * shapes + 2):
         starts[k] = 0
-    several, kept = shapes.count > 1, 0
+    several, kept = shapes > 1, 0
     for c in range(candidates.count):
         a, b = candidates.sorted_a[c], candidates.sorted_b[c]
         if layers_meet(state, a, b):
@@ -186,7 +187,7 @@ def select_pairs(state, dt):
             pairs.is_solid[kept], pairs.early[kept], pairs.disabled[kept] = is_solid_pair(state, a, b), False, False
             if several:
                 one, other = min(shape[a], shape[b]), max(shape[a], shape[b])
-                kind[kept] = one * shapes.count + other
+                kind[kept] = one * shapes + other
                 starts[kind[kept] + 2] += 1
             kept += 1
     if not several:
@@ -223,13 +224,13 @@ def evaluate_pairs(state, dt):
 
 
 @part
-def evaluate_levels_of(state, a, b, margin):
+def evaluate_levels_of(state, a, b, position, loose, margin):
     """(dropped, hit, depth, normal, point) of two bodies; the last level gives the contact, a pair hits if all do.
 
-    dropped: a rotated level reaches out of one that misses, so that the two are kept apart in this step.
+    position: where bodies are; loose: a rotated level reaches out of another. dropped: out of one that misses, so that
+    the two are kept apart in this step.
     """
-    bodies = state.bodies
-    position, levels, offsets = bodies.position, bodies.levels, bodies.level_offsets
+    levels, offsets = state.bodies.levels, state.bodies.level_offsets
     hit, depth, normal, point = False, 0.0, zero_of(state), zero_of(state)
     missed, first_hit = 0.0, False  # depth of the level that keeps them apart
     last = state.level_count - 1
@@ -245,9 +246,9 @@ def evaluate_levels_of(state, a, b, margin):
             state.first_level_hits += 1 if hit else 0
         if not hit:
             missed = min(missed, depth)
-            if depth < -margin and not (bodies.level_not_enclosing[a] or bodies.level_not_enclosing[b]):
+            if depth < -margin and not loose:
                 break
-    dropped = missed < 0.0 and depth > missed and (bodies.level_not_enclosing[a] or bodies.level_not_enclosing[b])
+    dropped = loose and missed < 0.0 and depth > missed
     hit = hit and not missed < 0.0
     if first_hit and (dropped or not hit):
         state.false_positives += 1
@@ -256,18 +257,21 @@ def evaluate_levels_of(state, a, b, margin):
 
 def evaluate_levels(state, dt):
     """Every pair level by level; pairs that a rotated level keeps apart are dropped."""
-    pairs = state.pairs
+    pairs, bodies = state.pairs, state.bodies
     if not state.several_levels:
         return OK
+    mark_early(state)
     span, kept = dt if state.moved else 0.0, 0
     for c in range(pairs.count):
         a, b, solid = pairs.a[c], pairs.b[c], pairs.is_solid[c]
         margin = contact_margin(state, span, a, b) if span > 0.0 and solid else 0.0
-        dropped, hit, depth, normal, point = evaluate_levels_of(state, a, b, margin)
+        loose = bodies.level_not_enclosing[a] or bodies.level_not_enclosing[b]
+        pairs.early[kept] = pairs.early[c] and not loose
+        position = bodies.previous_position if pairs.early[kept] else bodies.position
+        dropped, hit, depth, normal, point = evaluate_levels_of(state, a, b, position, loose, margin)
         pairs.a[kept], pairs.b[kept], pairs.is_solid[kept] = a, b, solid
         pairs.hit[kept], pairs.depth[kept] = hit, depth
-        pairs.at[kept], pairs.normal[kept], pairs.point[kept] = centre_offset(state.bodies, a, b), normal, point
-        pairs.early[kept] = False
+        pairs.at[kept], pairs.normal[kept], pairs.point[kept] = centres_apart(state, kept, a, b), normal, point
         kept += 0 if dropped else 1
     pairs.count = kept
     return OK

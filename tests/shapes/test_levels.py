@@ -151,6 +151,33 @@ def test_levels_change_the_cost_and_not_what_is_found(d):
     assert [plain.stats().counters[name] for name in COUNTERS] == [0, 0, 0]
 
 
+@pytest.mark.parametrize("where", ["far", "near"])
+@pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
+@both_dimensions
+def test_levels_change_nothing_of_what_rests(d, mode, where):
+    """Boxes slide off the end of a floor: they fall from the same step on where a body 1 km away has two levels, or
+    each of them has."""
+    pad, places = (0.0,) * (d - 2), []
+    for levels in (None, where):
+        world, rng = make_world(d, 9.81, collision=mode), np.random.default_rng(7)
+        world.create_entity(Transform((0.0, -1.0, *pad)), AABBCollider((6.0, 1.0, *(6.0,) * (d - 2)), friction=0.3))
+        far = (SphereCollider(2.0),) if levels == "far" else ()
+        body = RigidBody(gravity_scale=0)
+        world.create_entity(Transform((1000.0, 0.0, *pad)), body, *far, AABBCollider((1.0,) * d))
+        ids = []
+        for k in range(12):
+            half = rng.uniform(0.1, 0.4, d)
+            place, speed = (0.9 * k - 5.0, rng.uniform(0.5, 1.5), *pad), (rng.uniform(1.0, 5.0), 0.0, *pad)
+            near = (SphereCollider(1.01 * float(np.linalg.norm(half))),) if levels == "near" else ()
+            box = AABBCollider(half, friction=0.3)
+            ids.append(world.create_entity(Transform(place), RigidBody(linear_velocity=speed), *near, box))
+        run(world, 120)
+        places.append(np.array([position(world, i) for i in ids]))
+        world.close()
+    assert places[0][:, 1].min() < -1.0
+    np.testing.assert_array_equal(places[0], places[1])
+
+
 @both_dimensions
 def test_the_last_level_gives_contact_and_material(d):
     """Restitution, normal and time of impact are the box's: the sphere around it only rejects pairs."""
