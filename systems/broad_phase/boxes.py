@@ -141,6 +141,7 @@ def box_rows(state, start, stop, motion):
     A box holds every level, so that what the first one meets is looked at.
     """
     bodies, starts, ends = state.bodies, state.bodies.position, state.bodies.position
+    lower, upper = bodies.lower, bodies.upper
     if motion == MOVING and state.moved:
         starts = bodies.previous_position
     if motion == SEARCHING:
@@ -148,14 +149,14 @@ def box_rows(state, start, stop, motion):
     thinnest = find_extents(state, 0, start, stop)
     for i in range(start, stop):
         low, high = box_level(state, 0, i, starts[i], ends[i])
-        if motion == STAYING and not contains_box(bodies.lower[i], bodies.upper[i], low, high):
+        if motion == STAYING and not contains_box(lower[i], upper[i], low, high):
             move_in_grid(state.grid, i, low, high)
-        bodies.lower[i], bodies.upper[i] = low, high
+        lower[i], upper[i] = low, high
     for level in range(1, state.level_count):
         thinnest = find_extents(state, level, start, stop)
         for i in range(start, stop):
             low, high = box_level(state, level, i, starts[i], ends[i])
-            bodies.lower[i], bodies.upper[i] = smaller(bodies.lower[i], low), larger(bodies.upper[i], high)
+            lower[i], upper[i] = smaller(lower[i], low), larger(upper[i], high)
     if state.spinning and motion in (MOVING, SEARCHING):
         hold_turns(state, start, stop)
     if motion == STANDING:

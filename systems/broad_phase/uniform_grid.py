@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
+from numpy import int64
 
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
@@ -97,14 +97,14 @@ def find_cells(grid, lower, upper, start, count):
             fits = item(low, q) <= item(high, q)
             valid &= fits
             middle = 0.5 * (item(low, q) + item(high, q)) if fits else item(origin, q)
-            at = np.int64((middle - item(origin, q)) * inverse) + 1
+            at = int64((middle - item(origin, q)) * inverse) + 1
             key += at if q == 0 else at * (row if q == 1 else layer)
         key = key if valid else total
         keys[i] = key
         directory[key + 2] += 1
     crowding, fullest, before = 0, 0, 0
     for k in range(2, total + 2):
-        found = np.int64(directory[k])
+        found = int64(directory[k])
         crowding += found * found
         fullest = max(fullest, found)
         before += found
@@ -125,11 +125,11 @@ def choose_codes(grid):
 @inlined
 def code_of(grid, low, high):
     """The code of a box that is in the frame."""
-    scale, code, (field, largest) = grid.scale[0], np.int64(0), code_bits(len(low))
+    scale, code, (field, largest) = grid.scale[0], int64(0), code_bits(len(low))
     for q in range(len(low)):
         origin, shift = grid.frame[LOWEST + q], q * field
-        code |= np.int64((item(low, q) - origin) * item(scale, q)) << shift
-        code |= (largest - np.int64((item(high, q) - origin) * item(scale, q))) << (shift + len(low) * field)
+        code |= int64((item(low, q) - origin) * item(scale, q)) << shift
+        code |= (largest - int64((item(high, q) - origin) * item(scale, q))) << (shift + len(low) * field)
     return code
 
 
@@ -176,7 +176,7 @@ def is_near_cell(grid, key, low, high):
 def move_in_grid(grid, i, low, high):
     """Row i has left the box that the grid has of it, and now has this one. It stays in its cell if it is near that, or
     is outside of the grid now. No more than OUTSIDE_MAX can be."""
-    count, key = grid.outside_count, np.int64(grid.keys[i - grid.first])
+    count, key = grid.outside_count, int64(grid.keys[i - grid.first])
     for k in range(count):
         if grid.outside[k] == i:
             return
@@ -202,7 +202,7 @@ def look_around(grid, start, count):
     directory, order, cells, codes, notes = grid.directory, grid.order, grid.cells, grid.codes, grid.notes
     row, layer, d = grid.row, grid.layer, len(zero_of(grid))
     guards = guard_bits(d)
-    one, held, room, i = np.int64(1), np.int64(0), len(notes) - LONGEST, start
+    one, held, room, i = int64(1), int64(0), len(notes) - LONGEST, start
     while i < count and held < room:
         key, code, here, after = cells[i], outline_of_code(codes[i], d), order[i], i + 1
         length = directory[key + 2] - after
@@ -219,7 +219,7 @@ def look_around(grid, start, count):
             notes[held, 2] = begin
             notes[held, 3] = bits
             held += bits != 0
-            bits = np.int64(0)
+            bits = int64(0)
         if longest > 8:  # seldom: what is left of the ranges
             for k in range(-1, 1 if d == 2 else 4):
                 at = key + (row if k <= 0 else layer + (k - 2) * row)
@@ -242,7 +242,7 @@ def test_notes(state, held, found):
     grid, lower, upper, room = state.grid, state.bodies.lower, state.bodies.upper, len(state.candidates.first)
     order, notes, first, second = grid.order, grid.notes, state.candidates.first, state.candidates.second
     for r in range(held):
-        here, bits = notes[r, 0], np.int64(notes[r, 3])
+        here, bits = notes[r, 0], int64(notes[r, 3])
         low, high = lower[here], upper[here]
         if found + NOTE > room:
             return FULL
@@ -260,12 +260,12 @@ def test_notes(state, held, found):
 def outline(grid, low, high):
     """What codes of boxes are subtracted from to see whether they may overlap this one, which may reach out of the
     grid; and a guard bit above each coordinate."""
-    frame, scale, code, d = grid.frame, grid.scale[0], np.int64(0), len(low)
+    frame, scale, code, d = grid.frame, grid.scale[0], int64(0), len(low)
     field, largest = code_bits(d)
     for q in range(d):
         origin, unit = frame[LOWEST + q], item(scale, q)
-        before = np.int64(min(max((item(low, q) - origin) * unit, 0.0), float(largest)))
-        behind = np.int64(min(max((item(high, q) - origin) * unit, 0.0), float(largest)))
+        before = int64(min(max((item(low, q) - origin) * unit, 0.0), float(largest)))
+        behind = int64(min(max((item(high, q) - origin) * unit, 0.0), float(largest)))
         code |= (behind << (q * field)) | ((largest - before) << ((d + q) * field))
     return code | guard_bits(d), guard_bits(d)
 
@@ -287,7 +287,7 @@ def look_near(state, grid, start, stop, found):
     order, directory, codes = grid.order, grid.directory, grid.codes
     lower, upper, first = state.bodies.lower, state.bodies.upper, state.candidates.first
     second, row, layer, inverse = state.candidates.second, grid.row, grid.layer, grid.inverse_cell
-    (origin, end), d, one = frame_of(grid), len(zero_of(grid)), np.int64(1)
+    (origin, end), d, one = frame_of(grid), len(zero_of(grid)), int64(1)
     guards = guard_bits(d)
     width = 8 if d == 2 else 7  # boxes of a line that bits stand for
     for i in range(start, stop):
@@ -296,11 +296,11 @@ def look_near(state, grid, start, stop, found):
             edge = (item(high, q) - item(low, q)) * inverse
             fits &= (item(low, q) >= item(origin, q)) & (item(high, q) <= item(end, q))
             fits &= (edge <= LARGEST_EDGE) & (edge >= 0.0)
-        bits, longest, key, code = np.int64(0), 64, 0, guards
+        bits, longest, key, code = int64(0), 64, 0, guards
         if fits:
             longest, (code, _) = 0, outline(grid, low, high)
             for q in range(d):
-                at = np.int64((0.5 * (item(low, q) + item(high, q)) - item(origin, q)) * inverse) + 1
+                at = int64((0.5 * (item(low, q) + item(high, q)) - item(origin, q)) * inverse) + 1
                 key += at if q == 0 else at * (row if q == 1 else layer)
             for k in range(3 if d == 2 else 9):
                 at = line_around(grid, key, k, d)
@@ -309,7 +309,7 @@ def look_near(state, grid, start, stop, found):
                 longest = max(longest, length)
                 bits |= (eight_at(codes, begin, code, guards) & ((one << min(length, width)) - 1)) << (k * width)
         if longest > width:
-            bits, found = np.int64(0), look_inside(state, grid, i, low, high, found)
+            bits, found = int64(0), look_inside(state, grid, i, low, high, found)
             if found == FULL:
                 return FULL
         while bits != 0:
@@ -325,13 +325,13 @@ def look_near(state, grid, start, stop, found):
 @inlined
 def cells_around(grid, low, high):
     """Cells whose boxes may overlap low..high, which is valid: (first cell, lines, lines a layer, cells a line)."""
-    frame, inverse, first, lines, across = grid.frame, grid.inverse_cell, np.int64(0), np.int64(1), np.int64(1)
-    width = np.int64(0)
+    frame, inverse, first, lines, across = grid.frame, grid.inverse_cell, int64(0), int64(1), int64(1)
+    width = int64(0)
     for q in range(len(low)):
         origin = frame[LOWEST + q]
-        end = np.int64((frame[HIGHEST + q] - origin) * inverse) + 1.0
-        start = np.int64(min(max((item(low, q) - origin) * inverse - 0.5 - CELL_SLACK, 0.0), end))
-        stop = np.int64(min(max((item(high, q) - origin) * inverse + 0.5 + CELL_SLACK, -1.0), end - 1.0))
+        end = int64((frame[HIGHEST + q] - origin) * inverse) + 1.0
+        start = int64(min(max((item(low, q) - origin) * inverse - 0.5 - CELL_SLACK, 0.0), end))
+        stop = int64(min(max((item(high, q) - origin) * inverse + 0.5 + CELL_SLACK, -1.0), end - 1.0))
         length = max(stop - start + 1, 0)
         first += (start + 1) * (1 if q == 0 else grid.row if q == 1 else grid.layer)
         width = length if q == 0 else width
@@ -346,14 +346,14 @@ def line_of(grid, cells, n):
     first, _, across, width = cells
     layer = 0 if n < across else n // across  # a division takes longer than all the rest
     at = first + (n - layer * across) * grid.row + layer * grid.layer
-    return np.int64(grid.directory[at]), np.int64(grid.directory[at + width])
+    return int64(grid.directory[at]), int64(grid.directory[at + width])
 
 
 @part
 def look_inside(state, grid, i, low, high, found):
     """Pairs of body i, which is not in the grid, with what of it overlaps this box of any size; returns as
     ``test_notes``."""
-    lower, upper, order, codes, one = state.bodies.lower, state.bodies.upper, grid.order, grid.codes, np.int64(1)
+    lower, upper, order, codes, one = state.bodies.lower, state.bodies.upper, grid.order, grid.codes, int64(1)
     first, second, room = state.candidates.first, state.candidates.second, len(state.candidates.first)
     if not at_most(low, high):
         return found

@@ -63,30 +63,30 @@ def phi3(z):
 def keep_start(state, dt):
     """previous_position and start_velocity are the state at the start of the step; for going back, kept_previous is the
     start of the one before."""
-    bodies = state.bodies
+    bodies, first = state.bodies, state.first
     state.path_degree, state.drifted = state.usual_path_degree, False
     state.flight_usual, state.flight_seen = True, 0
     previous, position = bodies.previous_position, bodies.position
     start, velocity = bodies.start_velocity, bodies.linear_velocity
     # Of sleepers and static bodies the two are equal, see box_statics.
     if state.others_write:  # every column is kept
-        for i in range(state.first, state.kept_rows):
+        for i in range(first, state.kept_rows):
             previous[i] = position[i]
     else:
         state.kept |= KEEPS_START
-        for i in range(state.first, state.kept_rows):
+        for i in range(first, state.kept_rows):
             bodies.kept_previous[i] = previous[i]
             previous[i] = position[i]
     turned, rotation, width = bodies.previous_rotation, bodies.rotation, 1 if len(zero_of(state)) == 2 else 4
     if len(turned) > 0 and len(rotation) > 0:
-        first = state.first if state.boxed_version == state.statics_version else 0  # else other rows sleep
-        for k in range(width * first, width * state.kept_rows):
+        start_row = first if state.boxed_version == state.statics_version else 0  # else other rows sleep
+        for k in range(width * start_row, width * state.kept_rows):
             turned[k] = rotation[k]
     if state.limits_speed:  # systems may have pushed since the forces were summed
-        for i in range(state.first, state.dynamic):
+        for i in range(first, state.dynamic):
             if not bodies.quarantined[i]:
                 velocity[i] = within(velocity[i], zero_of(state), bodies.max_linear_speed[i])
-    for i in range(state.first, state.moving):
+    for i in range(first, state.moving):
         start[i] = velocity[i]
     return 0
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
+from numpy import int64
 
 from ....framework.compilation import inlined
 from ....framework.vectors import absolute, add, add_scaled, item, larger, scale, shifted
@@ -33,7 +33,7 @@ def cover(tree, low, high, level):
     scale = tree.inverse_cell * shrink
     origin, lowest, highest = tree.origin[0], tree.lowest[0], tree.highest[0]
     first, size = tree.level_shift[level], tree.level_cells[level]
-    span, n0, n1, n2 = np.int64(1), np.int64(1), np.int64(1), np.int64(1)
+    span, n0, n1, n2 = int64(1), int64(1), int64(1), int64(1)
     for q in range(len(low)):
         # Clamping to what is there keeps numbers small and makes a floor of any length cost no more than the scene.
         least = max(item(lowest, q) * shrink, -TREE_FARTHEST)
@@ -43,25 +43,25 @@ def cover(tree, low, high, level):
         bottom = bottom if bottom >= least else least  # in this order nan (infinity times 0) becomes the bound
         top = top if top <= most else most
         if bottom > most or top < least:
-            return first, np.int64(0), np.int64(0), np.int64(0)
-        index = np.int64(math.floor(bottom))
-        length = np.int64(math.floor(top)) - index + 1
+            return first, int64(0), int64(0), int64(0)
+        index = int64(math.floor(bottom))
+        length = int64(math.floor(top)) - index + 1
         if length <= 0:
-            return first, np.int64(0), np.int64(0), np.int64(0)
+            return first, int64(0), int64(0), int64(0)
         n0 = length if q == 0 else n0
         n1 = length if q == 1 else n1
         n2 = length if q == 2 else n2
         first += index * tree.level_stride[level, q]
         span += (length - 1) * tree.level_stride[level, q]
     if span >= size:  # always so for the top level's only cell
-        return np.int64(0), size, np.int64(1), np.int64(1)
+        return int64(0), size, int64(1), int64(1)
     row, layer = tree.level_stride[level, 1], tree.level_stride[level, 2]
     if n0 >= row:  # runs as long as a row join into one
-        n0, n1 = n0 + (n1 - 1) * row, np.int64(1)
+        n0, n1 = n0 + (n1 - 1) * row, int64(1)
         if n0 >= layer:
-            n0, n2 = n0 + (n2 - 1) * layer, np.int64(1)
+            n0, n2 = n0 + (n2 - 1) * layer, int64(1)
     elif n1 * row >= layer:
-        n1, n2 = n1 + (n2 - 1) * (layer // row), np.int64(1)
+        n1, n2 = n1 + (n2 - 1) * (layer // row), int64(1)
     return first, n0, n1, n2
 
 

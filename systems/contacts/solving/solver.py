@@ -53,8 +53,8 @@ from .rows import (
     update_targets,
 )
 
-TURN, TIPPING_TURN = 2.0 * math.pi * FREQUENCY, 2.0 * math.pi * TURNING_FREQUENCY  # rad of a spring in a substep
-SQUARE_OF_TURN = TURN * TURN, TIPPING_TURN * TIPPING_TURN
+SQUARE_OF_TURN = tuple((2.0 * math.pi * frequency) ** 2 for frequency in (FREQUENCY, TURNING_FREQUENCY))  # rad of a
+# spring in a substep
 
 
 @part
