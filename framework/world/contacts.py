@@ -275,7 +275,7 @@ class Contacts(ContactRows):
     @property
     def manifold(self) -> ContactRows:
         """The points in which they touch, several for what lies on its face and turns: ``contact`` is the row of
-        theirs, ``normal_impulse`` what each of them has given. Made when it is read, where entity_a is then."""
+        theirs, ``normal_impulse`` what each of them has given. Made when it is read, where the two are then."""
         return ContactRows(self._source.points(self._columns), self._membership)
 
     @property

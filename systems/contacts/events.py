@@ -25,6 +25,7 @@ from .stages import ROOM_FOR_FOUND, compare_contacts
 
 Columns = dict[str, np.ndarray]
 TOLD = ("entity_a", "entity_b", "point", "normal", "depth", "impulse")  # of contacts
+SIDEWAYS = 0.1  # of a slide: along axes on which it goes less no side is looked at
 MEETING = ("layer", "mask", "group")  # of colliders: whom they meet
 
 
@@ -143,7 +144,7 @@ class RecordedContacts:
 
     def points(self, columns: Columns) -> Columns:
         """The same contacts, a row for each of their points, with its place in the columns; those of a pair of which
-        the solver knows none, or one, are as they are, and where entity_a is no more."""
+        the solver knows none are as they are, and where entity_a is no more."""
         self._refresh()
         state, memory, now = self._state, self._state.warm_start, self._state.warm_start.now
         count = int(memory.counts[now]) if state.spinning else 0
@@ -151,12 +152,12 @@ class RecordedContacts:
         place = {pair: row for row, pair in enumerate(_pairs(columns))}
         found = zip(entity_a.tolist(), entity_b.tolist(), strict=True)
         rows = np.array([place.get(pair, -1) for pair in found], np.int64)
-        first, bodies = self._table.rows_of(entity_a), state.bodies
+        first, second = self._table.rows_of(entity_a), self._table.rows_of(entity_b)
         known, alone = (rows >= 0) & (first >= 0), np.ones(len(columns["entity_a"]), bool)
         alone[rows[known]] = False
-        first = first[known]
-        point = bodies.position[first] + bodies.offset[first] + memory.place[now, :count][known]
+        first, second = first[known], np.where(second < 0, first, second)[known]
         rows, impulse = rows[known], memory.total[now, :count][known]
+        point = led_to_end(state.bodies, first, second, memory.place[now, :count][known], columns["normal"][rows])
         # What impacts have given, which have no points here, is that of the nearest one to the contact's.
         rest = columns["normal_impulse"] - np.bincount(rows, impulse, len(alone))
         order = np.lexsort((np.linalg.norm(point - columns["point"][rows], axis=1), rows))
@@ -197,6 +198,24 @@ class RecordedContacts:
 
 def _pairs(columns: Columns) -> Iterator[tuple[int, int]]:
     return zip(columns["entity_a"].tolist(), columns["entity_b"].tolist(), strict=True)
+
+
+def led_to_end(bodies: Record, a: np.ndarray, b: np.ndarray, place: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """(n, d) m, points of contacts where the step ends. bodies: of the records; a, b: (n,) rows of the two; place:
+    (n, d) from the centre of a's shape, as the two stand to each other where the step starts; normal: (n, d).
+
+    A point is a corner of one of the two, which slides on the other: it goes with the one whose side is nearer. Along
+    the normal it stays in the middle of the gap.
+    """
+    start, end, offset, half = bodies.previous_position, bodies.position, bodies.offset, bodies.half_extents
+    way_a, way_b, point = end[a] - start[a], end[b] - start[b], place + start[a] + offset[a]
+    nearing = np.sum((way_b - way_a) * normal, axis=1)[:, None] * normal
+    slide = np.abs(way_b - way_a - nearing)
+    sideways = slide > SIDEWAYS * np.linalg.norm(slide, axis=1)[:, None]
+    side_a, side_b = (
+        np.where(sideways, half[i] - np.abs(point - start[i] - offset[i]), np.inf).min(axis=1) for i in (a, b)
+    )
+    return point + np.where((side_a <= side_b)[:, None], way_a + 0.5 * nearing, way_b - 0.5 * nearing)
 
 
 def _repeated(number: int, count: int) -> np.ndarray:
