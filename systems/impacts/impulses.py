@@ -14,7 +14,8 @@ from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST
 from ..ccd.turning_touch import STOPPED
 from ..integration.trajectory import along, centre_at, path_of, rate_along
-from ..linking.parts import TURN_BY_IMPACT, call_turn_by_impact
+from ..joints.groups import is_joined
+from ..linking.parts import JOINED_IMPACT, TURN_BY_IMPACT, call_turn_by_impact
 from ..narrow_phase.manifolds import forget_manifold
 from ..parts.rows import next_row, owner_of
 from ..shapes.dispatch import restitution_at, restitution_of
@@ -132,6 +133,9 @@ def bounce_pair(state, event, dt):
     a, b, now = pairs.a[c], pairs.b[c], impacts.event_time[event]
     inverse_mass = bodies.inverse_mass
     mass, counted = 1.0 / (inverse_mass[a] + inverse_mass[b]), is_counted(state, event)
+    if state.spinning and is_joined(state, a, b):  # what joints answer may leave less of it
+        impulse, friction = impacts.event_change[event] * mass, scale(impacts.event_pull[event], mass)
+        call_turn_by_impact(state.links[JOINED_IMPACT], state, event, impulse, friction, dt)
     # of the bodies' relative velocity, with what friction adds to it
     change = add(scale(impacts.event_normal[event], impacts.event_change[event]), impacts.event_pull[event])
     if state.spinning:

@@ -19,6 +19,7 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
+from ..ccd.turning_touch import STOPPED
 from ..integration.trajectory import along, path_of, rate_along
 from ..integration.turning import change_of_spin, cross_spin, lever, turn_of_arm, twist
 from ..joints.bodies import turned_before, turned_in_step
@@ -184,7 +185,8 @@ def changes_of(state, rows, impulses):
 def given_in_flight(state, i):
     """What joints were foreseen to give body i on its flight, halfway through which it is now, and its path has."""
     impacts, bodies, k = state.impacts, state.bodies, owner_of(state, i)
-    if not (state.any_warm_started and bodies.warm_started[k] and bodies.swings[k]):
+    swings = state.any_warm_started and bodies.warm_started[k] and bodies.swings[k]
+    if bodies.impact_count[k] >= STOPPED or not swings:
         return zero_of(state)
     share = 2.0 * (impacts.now - impacts.since) / impacts.end
     if state.path_degree == 1:
@@ -194,16 +196,19 @@ def given_in_flight(state, i):
 
 @part
 def motion_to_take(state, i, takes):
-    """(velocity, spin) of body i now; or the sum of those before and behind its flight, without what joints were
-    foreseen to give it, or as the solver has them, before an impact as behind it."""
+    """(velocity, spin) of body i now, as it is settled; or the sum of those before and behind its flight, without what
+    joints were foreseen to give it, or as the solver has them, before an impact as behind it."""
     bodies, impacts, since, k = state.bodies, state.impacts, state.impacts.since, owner_of(state, i)
+    stopped = bodies.impact_count[k] >= STOPPED  # it stays where it is, with its velocity
     if takes == TAKE_STARTS:
         q = place_of(state, i)
         return scale(state.solver.velocity[q], 2.0), scale(state.solver.spin[q], 2.0)
     path = path_of(state, i)
-    if takes == TAKE_SPEEDS:
-        now = add(rate_along(path, impacts.now), impacts.settled[k])
-        return now, add(bodies.spin[i], impacts.settled_spin[k])
+    if takes <= TAKE_SPEEDS:
+        velocity = bodies.linear_velocity[k] if stopped else rate_along(path, impacts.now)
+        return add(velocity, impacts.settled[k]), add(bodies.spin[i], impacts.settled_spin[k])
+    if stopped:
+        return scale(bodies.linear_velocity[k], 2.0), scale(bodies.spin[i], 2.0)
     start = rate_along(path, since) if since > 0.0 else bodies.start_velocity[i]
     end = rate_along(path, 2.0 * impacts.now - since)
     return sub(add(start, end), given_in_flight(state, i)), scale(bodies.spin[i], 2.0)
@@ -211,9 +216,11 @@ def motion_to_take(state, i, takes):
 
 @part
 def rate_of_row(state, j, takes):
-    """How fast the bodies change the value of a row that holds it; 0 of motors and limits."""
+    """How fast the bodies change the value of a row that holds it, or bears it: motors 0, and limits where joints take
+    something back."""
     joints, speed = state.solver.joints, zero_of(state)
-    for k in range(numbers_of(joints, j) if joints.rule[j] == HOLD else 0):
+    counts = joints.rule[j] == HOLD or (joints.rule[j] == LIMIT and takes == TAKE_NOTHING)
+    for k in range(numbers_of(joints, j) if counts else 0):
         push_a, turn_a, push_b, turn_b = directions_at(joints, j, k)
         moved = 0.0
         for i, push, turn in ((joints.row_a[j], push_a, turn_a), (joints.row_b[j], push_b, turn_b)):

@@ -3,17 +3,20 @@ connect with it, and where that starts in the solver then."""
 
 from __future__ import annotations
 
+import math
+
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, item, length, scale, sub
 from ..codes import OK
 from ..contacts.solving.rows import rotate_body
-from ..integration.turning import arms_to, velocity_by_spin
+from ..integration.turning import arms_to, cross_spin, velocity_by_spin
 from ..joints.groups import group_of
 from ..joints.records import HOLD, POINT
 from ..parts.rows import owner_of, place_of
 from ..shapes.poses import advance_pose, motion_of, set_motion
-from .impulses import count_impact, deflect
+from ..shapes.surfaces import slip_at
+from .impulses import count_impact, deflect, touch_of_event
 from .joint_answers import (
     HELD,
     TAKE_FLIGHT,
@@ -23,15 +26,19 @@ from .joint_answers import (
     TAKE_WAYS,
     answer,
     answers,
+    change_of_row,
     given_in_flight,
     list_answering,
+    motion_to_take,
     parted_by,
     push_rows,
+    rate_of_row,
     rows_that_answer,
 )
 from .turning import add_spin, arms_of, impulses_of, slip_direction
 from .worklist import list_pairs_of
 
+GAIN_OF_ROUNDING = 1e-9  # of the energy of the velocities that an impact gives: less is rounding
 ONE_MOTION = 1e-5  # of the product: answers are as exact as that; two impulses that differ by less do one thing
 
 
@@ -87,6 +94,14 @@ def settle(state, sides, t):
 
 
 @part
+def drop_settled(state, sides):
+    """Two bodies go on as they have come."""
+    for i in sides:
+        k = owner_of(state, i)
+        state.impacts.settled[k] = state.impacts.settled_spin[k] = zero_of(state)
+
+
+@part
 def gain_settled(state, rows, sides):
     """Two bodies, and those of rows, gain what has settled them and what the rows push: all of that, or nothing."""
     impacts, joints, zero = state.impacts, state.solver.joints, zero_of(state)
@@ -129,6 +144,26 @@ def respond_joined(state, sides, met, motion, e, mu):
 
 
 @part
+def share_of_impact(state, rows, touch, met, friction):
+    """The largest share of an impact and of the answers of rows to it, which are in ``push``, that gives no energy: a
+    share s gives slope s + curvature s^2 / 2, without the work of what drives the bodies. met: (impulse along the
+    normal, at which their surfaces run)."""
+    ((a, b), arms, normal), joints, (impulse, running) = touch, state.solver.joints, met
+    answer(state, rows, touch, impulse, friction, TAKE_SPEEDS)
+    (v_a, spin_a), (v_b, spin_b) = motion_to_take(state, a, TAKE_NOTHING), motion_to_take(state, b, TAKE_NOTHING)
+    seen = sub(add(v_b, cross_spin(spin_b, arms[1])), add(v_a, cross_spin(spin_a, arms[0])))
+    push = add_scaled(friction, normal, impulse)
+    slope, curvature = dot(push, add(seen, running)), dot(push, parted_by(state, touch))
+    for e in range(rows):
+        j = joints.open_row[e]
+        slope += dot(joints.push[j], rate_of_row(state, j, TAKE_NOTHING))
+        curvature += dot(joints.push[j], change_of_row(state, j))
+    if slope + 0.5 * curvature <= GAIN_OF_ROUNDING * curvature:
+        return 1.0
+    return max(0.0, -2.0 * slope / curvature) if curvature < math.inf else 0.0
+
+
+@part
 def take_gains(state, i, dt):
     """Body i goes on with what it has gained; returns whether it has gained anything."""
     impacts, k, zero = state.impacts, owner_of(state, i), zero_of(state)
@@ -143,7 +178,8 @@ def take_gains(state, i, dt):
 
 def strike_joined(state, event, impulse, friction, dt):
     """What joints answer an impact of two bodies with: all that they connect goes on with other velocities and spins,
-    and is searched for its next impacts. The joints bear it."""
+    and is searched for its next impacts. The joints bear it. Limits that go slack, and answers that are not exact,
+    would give energy: only the share of all acts that gives none. Where each share does, joints answer nothing."""
     impacts, joints, bodies = state.impacts, state.solver.joints, state.bodies
     a, b = state.pairs.a[impacts.event_pair[event]], state.pairs.b[impacts.event_pair[event]]
     touch = (a, b), arms_of(state, event), impacts.event_normal[event]
@@ -152,7 +188,17 @@ def strike_joined(state, event, impulse, friction, dt):
     advance_pose(state, a, bodies.spin[a], impacts.now - dt)
     advance_pose(state, b, bodies.spin[b], impacts.now - dt)
     rows, _ = rows_that_answer(state, touch)
-    answer(state, rows, touch, impulse, friction, TAKE_SPEEDS)
+    running = slip_at(state, a, b, zero_of(state), touch_of_event(state, event))
+    share = share_of_impact(state, rows, touch, (impulse, running), friction)
+    if rows == 0 or share == 0.0:
+        rows = 0
+        drop_settled(state, touch[0])
+        share = share_of_impact(state, rows, touch, (impulse, running), friction)
+    if share < 1.0:
+        for e in range(rows):
+            joints.push[joints.open_row[e]] = scale(joints.push[joints.open_row[e]], share)
+        impacts.event_change[event] *= share
+        impacts.event_pull[event] = scale(impacts.event_pull[event], share)
     gain_settled(state, rows, touch[0])
     set_motion(state, a, motions[0])
     set_motion(state, b, motions[1])

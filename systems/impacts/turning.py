@@ -18,7 +18,7 @@ from ..codes import OK
 from ..integration.trajectory import along, path_of
 from ..integration.turning import arms_to, change_of_spin, compliance, cross_spin, lever, twist, velocity_by_spin
 from ..joints.groups import is_joined
-from ..linking.parts import JOINED_IMPACT, JOINED_RESPONSE, call_turn_by_impact, call_turning_response
+from ..linking.parts import JOINED_RESPONSE, call_turning_response
 from ..parts.rows import next_row, owner_of
 from ..shapes.poses import advance_pose, has_unequal_moments, motion_of, rotate_pose, set_motion, turn_shape
 
@@ -147,8 +147,6 @@ def turn_by_impact(state, event, impulse, friction, dt):
     normal; friction: along the surface."""
     impacts, bodies, arms = state.impacts, state.bodies, arms_of(state, event)
     c, normal, left = impacts.event_pair[event], impacts.event_normal[event], dt - impacts.now
-    if is_joined(state, state.pairs.a[c], state.pairs.b[c]):
-        call_turn_by_impact(state.links[JOINED_IMPACT], state, event, impulse, friction, dt)
     for i, arm, sign in ((state.pairs.a[c], arms[0], -1.0), (state.pairs.b[c], arms[1], 1.0)):
         twisted = add(scale(lever(bodies, i, arm, normal), impulse), twist(arm, friction))
         motion = motion_of(state, i)
