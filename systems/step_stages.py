@@ -90,16 +90,16 @@ def axes_are_old(state):
 def read_bodies(state, dt):
     """1 / mass of what moves freely; whether any speed is limited, any body swept or rotated."""
     bodies, mass, inverse_mass, limited = state.bodies, state.bodies.mass, state.bodies.inverse_mass, False
-    limit, out = bodies.max_linear_speed, bodies.quarantined
-    for i in range(state.first, state.dynamic):
+    limit, out, dynamic = bodies.max_linear_speed, bodies.quarantined, state.dynamic
+    for i in range(state.first, dynamic):
         inverse_mass[i] = 1.0 / mass[i]
-    for i in range(state.first, state.dynamic if state.quarantining else 0):
+    for i in range(state.first, dynamic if state.quarantining else 0):
         if out[i]:
             inverse_mass[i] = 0.0
-    for i in range(state.first, state.dynamic if len(limit) > 0 else 0):
+    for i in range(state.first, dynamic if len(limit) > 0 else 0):
         limited |= (limit[i] == limit[i]) & (not out[i])
     every = state.read_version != state.statics_version or state.inverse_masses_exposed
-    for i in range(state.dynamic, state.count if every else state.moving):
+    for i in range(dynamic, state.count if every else state.moving):
         inverse_mass[i] = 0.0
     add_masses_of_parts(state)
     state.limits_speed, state.spinning = limited, False

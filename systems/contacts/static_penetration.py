@@ -183,17 +183,17 @@ def measure_turned(state, i):
 
 def resolve_static_penetration(state, dt):
     """Put the bodies that the solver has moved, and in swept modes those that rest, out of what cannot be moved."""
-    pairs, bodies = state.pairs, state.bodies
+    pairs, bodies, dynamic = state.pairs, state.bodies, state.dynamic
     pushed = state.solver.contacts > 0 or state.any_warm_started or (state.spinning and state.impacts.logged > 0)
     pushed |= state.turns_too_far > 0  # it stopped, and turned on
-    if not pushed or state.count == state.dynamic:
+    if not pushed or state.count == dynamic:
         return OK
     for turn in range(ROUNDS):
-        first, moved = state.moving if turn == ROUNDS - 1 else state.dynamic, False
+        first, moved = state.moving if turn == ROUNDS - 1 else dynamic, False
         for c in range(pairs.count):
             a, b = pairs.a[c], pairs.b[c]
             fixed, i = max(a, b), min(a, b)  # dynamic rows come first
-            if not (fixed >= first and i < state.dynamic and pairs.is_solid[c] and may_penetrate(state, c, i)):
+            if not (fixed >= first and i < dynamic and pairs.is_solid[c] and may_penetrate(state, c, i)):
                 continue
             measure_turned(state, i)
             far = push_out(state, dt, c, a, b)
@@ -202,7 +202,7 @@ def resolve_static_penetration(state, dt):
                 note_fault(state.solver, SQUEEZED, i)
         if not moved:
             break
-    for i in range(state.first, state.dynamic if not state.pairs_filtered else 0):
+    for i in range(state.first, dynamic if not state.pairs_filtered else 0):
         if bodies.shape[i] >= 0 and is_moved_by_solver(state, i) and is_displaced(state, i, dt):
             measure_turned(state, i)
             for _ in range(ROUNDS):

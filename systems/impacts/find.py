@@ -56,9 +56,10 @@ NO_TOUCH, OVERLAPS_AT_END, FOUND_BY_SWEEP, UNKNOWN = range(4)
 @part
 def overlap_at_end(state, a, b, path, dt):
     """(whether they overlap at the end of their motion, and not at a corner only; the normal there)."""
-    shape_a, shape_b, d = state.bodies.shape[a], state.bodies.shape[b], along(path, dt)
+    bodies = state.bodies
+    shape_a, shape_b, d = bodies.shape[a], bodies.shape[b], along(path, dt)
     hit, depth, normal, _ = evaluate(state, shape_a, a, shape_b, b, d)
-    corners, slop = state.spinning and is_turned(state.bodies, a) and is_turned(state.bodies, b), slop_of(state, a, b)
+    corners, slop = state.spinning and is_turned(bodies, a) and is_turned(bodies, b), slop_of(state, a, b)
     return hit and (corners or not is_corner_touch(state, shape_a, a, shape_b, b, d, (depth, normal), slop)), normal
 
 
@@ -95,15 +96,15 @@ def find_touch(state, c, a, b, path, since, restitution, dt):
     """(NO_TOUCH, OVERLAPS_AT_END or FOUND_BY_SWEEP; (time, normal, point, from a's centre to b's)) of the pair's next
     touch from a time on; UNKNOWN: none until that time, nothing is known of later. What is not swept, or touches at a
     corner, has none unless it overlaps at the step's end."""
-    impacts, bodies, zero = state.impacts, state.bodies, zero_of(state)
+    impacts, pairs, bodies, zero = state.impacts, state.pairs, state.bodies, zero_of(state)
     swept, overlaps, end_normal, nothing = False, False, zero, (dt, zero, zero, zero)
     turning = state.spinning and is_turning(state, dt, a, b)
     limits = slop_of(state, a, b), dt, bounce_threshold(state, a, b) if turning else -math.inf, -math.inf
     if impacts.sweeps:
         since = max(since, bodies.last_impact[a], bodies.last_impact[b])
-        passive, travel = not state.pairs.is_solid[c], travel_of(path, dt) + turning_travel(state, dt, a, b)
+        passive, travel = not pairs.is_solid[c], travel_of(path, dt) + turning_travel(state, dt, a, b)
         swept = is_swept(state, a, b, travel)
-        if passive and (not swept or state.pairs.crossed[c]):
+        if passive and (not swept or pairs.crossed[c]):
             return NO_TOUCH, nothing
         if swept:
             limits = limits_of_sweep(state, a, b, travel, bounce_threshold(state, a, b), dt)
@@ -119,7 +120,7 @@ def find_touch(state, c, a, b, path, since, restitution, dt):
     while True:
         address, clear = state.links[FIRST_TOUCH], since
         found, t, normal, point, apart = call_first_touch(address, state, a, b, path, since, dt, limits)
-        if swept and found == TOUCHES and state.pairs.impulse[c] > 0.0 and dot(normal, state.pairs.normal[c]) < 0.0:
+        if swept and found == TOUCHES and pairs.impulse[c] > 0.0 and dot(normal, pairs.normal[c]) < 0.0:
             clear = leaves_touch_at(state, c, path, since, t)
         if not clear > since:
             break

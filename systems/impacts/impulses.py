@@ -37,6 +37,7 @@ def deflect(state, i, dv, now, dt):
     stopped stays where it is.
     """
     bodies, i = state.bodies, owner_of(state, i)
+    velocity = bodies.linear_velocity
     acting = dt - now if state.path_degree > 1 else dt * state.moves_with_old_velocity
     if state.impacts.sweeps and state.mode == EVENT_DRIVEN:
         acting = 0.5 * dt
@@ -44,13 +45,13 @@ def deflect(state, i, dv, now, dt):
     decay = exp(-fading) if fading > 0.0 else 1.0
     while i >= 0:
         if bodies.impact_count[i] >= STOPPED:
-            bodies.linear_velocity[i] = add(bodies.linear_velocity[i], dv)
+            velocity[i] = add(velocity[i], dv)
         else:
             bodies.start_velocity[i] = add(bodies.start_velocity[i], dv)
             bodies.origin[i] = add_scaled(bodies.origin[i], dv, -now)
             bodies.path_velocity[i] = add(bodies.path_velocity[i], dv)
             bodies.position[i] = add_scaled(bodies.position[i], dv, dt - now)
-            bodies.linear_velocity[i] = add_scaled(bodies.linear_velocity[i], dv, decay)
+            velocity[i] = add_scaled(velocity[i], dv, decay)
         i = next_row(state, i)
 
 
@@ -232,6 +233,7 @@ def hand_over(state, event, dt):
     moved, as does what is caught there, until it is caught twice as often; what else is beyond the cap, or halts, stays
     where it is."""
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
+    inverse_mass = bodies.inverse_mass
     c = impacts.event_pair[event]
     a, b = pairs.a[c], pairs.b[c]
     landing = impacts.event_kind[event] == HAND_OVER and not is_beyond_cap(state, a, b)
@@ -242,8 +244,8 @@ def hand_over(state, event, dt):
         count_capped(state, a, b)
     caught = not halts and restitution_of(state, a, b) == 1.0 and is_trapped(state, a, b)
     if landing or (caught and max(bodies.trapped_impacts[a], bodies.trapped_impacts[b]) < 2 * trapped_limit(state)):
-        if bodies.inverse_mass[a] * bodies.inverse_mass[b] == 0.0:
-            i = a if bodies.inverse_mass[a] > 0.0 else b
+        if inverse_mass[a] * inverse_mass[b] == 0.0:
+            i = a if inverse_mass[a] > 0.0 else b
             rate = kinematic_normal_speed(state, event) if state.spinning else 0.0
             slide_body(state, i, impacts.event_normal[event], rate, dt)
             if not landing:  # what turns may touch again at once, whatever it slides along
@@ -251,5 +253,5 @@ def hand_over(state, event, dt):
         return
     note_crossing(state, event)
     for i in (a, b):
-        if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] < STOPPED:
+        if inverse_mass[i] > 0.0 and bodies.impact_count[i] < STOPPED:
             stop_body(state, i, impacts.now)

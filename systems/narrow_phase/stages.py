@@ -71,12 +71,13 @@ def sort_by_counting(state):
         rank_rows(state)
     candidates, rank, count = state.candidates, state.bodies.rank, state.candidates.count
     first, second, starts = candidates.first, candidates.second, candidates.starts
+    stop = state.count + 1
     half_a, half_b = candidates.half_a, candidates.half_b
-    for i in range(state.count + 1):
+    for i in range(stop):
         starts[i] = 0
     for c in range(count):
         starts[max(rank[first[c]], rank[second[c]]) + 1] += 1
-    for i in range(1, state.count + 1):
+    for i in range(1, stop):
         starts[i] += starts[i - 1]
     for c in range(count):
         a, b = first[c], second[c]
@@ -85,11 +86,11 @@ def sort_by_counting(state):
         k = starts[rank[b]]
         starts[rank[b]] += 1
         half_a[k], half_b[k] = a, b
-    for i in range(state.count + 1):
+    for i in range(stop):
         starts[i] = 0
     for c in range(count):
         starts[rank[half_a[c]] + 1] += 1
-    for i in range(1, state.count + 1):
+    for i in range(1, stop):
         starts[i] += starts[i - 1]
     for c in range(count):
         k = starts[rank[half_a[c]]]
