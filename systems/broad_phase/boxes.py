@@ -117,12 +117,12 @@ def follow_static_places(state):
 
 
 @part
-def hold_turns(state, turns, share):
-    """Boxes of what moves hold what it sweeps by turning, by that ``share`` of ``turns``, and as far as motors may turn
-    it: they are those of shapes as they are turned where the step ends."""
+def hold_turns(state, start, stop):
+    """Boxes hold what bodies sweep by turning, and as far as motors may turn them: they are those of shapes as they are
+    turned where the step ends."""
     bodies = state.bodies
-    for i in range(state.first, state.moving if state.spinning else 0):
-        angle, driven = size_of_turn(turns[i]) * share, driven_travel(state, i)
+    for i in range(start, stop):
+        angle, driven = size_of_turn(bodies.turn[i]), driven_travel(state, i)
         turned = angle > 0.0 and bodies.rolling_radius[i] == 0.0
         if turned or driven > 0.0:
             way = (min(angle, 2.0) * bodies.reach[i] if turned else 0.0) + driven
@@ -145,7 +145,6 @@ def box_rows(state, start, stop, motion):
         starts = bodies.previous_position
     if motion == SEARCHING:
         starts, ends = bodies.search_lower, bodies.search_upper
-    lower, upper = bodies.lower, bodies.upper
     thinnest = find_extents(state, 0, start, stop)
     for i in range(start, stop):
         low, high = box_level(state, 0, i, starts[i], ends[i])
@@ -157,8 +156,8 @@ def box_rows(state, start, stop, motion):
         for i in range(start, stop):
             low, high = box_level(state, level, i, starts[i], ends[i])
             lower[i], upper[i] = smaller(lower[i], low), larger(upper[i], high)
-    if motion == MOVING:
-        hold_turns(state, bodies.turn, 1.0)
+    if state.spinning and motion in (MOVING, SEARCHING):
+        hold_turns(state, start, stop)
     if motion == STANDING:
         state.thinnest_static = min(state.thinnest_static, thinnest)
     elif motion != STAYING:
@@ -225,7 +224,6 @@ def bound_searches(state, now, dt):
         for i in range(state.first, state.moving):
             bodies.search_upper[i] = place_at(state, i, min(state.neighbours_known_until, dt), dt)
         box_rows(state, state.first, state.moving, SEARCHING)
-        hold_turns(state, bodies.spin, dt - now)
     for i in range(state.first, state.moving):
         margin = bodies.search_margin[i]
         give = margin + GIVE * bodies.min_extent[i]

@@ -13,7 +13,7 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.elementary import power
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, add_scaled, dot, item, length, replace, sub
+from ...framework.vectors import add, add_scaled, item, length, replace, sub
 from ..codes import OK
 from ..integration.trajectory import along, bend_of, centre_at, path_of, rate_along, relative_path, travel_of
 from ..linking.parts import FIRST_TOUCH, call_first_touch
@@ -84,24 +84,19 @@ def has_search_bounds(state, i, speed, span):
 
 @part
 def leaves_bounds_at(state, i, now, dt):
-    """The time at which a body that goes on from here may leave its search bounds; infinity: not in this step. What its
-    new spin may add is taken off these."""
+    """The time at which a body that goes on from here may leave its search bounds; infinity: not in this step."""
     bodies, path, span = state.bodies, path_of(state, i), dt - now
     at, v = along(path, now), rate_along(path, now)
     bend = bend_of(add_scaled(path[2], path[3], 3.0 * now), path[3], span)
-    turning = way_of_turning(bodies, i, bodies.spin[i]) if state.spinning else 0.0
-    if not has_search_bounds(state, i, length(v) + turning, span):
+    if not has_search_bounds(state, i, length(v), span):
         return math.inf
     left = math.inf
     lower, upper = bodies.search_lower[i], bodies.search_upper[i]
     for k in range(len(v)):
         speed = item(v, k)
-        below, above = item(at, k) - item(lower, k), item(upper, k) - item(at, k)
-        room = (above if speed > 0.0 else below) - bend
-        if min(room, below, above) < 0.0:
-            return now
+        room = (item(upper, k) - item(at, k) if speed > 0.0 else item(at, k) - item(lower, k)) - bend
         if not room >= abs(speed) * span:
-            left = min(left, room / abs(speed))
+            left = min(left, max(0.0, room / abs(speed)))
     return now + left
 
 
@@ -141,9 +136,15 @@ def width_that_holds(share, extents):
 
 
 @part
+def speed_at(state, i, now):
+    """A body's speed on its path."""
+    return length(rate_along(path_of(state, i), now))
+
+
+@part
 def measure_crowd(state, now):
     """(mean kinetic energy of the dynamic bodies with a shape, bodies with a shape, extents of their places); notes
-    each one's speed, with that of its points, in search_margin. Places are in ``search_lower``."""
+    each one's speed in search_margin. Places are in ``search_lower``."""
     bodies = state.bodies
     margin, inverse_mass = bodies.search_margin, bodies.inverse_mass
     energy, weighed, shaped = 0.0, 0, 0
@@ -156,10 +157,7 @@ def measure_crowd(state, now):
             lowest = replace(lowest, k, min(item(lowest, k), item(x, k) if known else math.inf))
             highest = replace(highest, k, max(item(highest, k), item(x, k) if known else -math.inf))
         shaped += known
-        v, turning = rate_along(path_of(state, i), now), 0.0
-        if state.spinning:
-            turning = way_of_turning(bodies, i, bodies.spin[i])
-        margin[i] = math.sqrt(dot(v, v) + turning * turning)
+        margin[i] = speed_at(state, i, now)
         if inverse_mass[i] > 0.0 and known:
             energy += 0.5 * margin[i] * margin[i] / inverse_mass[i]
             weighed += 1
@@ -196,7 +194,7 @@ def find_margins(state, now, span):
     largest = 0.5 * width_that_holds(CROWD / max(1, wide), extents)
     speeds, fast = 0.0, 0
     for i in range(state.first, state.moving):
-        speed = length(rate_along(path_of(state, i), now))
+        speed = speed_at(state, i, now)
         if shape[i] >= 0 and speed * span > largest:
             speeds += speed
             fast += 1

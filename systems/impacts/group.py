@@ -233,19 +233,19 @@ def solve_group_friction(state, count):
     Bodies are taken to be split among their impacts, so that these together never do more than stop what slides.
     """
     impacts, pairs, rubs = state.impacts, state.pairs, False
-    inverse_mass, member = state.bodies.inverse_mass, impacts.member
+    inverse_mass = state.bodies.inverse_mass
     for g in range(count):
         m = impacts.group[g]
-        c = impacts.event_pair[member[m]]
-        a, b, normal = pairs.a[c], pairs.b[c], impacts.event_normal[member[m]]
-        touch = touch_of_event(state, member[m])
+        c = impacts.event_pair[impacts.member[m]]
+        a, b, normal = pairs.a[c], pairs.b[c], impacts.event_normal[impacts.member[m]]
+        touch = touch_of_event(state, impacts.member[m])
         mu, impacts.friction_impulse[m] = friction_at(state, a, b, touch), zero_of(state)
         if mu > 0.0 and impacts.ahead[m] > 0.0:
             w = slip_at(state, a, b, rate_along(relative_path(state, a, b), impacts.now), touch)
             w = add(w, sub(impacts.gained[owner_of(state, b)], impacts.gained[owner_of(state, a)]))
             arms = normal, normal
             if state.spinning:
-                arms = arms_of(state, member[m])
+                arms = arms_of(state, impacts.member[m])
                 w = add(w, velocity_by_spin(state.bodies, a, b, arms))
             sliding = add_scaled(w, normal, -dot(w, normal))
             fast, light = length(sliding), 0.0

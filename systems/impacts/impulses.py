@@ -41,7 +41,7 @@ def deflect(state, i, dv, now, dt):
     acting = dt - now if state.path_degree > 1 else dt * state.moves_with_old_velocity
     if state.impacts.sweeps and state.mode == EVENT_DRIVEN:
         acting = 0.5 * dt
-    velocity, fading = bodies.linear_velocity, bodies.total_damping[i] * acting
+    fading = bodies.total_damping[i] * acting
     decay = exp(-fading) if fading > 0.0 else 1.0
     while i >= 0:
         if bodies.impact_count[i] >= STOPPED:

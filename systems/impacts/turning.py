@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
-from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, scale, shifted, sub
+from ...framework.vectors import add, add_scaled, divided, dot, item, length, replace, scale, sub
 from ..codes import OK
 from ..integration.trajectory import along, path_of
 from ..integration.turning import arms_to, change_of_spin, compliance, cross_spin, lever, twist, velocity_by_spin
@@ -127,14 +127,9 @@ def kinematic_normal_speed(state, event):
 
 @part
 def add_spin(state, i, change, left):
-    """Body i turns by so much faster for what is left of the step: as far as that leads its points from where they were
-    foreseen its centre has to stay farther within its search bounds."""
+    """Body i turns by so much faster for what is left of the step."""
     bodies, i = state.bodies, owner_of(state, i) if length(change) > 0.0 else -1
     while i >= 0:
-        way = left * length(change) * bodies.reach[i]
-        if state.impacts.sweeps and way > 0.0 and bodies.rolling_radius[i] == 0.0:
-            bodies.search_lower[i] = shifted(bodies.search_lower[i], way)
-            bodies.search_upper[i] = shifted(bodies.search_upper[i], -way)
         if has_unequal_moments(state, i):
             rotate_pose(state, i, bodies.spin[i], -left)
             bodies.spin[i] = add(bodies.spin[i], change)
