@@ -141,6 +141,7 @@ def box_rows(state, start, stop, motion):
     A box holds every level, so that what the first one meets is looked at.
     """
     bodies, starts, ends = state.bodies, state.bodies.position, state.bodies.position
+    lower, upper = bodies.lower, bodies.upper
     if motion == MOVING and state.moved:
         starts = bodies.previous_position
     if motion == SEARCHING:

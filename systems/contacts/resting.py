@@ -187,8 +187,8 @@ def still_bounces(state, dt, c, depth, normal):
 
     Notes in pairs.parting how it parts.
     """
-    pairs, bodies, a, b = state.pairs, state.bodies, state.pairs.a[c], state.pairs.b[c]
-    velocity = bodies.linear_velocity
+    pairs, bodies = state.pairs, state.bodies
+    a, b, velocity = pairs.a[c], pairs.b[c], bodies.linear_velocity
     e = restitution_at(state, a, b, (pairs.point[c], pairs.normal[c], pairs.at[c]))
     if not e > 0.0:
         return False

@@ -105,7 +105,7 @@ def lands_before(state, event):
     list_landings(state, c, now)
     if impacts.listed == 0:
         return False
-    requeue(impacts, event, impacts.waiting)
+    requeue(impacts, event)
     impacts.touchdown_pair, impacts.touchdown_time = c, now
     return True
 

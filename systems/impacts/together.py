@@ -19,7 +19,7 @@ from ..joints.groups import is_joined
 from ..parts.rows import owner_of
 from .group import LEAST_PASSES, WORK, is_shooting, is_turning_group, push_group, solve_group
 from .heap import heap_pop, heap_push, is_current
-from .impulses import CROSSING, bounce_pair, note_crossing
+from .impulses import HALT, HAND_OVER, IMPACT, bounce_pair, note_crossing
 from .worklist import list_landings, list_pairs_of
 
 EQUAL = 1e-6  # of the step: times that differ by more are never the same, however slow the approach
@@ -40,51 +40,37 @@ def is_at(state, event, now, dt):
 
 
 @part
-def requeue(impacts, event, place):
-    """Add an event to the queue again that has been taken off it, and is in that place of ``heap`` or behind it;
-    returns the one behind its own."""
-    while impacts.heap[place] != event:
-        place += 1
-    heap_push(impacts, place)
-    return place + 1
+def next_at(state, now, dt):
+    """The earliest impact in the queue that holds, if its time is ``now``, else -1; it stays there. Crossings before it
+    are noted, as they change no path."""
+    impacts = state.impacts
+    while impacts.waiting > 0:
+        event = impacts.heap[0]
+        c, kind, time = impacts.event_pair[event], impacts.event_kind[event], impacts.event_time[event]
+        if time - now > EQUAL * dt or (impacts.sweeps and time > impacts.until):
+            return -1
+        if is_current(state, event):
+            joined = is_joined(state, state.pairs.a[c], state.pairs.b[c])
+            if kind in (HAND_OVER, HALT) or joined or not is_at(state, event, now, dt):
+                return -1
+            if kind == IMPACT:
+                if not impacts.may_sink:
+                    return event
+                list_landings(state, c, time)
+                sinks, impacts.listed = impacts.listed > 0, 0
+                return -1 if sinks else event
+            note_crossing(state, event)
+        heap_pop(impacts)
+    return -1
 
 
 @part
-def collect_members(state, event, most, dt):
-    """Take off the queue the impacts at the time of ``event``, into ``member``, which begins with it; returns how many.
-
-    Crossings at that time are noted, as they change no path. What else comes within EQUAL waits once more: it does not
-    part those of one time, wherever it is. There are ``most`` of all.
-    """
-    impacts, pairs, members, others = state.impacts, state.pairs, 1, most
-    member, now = impacts.member, impacts.now
-    member[0] = event
-    while impacts.waiting > 0:
-        following = impacts.heap[0]
-        c, kind, time = impacts.event_pair[following], impacts.event_kind[following], impacts.event_time[following]
-        if time - now > EQUAL * dt or (impacts.sweeps and time > impacts.until):
-            break
-        heap_pop(impacts)
-        if not is_current(state, following):
-            continue
-        joins = kind <= CROSSING and is_at(state, following, now, dt)
-        if joins and kind == CROSSING:
-            note_crossing(state, following)
-            continue
-        joins = joins and not is_joined(state, pairs.a[c], pairs.b[c])
-        if joins and impacts.may_sink:
-            list_landings(state, c, time)
-            joins, impacts.listed = impacts.listed == 0, 0
-        if joins:
-            member[members] = following
-            members += 1
-        else:
-            others -= 1
-            member[others] = following
+def requeue(impacts, event):
+    """Add an event to the queue again that has been taken off it."""
     place = impacts.waiting
-    for k in range(others, most):  # the last one off the queue is found first
-        place = requeue(impacts, member[k], place)
-    return members
+    while impacts.heap[place] != event:
+        place += 1
+    heap_push(impacts, place)
 
 
 def resolve_simultaneous(state, event, dt):
@@ -93,18 +79,25 @@ def resolve_simultaneous(state, event, dt):
     Returns OK; NEED_ROOM if there is no room, and nothing has changed then; -1 if there is none besides it, or no
     work left for groups, or joints hold its bodies: such impacts come one after the other.
     """
-    impacts, c, most = state.impacts, state.impacts.event_pair[event], 1
-    if impacts.group_visits >= WORK or is_joined(state, state.pairs.a[c], state.pairs.b[c]):
+    impacts, now, c = state.impacts, state.impacts.event_time[event], state.impacts.event_pair[event]
+    if is_joined(state, state.pairs.a[c], state.pairs.b[c]):
         return -1
+    if impacts.group_visits >= WORK or next_at(state, now, dt) < 0:
+        return -1
+    most = 1
     for k in range(impacts.waiting):
-        most += impacts.event_time[impacts.heap[k]] - impacts.now <= EQUAL * dt
+        most += impacts.event_time[impacts.heap[k]] - now <= EQUAL * dt
     room = min(len(impacts.member), len(impacts.next_member) // 2, len(impacts.log_pair) - impacts.logged)
     if most > room or state.count > len(impacts.first_member):
         impacts.together = most
         return NEED_ROOM
-    members = collect_members(state, event, most, dt)
-    if members == 1:
-        return -1
+    members, following = 0, event
+    while following >= 0:
+        impacts.member[members] = following
+        members += 1
+        following = next_at(state, now, dt)
+        if following >= 0:
+            heap_pop(impacts)
     link_members(state, members)
     for m in range(members):
         if impacts.is_left[m]:
@@ -141,22 +134,21 @@ def link_members(state, members):
 def find_group(state, m):
     """Write into ``group`` member m and all that bodies which can be moved connect with it; returns how many."""
     impacts, pairs, inverse_mass, done, reached = state.impacts, state.pairs, state.bodies.inverse_mass, 0, 1
-    group, is_left = impacts.group, impacts.is_left
-    group[0], is_left[m] = m, False
+    impacts.group[0], impacts.is_left[m] = m, False
     while done < reached:
-        c = impacts.event_pair[impacts.member[group[done]]]
+        c = impacts.event_pair[impacts.member[impacts.group[done]]]
         done += 1
         for i in (owner_of(state, pairs.a[c]), owner_of(state, pairs.b[c])):
             entry = impacts.first_member[i] if inverse_mass[i] > 0.0 else -1
             while entry >= 0:
-                if is_left[entry // 2]:
-                    is_left[entry // 2] = False
-                    group[reached] = entry // 2
+                if impacts.is_left[entry // 2]:
+                    impacts.is_left[entry // 2] = False
+                    impacts.group[reached] = entry // 2
                     reached += 1
                 entry = impacts.next_member[entry]
     for g in range(reached):  # canonical order, for the log
-        impacts.terms[group[g]] = impacts.event_key[impacts.member[group[g]]]
-    sort_by(group, reached, impacts.terms)
+        impacts.terms[impacts.group[g]] = impacts.event_key[impacts.member[impacts.group[g]]]
+    sort_by(impacts.group, reached, impacts.terms)
     return reached
 
 
@@ -183,7 +175,7 @@ def take_group(state, m, dt):
     else:
         for g in range(count - 1, -1, -1):  # the last one off the queue is found first
             if impacts.group[g] != m:
-                requeue(impacts, impacts.member[impacts.group[g]], impacts.waiting)
+                requeue(impacts, impacts.member[impacts.group[g]])
         bounce_pair(state, first, dt)
     for k in range(logged, impacts.logged):
         c, listed = impacts.log_pair[k], -1
