@@ -35,6 +35,7 @@ from ..narrow_phase.one_way import is_one_way
 from ..narrow_phase.stages import is_solid_pair, layers_meet
 from ..parts.rows import next_row, owner_of
 from ..shapes.tolerances import SAME_PLACE, smaller_extent, way_of_turning
+from .bodies import rows_at_rest
 from .resting import first_touch_on_segment, segment_start
 from .solving.records import SQUEEZED, note_fault
 
@@ -116,6 +117,8 @@ def push_out(state, dt, c, a, b):
         bodies.position[k] = add_scaled(bodies.position[k], normal, sign * far)
         if closing < 0.0:
             velocities[k] = add_scaled(velocities[k], normal, -sign * closing)
+            if rows_at_rest(state) > 0:  # what held it does not push it there again
+                bodies.held_velocity[k] = velocities[k]
         k = next_row(state, k)
     return far
 

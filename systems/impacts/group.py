@@ -88,13 +88,13 @@ def sum_pushes(state, i, rubs):
 @part
 def push_bodies(state, count, rubs):
     """Write into ``gained`` what the impulses of the group give each of its bodies."""
-    impacts, pairs, inverse_mass = state.impacts, state.pairs, state.bodies.inverse_mass
+    impacts, pairs = state.impacts, state.pairs
     for g in range(count):
         m = impacts.group[g]
         c = impacts.event_pair[impacts.member[m]]
         for side in range(2):
             i = owner_of(state, pairs.a[c] if side == 0 else pairs.b[c])
-            if inverse_mass[i] > 0.0 and impacts.first_member[i] == 2 * m + side:  # once each
+            if impacts.first_member[i] == 2 * m + side:  # once each
                 impacts.gained[i] = sum_pushes(state, i, rubs)
 
 
@@ -126,11 +126,8 @@ def solve_group(state, count):
     for g in range(count):
         m = group[g]
         c = impacts.event_pair[impacts.member[m]]
-        a, b, heavy = owner_of(state, pairs.a[c]), owner_of(state, pairs.b[c]), 0.0
-        if inverse_mass[a] > 0.0:
-            heavy += inverse_mass[a] * count_coupled(state, m, a)
-        if inverse_mass[b] > 0.0:
-            heavy += inverse_mass[b] * count_coupled(state, m, b)
+        a, b = owner_of(state, pairs.a[c]), owner_of(state, pairs.b[c])
+        heavy = inverse_mass[a] * count_coupled(state, m, a) + inverse_mass[b] * count_coupled(state, m, b)
         impacts.weight[m] = 1.0 / heavy
         share[m] = ahead[m] = 0.0
     inertia = 1.0
@@ -155,15 +152,14 @@ def solve_group(state, count):
 @part
 def improve_impulses(state, count):
     """A pass over all impacts of a group: (largest change, largest speed in it, whether the momentum leads back)."""
-    impacts, terms = state.impacts, state.impacts.terms
-    worst, largest = 0.0, 0.0
+    impacts, terms, worst, largest = state.impacts, state.impacts.terms, 0.0, 0.0
     for g in range(count):
         m = impacts.group[g]
         wanted, weight, ahead = impacts.event_change[impacts.member[m]], impacts.weight[m], impacts.ahead[m]
-        share = max(0.0, ahead + (wanted - gained_along(state, m)) * weight)
+        before, share = impacts.share[m], max(0.0, ahead + (wanted - gained_along(state, m)) * weight)
         worst, largest = max(worst, abs(share - ahead) / weight), max(largest, wanted, share / weight)
-        terms[g] = (ahead - share) * (share - impacts.share[m]) / weight
-        impacts.before[m], impacts.share[m] = impacts.share[m], share
+        terms[g] = (ahead - share) * (share - before) / weight
+        impacts.before[m], impacts.share[m] = before, share
     return worst, largest, exact_sum(terms, count) > 0.0
 
 
@@ -208,11 +204,11 @@ def is_ejected(state, i):
 @part
 def is_shooting(state, count):
     """Whether a body of the group that has been solved is shot out."""
-    impacts, pairs, inverse_mass, any_shot = state.impacts, state.pairs, state.bodies.inverse_mass, False
+    impacts, pairs, any_shot = state.impacts, state.pairs, False
     for g in range(count):
         c = impacts.event_pair[impacts.member[impacts.group[g]]]
         for i in (owner_of(state, pairs.a[c]), owner_of(state, pairs.b[c])):
-            any_shot |= inverse_mass[i] > 0.0 and is_ejected(state, i)
+            any_shot |= is_ejected(state, i)
     return any_shot
 
 
@@ -233,25 +229,25 @@ def solve_group_friction(state, count):
     Bodies are taken to be split among their impacts, so that these together never do more than stop what slides.
     """
     impacts, pairs, rubs = state.impacts, state.pairs, False
-    inverse_mass = state.bodies.inverse_mass
+    inverse_mass, group, member = state.bodies.inverse_mass, impacts.group, impacts.member
     for g in range(count):
-        m = impacts.group[g]
-        c = impacts.event_pair[impacts.member[m]]
-        a, b, normal = pairs.a[c], pairs.b[c], impacts.event_normal[impacts.member[m]]
-        touch = touch_of_event(state, impacts.member[m])
+        m = group[g]
+        c = impacts.event_pair[member[m]]
+        a, b, normal = pairs.a[c], pairs.b[c], impacts.event_normal[member[m]]
+        touch = touch_of_event(state, member[m])
         mu, impacts.friction_impulse[m] = friction_at(state, a, b, touch), zero_of(state)
         if mu > 0.0 and impacts.ahead[m] > 0.0:
             w = slip_at(state, a, b, rate_along(relative_path(state, a, b), impacts.now), touch)
             w = add(w, sub(impacts.gained[owner_of(state, b)], impacts.gained[owner_of(state, a)]))
             arms = normal, normal
             if state.spinning:
-                arms = arms_of(state, impacts.member[m])
+                arms = arms_of(state, member[m])
                 w = add(w, velocity_by_spin(state.bodies, a, b, arms))
             sliding = add_scaled(w, normal, -dot(w, normal))
             fast, light = length(sliding), 0.0
             for side in range(2 if fast > 0.0 else 0):
                 i, arm, turning = (a, arms[0], 0.0) if side == 0 else (b, arms[1], 0.0)
-                entry = impacts.first_member[owner_of(state, i)] if inverse_mass[i] > 0.0 else -1
+                entry = impacts.first_member[owner_of(state, i)]
                 if state.spinning:
                     turning = compliance(state.bodies, i, arm, divided(sliding, fast))
                 while entry >= 0:
@@ -266,30 +262,30 @@ def solve_group_friction(state, count):
 def push_group(state, count, dt):
     """Give the bodies of a group their impulses, all at once, and note these."""
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
-    inverse_mass = bodies.inverse_mass
+    inverse_mass, group, member, now = bodies.inverse_mass, impacts.group, impacts.member, impacts.now
     rubs = solve_group_friction(state, count)
     if rubs:
         push_bodies(state, count, True)
     for g in range(count if rubs and state.spinning else 0):
-        m = impacts.group[g]
-        event = impacts.member[m]
+        m = group[g]
+        event = member[m]
         call_turn_by_impact(state.links[TURN_BY_IMPACT], state, event, 0.0, impacts.friction_impulse[m], dt)
     for g in range(count):
-        m = impacts.group[g]
-        event = impacts.member[m]
+        m = group[g]
+        event, impulse = member[m], impacts.ahead[m]
         c = impacts.event_pair[event]
         for side in range(2):
             i = owner_of(state, pairs.a[c] if side == 0 else pairs.b[c])
-            if inverse_mass[i] > 0.0 and impacts.first_member[i] == 2 * m + side:
-                deflect(state, i, impacts.gained[i], impacts.now, dt)
-            if inverse_mass[i] > 0.0 and impacts.ahead[m] > 0.0:
+            if impacts.first_member[i] == 2 * m + side:
+                deflect(state, i, impacts.gained[i], now, dt)
+            if inverse_mass[i] > 0.0 and impulse > 0.0:
                 count_impact(state, i, is_counted(state, event))
-        if impacts.ahead[m] > 0.0:
-            impacts.event_time[event] = impacts.now
-            log_impact(state, event, impacts.ahead[m])
+        if impulse > 0.0:
+            impacts.event_time[event] = now
+            log_impact(state, event, impulse)
     for strikes_mover in range(2 if impacts.sweeps else 0):
         for g in range(count):
-            c = impacts.event_pair[impacts.member[impacts.group[g]]]
+            c = impacts.event_pair[member[group[g]]]
             a, b = pairs.a[c], pairs.b[c]
             for i in (a, b):
                 still = is_immovable(bodies, a + b - i)

@@ -56,23 +56,23 @@ def begin_impacts(state, dt):
     impacts.active, impacts.end = False, dt
     if state.response_idle:
         return OK
-    impacts.sweeps = state.sweeping and state.moved
+    impacts.sweeps = sweeps = state.sweeping and state.moved
     for i in range(state.first, state.moving):
         bodies.impact_count[i], bodies.counted_impacts[i] = 0, 0
     for c in range(pairs.count):
         pairs.crossed[c] = False
-    if pairs.found == 0 and not state.any_warm_started and not (impacts.sweeps and state.neighbours_known_until < dt):
+    if pairs.found == 0 and not state.any_warm_started and not (sweeps and state.neighbours_known_until < dt):
         return OK
-    impacts.active = impacts.sweeps or any_restitution(state)
-    impacts.may_sink = impacts.sweeps and may_sink(state, dt)
-    if impacts.sweeps:
+    impacts.active = sweeps or any_restitution(state)
+    impacts.may_sink = sweeps and may_sink(state, dt)
+    if sweeps:
         known = impacts.swept_version == state.version  # impacts change nothing of static bodies
         for i in range(state.first if known else 0, state.moving if known else state.count):
             bodies.trapped_impacts[i], bodies.last_impact[i] = 0, -1.0
         impacts.swept_version = state.version
     impacts.waiting, impacts.listed, impacts.pending = 0, UNLISTED, -1
     impacts.linked, impacts.touchdown_pair, impacts.touchdown_time = False, -1, 0.0
-    impacts.until = state.neighbours_known_until if impacts.sweeps else math.inf
+    impacts.until = state.neighbours_known_until if sweeps else math.inf
     return NEED_IMPACTS if impacts.active and state.links[FIRST_TOUCH] == 0 else OK
 
 
@@ -172,13 +172,13 @@ def end_worklist(state, dt):
 @part
 def search_worklist(state, dt, far):
     """Queue the next impact of each of its pairs; then it is empty."""
-    impacts, pairs = state.impacts, state.pairs
-    impacts.looked += impacts.listed
-    for q in range(min(AHEAD, impacts.listed) if far else 0):
+    impacts, pairs, listed = state.impacts, state.pairs, state.impacts.listed
+    impacts.looked += listed
+    for q in range(min(AHEAD, listed) if far else 0):
         request_bodies(state, impacts.worklist[q])
-    for q in range(impacts.listed):
+    for q in range(listed):
         c = impacts.worklist[q]
-        if far and q + AHEAD < impacts.listed:
+        if far and q + AHEAD < listed:
             request_bodies(state, impacts.worklist[q + AHEAD])
         if pairs.is_solid[c] or impacts.sweeps:
             queue_next_impact(state, c, impacts.listed_since[q], dt)

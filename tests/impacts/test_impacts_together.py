@@ -11,6 +11,7 @@ from helpers_pairwise import pairwise
 from worlds import both_dimensions
 
 from carom.lab import testing as kit
+from carom.plugins.joints import Distance, Joints
 from carom.systems.impacts.group import WORK
 
 each_collision = pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
@@ -70,6 +71,30 @@ def test_a_rack_of_fifteen(mode, restitution, gap):
     for _ in range(2):
         again = play(balls, mode, 100, order=rng.permutation(16))
         np.testing.assert_array_equal(again, states)
+
+
+@each_collision
+@pytest.mark.parametrize("speed", [8.0, 4.0], ids=["struck", "lands"])
+def test_what_else_comes_at_that_time_parts_none(mode, speed):
+    """A mirrored start stays one, to the bit, where a ball on a rope is struck 1,024 m away at that same time, or one
+    lands that is too slow to bounce."""
+    e = {"radius": 0.625, "restitution": 1.0}
+    balls = [((0.0, 0.75), (0.0, 0.0), e), ((1024.0, 0.75), (0.0, 0.0), e), ((0.0, -0.75), (0.0, 0.0), e),
+             ((1023.0 - 4.0625 * speed / 8, 0.0), (speed, 0.0), e), ((-5.0625, 0.0), (8.0, 0.0), e)]  # fmt: skip
+    threshold = 3.3 if speed < 8.0 else 0.0  # times 0.8, the cosine at the touch
+    near = play(balls[::2], mode, 60, dt=1 / 64, restitution_threshold=threshold)
+    world = kit.make_world(collision=mode, dt=1 / 64, restitution_threshold=threshold)
+    world.add_plugin(Joints())
+    ids = [kit.ball(world, place, velocity, **e) for place, velocity, e in balls]
+    if speed == 8.0:
+        world.create_entity(Distance(None, ids[1], point_a=(1024.0, 3.0)))
+    for _ in range(60):
+        world.step()
+    states = np.array([[kit.position(world, i), kit.velocity(world, i)] for i in ids[::2]])
+    assert np.abs(states[1, 1]).min() > 3.0
+    np.testing.assert_array_equal(states[0], states[1] * (1.0, -1.0))
+    np.testing.assert_array_equal(states, near[-1])
+    world.close()
 
 
 @pytest.mark.slow

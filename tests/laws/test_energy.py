@@ -73,6 +73,9 @@ def check(rise):
     assert rise.run <= RUN
 
 
+# Once gained up to 1.28 times: what a wall had stopped was foreseen to be pushed into it once more, and bounced.
+FOUND = [(51, "event_driven", 0.3, 1000.0, 60, 4), (20, "event_driven", 0.8, 1000.0, 60, 1),
+         (1156, "continuous", 0.3, 1000.0, 60, 1), (1134, "event_driven", 0.0, 1000.0, 20, 8)]  # fmt: skip
 PAIRED = pairwise(MODES, RESTITUTIONS, MASSES, RATES, SUBSTEPS)
 EVERY = [
     (seed, *case)
@@ -88,6 +91,11 @@ def test_rooms_gain_nothing(mode, e, masses, rate, substeps):
 @pytest.mark.long
 @pytest.mark.parametrize(("seed", "mode", "e", "masses", "rate", "substeps"), EVERY)
 def test_every_room_gains_nothing(seed, mode, e, masses, rate, substeps):
+    check(room(seed, mode, e, masses, rate, substeps))
+
+
+@pytest.mark.parametrize(("seed", "mode", "e", "masses", "rate", "substeps"), FOUND)
+def test_rooms_that_gained(seed, mode, e, masses, rate, substeps):
     check(room(seed, mode, e, masses, rate, substeps))
 
 
