@@ -15,6 +15,7 @@ from ..forces.stages import is_zero
 from ..impacts.impulses import STOPPED, is_beyond_cap, is_trapped
 from ..integration.trajectory import ROUNDING, along, relative_path
 from ..integration.turning import arms_to, closing_by_spin, is_turned, size_of_turn
+from ..joints.groups import is_joined
 from ..linking.parts import ARMS_AT_REST, TOUCH_OF_TURN, call_of_step, call_touch_of_turn
 from ..narrow_phase.manifolds import (
     centre_offset,
@@ -213,10 +214,14 @@ def still_bounces(state, dt, c, depth, normal):
         return True  # the next step's impact
     if speed > 0.0:
         pairs.parting[c] = SEPARATES if speed > threshold and speed * dt > slop else SEPARATES_SLOWLY
-    if pairs.impulse[c] > 0.0 and speed > threshold:
-        before, _ = depth_at(state, c, centre_offset_at_start(bodies, a, b), extent, True)
-        return before < 0.0  # on its way out
     return False
+
+
+@inlined
+def is_borne(state, i):
+    """Whether contacts have held row i in the last step."""
+    bodies, k = state.bodies, owner_of(state, i)
+    return bodies.warm_started[k] and not (is_joined(state, k, k) and bodies.swings[k])
 
 
 @part
@@ -225,15 +230,18 @@ def is_resting(state, dt, c):
     pairs, bodies, count = state.pairs, state.bodies, state.bodies.impact_count
     near_contact = pairs.near_contact
     a, b = pairs.a[c], pairs.b[c]
-    if count[a] >= STOPPED or count[b] >= STOPPED:
+    if max(count[a], count[b]) >= STOPPED:
         near_contact[c] = True  # they may touch where they are now
         return False
-    hit, carried = count[a] > 0 or count[b] > 0, bodies.warm_started[a] or bodies.warm_started[b]
+    hit, carried = count[a] + count[b] > 0, bodies.warm_started[a] or bodies.warm_started[b]
     if not near_contact[c] and not hit and not carried:
         return False
     d = centre_offset(bodies, a, b)
     turns = state.spinning and turns_far(state, a, b)
-    if turns and state.impacts.sweeps and pairs.impulse[c] > 0.0 and restitution_of(state, a, b) > 0.0:  # it has left
+    struck, parts = pairs.impulse[c] > 0.0, STATIONARY
+    if struck and (is_borne(state, a) or is_borne(state, b)):  # what bears one may send it back to the other
+        parts = SEPARATES
+    elif struck and turns and state.impacts.sweeps and restitution_of(state, a, b) > 0.0:  # it has left
         return False
     if pairs.early[c] and not hit and not turns and is_at_manifold(pairs, c, d, smaller_extent(bodies, a, b)):  # usual
         depth, normal, far = depth_by_plane(pairs, c, d), pairs.normal[c], False
@@ -249,12 +257,13 @@ def is_resting(state, dt, c):
                 if before >= -margin:
                     depth, normal, far = before, across, True
     was_near = near_contact[c] and has_manifold(pairs, c)  # not so pairs that were found within the step
-    if depth < 0.0 and (hit or turns or not was_near) and depth < -turning_margin(state, dt, a, b):
+    stays = depth >= 0.0 or parts != STATIONARY or (was_near and not hit and not turns)
+    if not stays and depth < -turning_margin(state, dt, a, b):
         return False  # else it may have been pushed too much by the prediction
     if depth >= 0.0:
         near_contact[c] = True
-    pairs.parting[c] = STATIONARY
-    if state.impacts.active and still_bounces(state, dt, c, depth, normal):
+    pairs.parting[c] = parts
+    if state.impacts.active and parts == STATIONARY and still_bounces(state, dt, c, depth, normal):
         return False
     return far or not meets_at_corner(state, a, b, d, (depth, normal), slop_of(state, a, b))
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from ...framework.compilation import inlined, part
 from ..ccd.search_bounds import FAST, leaves_bounds_at
+from ..narrow_phase.manifolds import forget_manifold
 from ..parts.rows import next_row, owner_of
 from ..shapes.tolerances import smaller_extent
 from .find import bounce_threshold
@@ -60,7 +61,8 @@ def link_pairs(state):
 
 @part
 def list_pairs_of(state, i, but, dt):
-    """Body i goes on from an impact: list its pairs but one from now on, and note when it may leave its bounds."""
+    """Body i goes on from an impact: list its pairs but one from now on, and note when it may leave its bounds. What is
+    known of them was with the shape as it was turned before."""
     impacts, bodies = state.impacts, state.bodies
     i = owner_of(state, i)
     k = i if impacts.sweeps and bodies.impact_count[i] < STOPPED else -1
@@ -72,8 +74,11 @@ def list_pairs_of(state, i, but, dt):
         link_pairs(state)
     entry = impacts.heads[i]
     while entry >= 0:
-        if entry // 2 != but:
-            list_pair(impacts, entry // 2, impacts.now)
+        c = entry // 2
+        if state.spinning:
+            forget_manifold(state.pairs, c)
+        if c != but:
+            list_pair(impacts, c, impacts.now)
         entry = impacts.links[entry]
 
 

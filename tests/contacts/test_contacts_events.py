@@ -137,7 +137,7 @@ def test_impacts_are_told_without_the_system_of_events():
             if isinstance(system, removed):
                 world.remove_system(system)
         told.append([])
-        for _ in range(12):
+        for _ in range(16):
             world.advance(4 / 60)
             told[-1] += [(one.step, one.entity_a, one.entity_b) for one in world.contacts.impacts]
     assert told[0] == told[1]

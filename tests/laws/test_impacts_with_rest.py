@@ -10,9 +10,13 @@ import math
 import numpy as np
 import pytest
 from helpers_pairwise import pairwise
-from helpers_rest import SLOP, G, energy, heights, overlaps, rows_of, speed, tower
+from helpers_rest import SLOP, G, depths, energy, heights, overlaps, rows_of, speed, tower
 from laws.helpers_laws import MODES, seeds
 from worlds import EPS, ball, both_dimensions, box, floor, make_world, position, run, velocity
+
+from carom import RigidBody, SphereCollider, Transform
+from carom.plugins.joints import Hinge, Joints
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 DT = 1 / 60
 
@@ -107,6 +111,41 @@ def test_a_stack_is_hit_from_above(d, e, deepest):
         assert overlaps(world, ids).max() < deepest
     assert speed(world) < 1e-9
     assert overlaps(world, ids).max() < SLOP
+
+
+@pytest.mark.parametrize(("mode", "mass", "e"), pairwise(MODES, (1.0, 10.0, 40.0, 100.0), (0.3, 0.8)))
+def test_a_heavy_ball_falls_on_a_plank_that_lies(mode, mass, e):
+    """Two metres onto a plank of 1 kg and .2 m, on a floor with e = 0: the floor stops both, and no energy comes in."""
+    with make_world(2, gravity=9.81, collision=mode, on_fault="ignore") as world:
+        floor(world)
+        box(world, (0.0, 0.1), half=(1.0, 0.1))
+        ball(world, (0.0, 2.5), radius=0.3, mass=mass, restitution=e)
+        least = energy(world)
+        for _ in range(150):
+            world.step()
+            now = energy(world)
+            assert now - least <= 1e-3 * mass * 9.81 * 2.0
+            least = min(least, now)
+            assert depths(world).max(initial=0.0) < 0.01
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("seed", seeds(2, 100, known=(10, 12, 93)))
+def test_a_see_saw_stays_above_the_ground(seed, mode):
+    """10 to 100 kg fall 1 to 12 m on one end of a hinged plank of 3.5 kg and .2 m: contacts at rest hold it."""
+    random = np.random.default_rng(seed)
+    mass, height, e = random.uniform(10, 100), random.uniform(1, 12), float(random.choice([0.1, 0.3, 0.5, 0.8]))
+    with make_world(2, gravity=9.81, collision=mode, on_fault="ignore") as world:
+        for plugin in (Rotation(), Joints()):
+            world.add_plugin(plugin)
+        ground = floor(world)
+        plank = world.create_entity(Transform((0, 1)), RigidBody(mass=3.5), Spin(), BoxCollider((4, 0.1), friction=0.7))
+        world.create_entity(Hinge(None, plank, anchor=(0, 1)))
+        place, fallen = (random.uniform(2.0, 3.8), 1 + height), SphereCollider(0.3, friction=0.7, restitution=e)
+        world.create_entity(Transform(place), RigidBody(mass=mass), Spin(), fallen)
+        for _ in range(130):
+            world.step()
+            assert max((c.depth for c in world.contacts if ground in (c.entity_a, c.entity_b)), default=0.0) < 0.05
 
 
 # -- rows ----------------------------------------------------------------------------------------

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from ....framework.compilation import part
 from ....framework.vectors import dot, sub
-from ...ccd.search_bounds import turns_far
 from ...integration.turning import is_turned
 from ...narrow_phase.manifolds import centre_offset, centre_offset_at_start
 from ..constants import NEGLIGIBLE, UNREACHED
@@ -59,9 +58,7 @@ def select_rigid(state, dt, nothing, arms):
             solver.hard[k] = hard
             any_apart |= hard and solver.apart[k]
             if hard and solver.apart[k]:
-                least = 0.0
-                if state.spinning and turns_far(state, solver.body_row[a], solver.body_row[b]):
-                    least = -separation_from_rotation(solver, k, arms)
+                least = min(0.0, -separation_from_rotation(solver, k, arms))
                 solver.gap[k] = max(least, solver.gap[k])  # faces that meet in the end do not overlap at the start
                 if closing_speed(solver, k, arms) < 0.0:  # the body has passed the corner
                     solver.impulse[k], solver.tangent[k] = 0.0, nothing
