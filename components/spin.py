@@ -17,6 +17,7 @@ from ..framework.vectors import item
 from .colliders import AABBCollider, Collider
 from .part_of import PartOf, rows_of_parts
 from .rigid_body import RigidBody, add_push, force_applied
+from .second_moments import moments_of
 
 UNKNOWN = "Spin.inertia is None, and it has no collider that tells it, or several: give a number"
 FASTEST_TURN = 1e150  # rad/s: squares of it are finite
@@ -246,9 +247,8 @@ def mass_of_shape(store: Any, row: Any) -> MassOfShape | None:
     colliders = [component for component in store.types_in(row) if issubclass(component, Collider)]
     if len(colliders) != 1 or not hasattr(colliders[0], "second_moments"):
         return None
-    shape: Any = object.__new__(colliders[0])
-    shape._bind(store, int(store.column("entity")[row]))
-    moments, offset = colliders[0].second_moments(shape, store.dimensions), np.array(shape.offset)  # type: ignore[attr-defined]
+    moments = moments_of(colliders[0], store.dimensions).of(store, np.array((row,)))[0]
+    offset = store.values(colliders[0].columns["offset"].key, row)
     return MassOfShape(offset + np.array(moments[1 : 1 + store.dimensions]), moments, offset)
 
 
@@ -281,18 +281,6 @@ def keep_gyration(store: Any, component: type[Component], rows: np.ndarray) -> N
                 own, products = store.make(f"{kind}.gyration"), store.make(f"{kind}.gyration_products")
                 own[row] = np.diagonal(tensor) if np.ndim(tensor) else tensor
                 products[row] = tensor[(0, 0, 1), (1, 2, 2)] if np.ndim(tensor) else 0.0
-
-
-def spin_energy(store: Any, entities: np.ndarray) -> float:
-    """Sum of w . I w / 2 of bodies with a Spin, joules."""
-    spin, total = object.__new__(Spin), 0.0
-    for entity in entities.tolist():
-        spin._bind(store, entity)
-        w = spin.angular_velocity
-        if np.any(w):
-            w = spin._axes().T @ w if np.ndim(w) else w
-            total += 0.5 * float(np.dot(w, np.dot(spin.moments, w)))
-    return total
 
 
 def _cross(arm: np.ndarray, push: np.ndarray) -> Angular:

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from ...components.spin import Spin, spin_energy
 from ...framework.data.bodies import Bodies
 from ...framework.data.table import Table
 from ..forces.accumulation import required_bodies
+from .spin_energy import spin_energy
 
 
 def kinetic_energy(table: Table, dynamic: Bodies) -> float:
     """Sum of m v^2 / 2, and of w . I w / 2 of those that have a Spin, joules."""
     speeds = np.einsum("ij,ij->i", dynamic.linear_velocity, dynamic.linear_velocity)
-    spinning = table.column("entity")[dynamic.rows][dynamic.has(Spin)]
-    return float(0.5 * (dynamic.mass * speeds).sum()) + spin_energy(table, spinning)
+    rows = np.arange(dynamic.rows.start, dynamic.rows.stop)
+    return float(0.5 * (dynamic.mass * speeds).sum()) + spin_energy(table, rows)
 
 
 def momentum(dynamic: Any, dimensions: int) -> np.ndarray:
