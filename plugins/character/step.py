@@ -379,7 +379,7 @@ def move_one(state, near, character, ladder, work, i, dt):
     level = towards(character, i, level, wish, rate * dt)
     # its own way
     if climbing:
-        end = climb(walker, at, level, dt)
+        end = climb(walker, ladder, at, level, dt)
     elif standing:
         end = walk(walker, at, level, kept, lift, dt)
         if end.state == AIR:

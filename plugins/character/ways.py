@@ -5,8 +5,8 @@ from __future__ import annotations
 import collections
 
 from ...framework.compilation import part
-from ...framework.vectors import add, add_scaled, divided, dot, item, length, scale, sub
-from ...systems.queries.compiled import overlap
+from ...framework.vectors import add, add_scaled, divided, dot, item, length, negative, scale, sub
+from ...systems.queries.compiled import Path, cast, inverse_of, overlap
 from .casts import across, floor_below, is_dynamic, lowered
 from .records import AIR, CLIMB, EXACT, FLOOR, STEEP
 from .slides import along_floor, note_hit, slide
@@ -20,26 +20,57 @@ Outcome = collections.namedtuple("Outcome", "at level rising state ground out fo
 
 
 @part
-def is_on_ladder(walker, ladder, at, before, standing):
-    """Whether it climbs: it is in a ladder, and did so before or wants to, but not down into the floor."""
-    state, near, character = walker.state, walker.near, walker.character
-    wanted = character.climb[walker.row]
-    if before == CLIMB or (wanted != 0.0 and not (standing and wanted < 0.0)):
-        for k in range(walker.found if len(ladder.present) > 0 else 0):
-            j = near.row[k]
-            if ladder.present[j] and overlap(state, walker.row, j, at)[0] > 0.0:
-                return True
+def is_in_ladder(walker, ladder, at):
+    """Whether it overlaps one there."""
+    near = walker.near
+    for k in range(walker.found if len(ladder.present) > 0 else 0):
+        j = near.row[k]
+        if ladder.present[j] and overlap(walker.state, walker.row, j, at)[0] > 0.0:
+            return True
     return False
 
 
 @part
-def climb(walker, at, level, dt):
-    """Where it gets on a ladder."""
-    character = walker.character
+def is_on_ladder(walker, ladder, at, before, standing):
+    """Whether it climbs: it is in a ladder and wants to, but not down into the floor, or did so before, where it may
+    stand on the end of one, too."""
+    wanted = walker.character.climb[walker.row]
+    if before != CLIMB and (wanted == 0.0 or (standing and wanted < 0.0)):
+        return False
+    if is_in_ladder(walker, ladder, at):
+        return True
+    return before == CLIMB and is_in_ladder(walker, ladder, add_scaled(at, walker.up, -2.0 * walker.skin))
+
+
+@part
+def rise_on_ladder(walker, ladder, at, rise):
+    """How much of a way up leads to no more than its skin above the end of a ladder."""
+    down, gap = negative(walker.up), rise + 3.0 * walker.skin
+    path = Path(add_scaled(at, walker.up, rise), down, inverse_of(down), walker.half_extents)
+    for k in range(walker.found):
+        j = walker.near.row[k]
+        if ladder.present[j]:
+            touches, distance, _, _ = cast(walker.state, walker.near, walker.row, j, path, gap, gap)
+            gap = min(gap, distance) if touches else gap
+    more = rise + min(0.0, walker.skin - gap)
+    return more if more > EXACT else 0.0
+
+
+@part
+def climb(walker, ladder, at, level, dt):
+    """Where it gets on a ladder; it stays at the end of it, or on a floor that is there."""
+    character, up = walker.character, walker.up
     rising = character.climb[walker.row]
-    velocity = add_scaled(level, walker.up, rising)
+    if rising > 0.0:
+        most = rise_on_ladder(walker, ladder, at, rising * dt)
+        rising = most / dt if most < rising * dt else rising
+    velocity = add_scaled(level, up, rising)
     to = slide(walker, at, scale(velocity, dt), False, False, -1)
-    return Outcome(to, level, rising, CLIMB, -1, walker.up, to, velocity, 0.0)
+    if rising >= 0.0 and not is_in_ladder(walker, ladder, to):
+        j, gap, out, _, foot = floor_below(walker, to, 2.0 * walker.skin)
+        if j >= 0:
+            return Outcome(lowered(walker, to, gap), level, 0.0, FLOOR, j, out, foot, velocity, 0.0)
+    return Outcome(to, level, rising, CLIMB, -1, up, to, velocity, 0.0)
 
 
 @part

@@ -246,3 +246,51 @@ def test_it_slides_down_walls_slowly_and_jumps_off_them(figure):
     plain.box((1, -9), (2, 30))
     track = plain.run(80, lambda step: (plain.move(1.0), setattr(plain.me, "jump", step > 60)))
     assert (np.diff(track.y) < 0).all()
+
+
+@each_figure
+@pytest.mark.parametrize("rate", [60, 120])
+@pytest.mark.parametrize("over", [0.0, 0.5])  # m, from the ledge to the end of the ladder
+def test_who_climbs_on_stands_still_at_the_end_of_a_ladder(figure, rate, over):
+    """Its foot a skin above that, for as long as it wants up, and when it wants nothing more; from there it walks onto
+    a ledge, climbs down, or jumps."""
+    stage = Stage(figure, dt=1 / rate)
+    stage.box((-6.0, 3.8), (-0.5, 4.0))
+    stage.sensor(0.0, 2.0 + over / 2, (0.4, 2.0 + over / 2), Ladder())
+    stage.run(rate, stage.hold(climb=7.0))
+    track, top = stage.run(rate // 2, stage.hold(climb=7.0)), 4.0 + over + stage.stands
+    assert set(track.state) == {"climb"}
+    assert track.y == pytest.approx(np.full(len(track.y), top), abs=1e-6)
+    assert track.steps().max() < 1e-9
+    assert np.abs(track.velocity).max() < 1e-6
+    hangs = stage.run(rate // 4, stage.hold(climb=0.0))
+    assert set(hangs.state) == {"climb"}
+    assert hangs.y == pytest.approx(top, abs=1e-6)
+    down = stage.run(rate // 4, stage.hold(climb=-2.0))
+    assert set(down.state) == {"climb"}
+    assert down.y[-1] == pytest.approx(top - 0.5, abs=1e-6)
+    stage.run(rate // 2, stage.hold(climb=3.0))
+    leaps = stage.run(rate // 4, stage.hold(climb=3.0, jump=True))
+    assert leaps.y.max() > top + 1.0
+    again = stage.run(rate, stage.hold(climb=3.0))
+    assert again.y[-1] == pytest.approx(top, abs=1e-6)
+    off = stage.run(rate, lambda step: (stage.hold(climb=3.0 * (step < 5), jump=False)(0), stage.move(-3.0)))
+    assert off.state[-1] == "floor"
+    assert off.y[-1] == pytest.approx(4.0 + stage.stands, abs=1e-6)
+    assert off.x[-1] == pytest.approx(-3.0, abs=0.3)
+
+
+@each_figure
+@pytest.mark.parametrize("one_way", [False, True])
+def test_who_climbs_to_a_floor_that_a_ladder_ends_at_stands_on_it(figure, one_way):
+    stage = Stage(figure)
+    if one_way:
+        stage.one_way(-3.0, 3.0, 4.0)
+    else:
+        stage.box((-6.0, 3.8), (-0.45, 4.0))
+    stage.sensor(0.0, 2.0, (0.4, 2.0), Ladder())
+    aside = 0.0 if one_way else -2.0
+    track = stage.run(120, lambda step: (stage.hold(climb=4.0)(0), stage.move(aside * (step > 70))))
+    assert is_walking(track.state[-30:])
+    assert track.y[-1] == pytest.approx(4.0 + stage.stands, abs=1e-6)
+    assert np.ptp(track.y[-30:]) < 1e-9
