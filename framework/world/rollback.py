@@ -118,7 +118,7 @@ class Rollback:
             self._snapshots[frame] = before
         used = [known[frame] if frame < len(known) else known[-1] if known else self._idle for known in self._inputs]
         try:
-            self._apply(used)
+            self._call(used)
             self.world.step()
         except BaseException:
             self.world.restore(before)  # of a step that fails the inputs are not undone
@@ -130,6 +130,16 @@ class Rollback:
         ):  # fmt: skip
             for old in [old for old in kept if old < oldest]:
                 del kept[old]
+
+    def _call(self, used: list[Any]) -> None:
+        try:
+            self._apply(used)
+        except Exception as error:
+            unknown = [player for player, known in enumerate(self._inputs) if not known]
+            if unknown:
+                got = f"apply got {self._idle!r} for player {unknown[0]}, of whom no input is known yet"
+                error.add_note(f"Rollback: {got}; Rollback(..., idle=...) says what it gets then")
+            raise
 
     def checksum(self) -> tuple[int, str]:
         """A frame whose start depends on no guess, the newest one of every 30th, and the hash of the world there; to be

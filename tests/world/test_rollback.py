@@ -142,6 +142,21 @@ def test_what_raises_is_played_once_more(where, at):
     assert found[:2] == found[2:]
 
 
+def test_an_error_of_apply_before_the_first_input_of_a_player_names_idle():
+    world = World(Physics(2))
+    given = []
+    rollback = Rollback(world, lambda inputs: given.append([steer for steer, _ in inputs]))
+    rollback.give(0, 0, [(1.0, False)])
+    with pytest.raises(TypeError) as raised:
+        rollback.step()
+    (note,) = raised.value.__notes__
+    assert note.startswith("Rollback: apply got 0 for player 1, of whom no input is known yet; Rollback(..., idle=...)")
+    rollback = Rollback(world, lambda inputs: given.append([steer for steer, _ in inputs]), idle=(0.5, False))
+    rollback.give(0, 0, [(1.0, False)])
+    assert rollback.step()
+    assert given == [[1.0, 0.5]]
+
+
 def test_it_waits_for_the_slowest_and_ignores_gaps():
     world, apply = game()
     rollback = Rollback(world, apply, most=3)
