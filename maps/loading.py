@@ -88,17 +88,19 @@ def look_at(path: str | Path, known: Vocabulary, level: str | None = None) -> li
 
 
 def world_of(
-    path: str | Path, *plugins: Plugin, settings: Settings | None = None, level: str | None = None, metres: float = 1.0
-) -> tuple[World, Level]:
-    """(a new world with the plugins that a map needs and others, the map in it); classes of a game that nothing here
-    knows mean nothing. MapError for what is wrong with the map."""
-    plan = Plan.of(path, Vocabulary(lenient=True), level, metres)
+    path: str | Path, *plugins: Plugin, components: Iterable[type[Component]] = (), settings: Settings | None = None,
+    level: str | None = None, metres: float = 1.0,
+) -> tuple[World, Level]:  # fmt: skip
+    """(a new world with the plugins that a map needs and others, the map in it); ``components``: as of :func:`load`,
+    but other classes mean nothing. MapError for what is wrong with the map."""
+    components = tuple(components)
+    plan = Plan.of(path, Vocabulary(None, components, lenient=True), level, metres)
     plan.findings.refuse()
     names = {component.plugin or component.__module__.split(".")[2] for component in plan.types if _is_carom(component)}
     given = {plugin.name for plugin in plugins}
     needed = [find(name) for name in sorted(names - given)]
     world = World(Physics(dimensions=2, gravity=(0.0, -9.81)), *needed, *plugins, settings=settings or Settings())
-    plan = Plan.of(path, Vocabulary(world, lenient=True), level, metres)
+    plan = Plan.of(path, Vocabulary(world, components, lenient=True), level, metres)
     plan.findings.refuse()
     Maker(world, plan.level).make(plan.planned)
     return world, plan.level

@@ -80,6 +80,8 @@ def test_values_are_solid_whatever_their_name(ice, solid, tmp_path, world):
     assert maps.load(path, world, (Spring,), materials=ice).of_class["Spring"]
     without_the_game, made = maps.world_of(path)
     assert "Spring" not in made.of_class
+    with_it, made = maps.world_of(path, components=[Spring])
+    assert [with_it.has_component(entity, Spring) for entity in made.of_class["Spring"]] == [True]
     for each, where in ((world, solid), (without_the_game, "1235")):
         assert [x + 1 for x in range(5) if each.ray_cast((x + 0.5, 1.5), (0, -0.9))] == [*map(int, where)]
 
