@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -29,6 +30,8 @@ class PointsColumn(ArrayColumn):
     """Arrays (k, 2) or (k, 3): three numbers a row are stored, the last one is nan in 2D."""
 
     def checked(self, value: Any, entity: int | None = None) -> Any:
+        if isinstance(value, (str, os.PathLike)):
+            raise self._error(value, "must be points, it is not a path of files, which is pathlib.Path", entity)
         array = Column(item="vector", name=self.name, owner=self.owner)._as_numbers(value, entity)
         if array.ndim != 2 or array.shape[1] not in (2, 3) or len(array) < 2:
             raise self._error(value, "must be two points or more, an array of shape (n, 2) or (n, 3)", entity)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import pathlib
 
 import numpy as np
 import pytest
@@ -232,7 +233,8 @@ POINTS = (
     ([(0, 0), (1, math.nan)], "must be finite"),
     ([(0, 0), (0, 0), (1, 1)], r"must not have a point twice in a row, got \[0.0, 0.0\]"),
     ([(0, 0), (1e308, 1e308), (0, 0)], "must not be so long"),
-    ("ab", "must be numbers"),
+    ("ab", "must be points, it is not a path of files, which is pathlib.Path, got 'ab'"),
+    (pathlib.Path("a.tmx"), "must be points, it is not a path of files, which is pathlib.Path"),
 )
 
 
