@@ -14,7 +14,12 @@ from .component import Component
 from .driven import drive
 from .interpolation import interpolated
 from .layers import resolved_rows
+from .pushes import push, velocities
 from .table import DYNAMIC, KINDS, KINEMATIC, STATIC, Table
+
+
+def _points(name: str, points: Any, count: int, dimensions: int) -> np.ndarray:
+    return Column(item="vector", owner="bodies", name=name).checked_many(points, count, dimensions)
 
 
 class Bodies:
@@ -118,6 +123,37 @@ class Bodies:
         if rotations is not None:
             turns = Column(item="rotation", owner="bodies", name="move_to").checked_many(rotations, n, d)[chosen]
         drive(table, chosen + self.rows.start, places[chosen], turns, "move_to")
+
+    def apply_force(self, entities: Any, forces: Any, at: Any = None) -> None:
+        """As :meth:`RigidBody.apply_force` of each, and with ``at`` as :meth:`Spin.apply_force`, in one call.
+
+        entities
+            (n,) ids; one that comes several times gets the sum
+        forces
+            (n, d) N, or (d,) for all
+        at
+            None, or (n, d) m, points of the world, or (d,) for all: the bodies turn, too
+
+        KeyError for what is no body, ValueError for wrong shapes or numbers, or for one without a Spin that is to turn;
+        nothing is applied then.
+        """
+        table, rows, d = self._table, self.rows_of(entities), self._table.dimensions
+        pushes = Column(item="vector", owner="bodies", name="apply_force").checked_many(forces, len(rows), d)
+        points = None if at is None else _points("apply_force at", at, len(rows), d)
+        push(table, rows, pushes, points)
+
+    def velocity_at(self, entities: Any, points: Any) -> np.ndarray:
+        """(n, d) m/s: as :meth:`Spin.velocity_at` of each; of one without a Spin the velocity of its position.
+
+        entities
+            (n,) ids
+        points
+            (n, d) m of the world, or (d,) for all
+
+        KeyError for what is no body, ValueError for wrong shapes or numbers.
+        """
+        rows = self.rows_of(entities)
+        return velocities(self._table, rows, _points("velocity_at", points, len(rows), self._table.dimensions))
 
     def row_of(self, entity: int) -> int:
         """The row of that entity among all bodies; KeyError if it is no body."""

@@ -14,8 +14,8 @@ from .layers import LayerNames
 
 # Attributes of Bodies:
 RESERVED = (
-    "asleep", "column_names", "dynamic", "has", "interpolated_position", "interpolated_rotation", "kinematic",
-    "move_to", "row_of", "rows", "rows_of", "static",
+    "apply_force", "asleep", "column_names", "dynamic", "has", "interpolated_position", "interpolated_rotation",
+    "kinematic", "move_to", "row_of", "rows", "rows_of", "static", "velocity_at",
 )  # fmt: skip
 
 
