@@ -110,7 +110,7 @@ def march(state, a, b, path, since, until, limits):
     _, stride, threshold, _ = limits
     shape_a, shape_b = state.bodies.shape[a], state.bodies.shape[b]
     low, high, t, looks = since, math.inf, since, 0
-    normal, point, at = zero_of(state), zero_of(state), zero_of(state)
+    normal = point = at = zero_of(state)
     while True:
         d = along(path, t)
         hit, _, n, p = evaluate(state, shape_a, a, shape_b, b, d)
@@ -140,14 +140,26 @@ def clear_of_rounding(state, a, b, path, t):
 
 
 @part
-def normal_beside(state, a, b, path, t, since, normal):
-    """The normal of a touch at time t, seen from where they come from, or, at ``since``, from where they go: another
-    one only if that is on the other side."""
-    bodies, rate = state.bodies, dot(rate_along(path, t), normal)
-    span = clear_of_rounding(state, a, b, path, t) / abs(rate)
-    beside = max(since, t - span) if t > since else t + span
-    n = evaluate(state, bodies.shape[a], a, bodies.shape[b], b, along(path, beside))[2]
-    return n if dot(n, normal) < 0.0 else normal
+def closed_at(path, t, normal, gap, rate, until):
+    """A time until which a gap along the normal, that at time t is this one and grows at this rate, stays open on a
+    path; infinity, or one after ``until``, if it does not close before that (see first_root)."""
+    bend = dot(path[3], normal)
+    return t + first_root(gap, rate, dot(path[2], normal) + 3.0 * t * bend, bend, until - t)
+
+
+@part
+def normal_beside(state, a, b, path, times, normal, rate):
+    """The normal of a touch that opens at this rate, seen from where they come from, or, at the first time, from where
+    they go: another one only if that is on the other side, and within the times beyond what rounding makes of it.
+
+    times: (since when the pair is looked at, that of the touch, until when)."""
+    (since, t, until), shape, clear = times, state.bodies.shape, clear_of_rounding(state, a, b, path, times[1])
+    beside = max(since, t - clear / rate) if t > since else closed_at(path, t, normal, clear, rate, until)
+    if beside <= until:
+        n = evaluate(state, shape[a], a, shape[b], b, along(path, beside))[2]
+        if dot(n, normal) < 0.0:
+            return n
+    return normal
 
 
 @part
@@ -156,7 +168,7 @@ def advance_conservatively(state, a, b, path, kind, times, until, slop):
     looked at, the time to begin with: that of the touch if it is known)."""
     (straight, known), (since, t) = kind, times
     shape_a, shape_b = state.bodies.shape[a], state.bodies.shape[b]
-    normal, point, at = zero_of(state), zero_of(state), zero_of(state)
+    normal = point = at = zero_of(state)
     found, cornered, time = False, False, t
     for look in range(MOST_ADVANCES):
         d = along(path, t)
@@ -171,17 +183,14 @@ def advance_conservatively(state, a, b, path, kind, times, until, slop):
         if look > 0 and rate > 0.0 and dot(n, normal) < 0.0 and -depth <= clear_of_rounding(state, a, b, path, t):
             n, rate, touches = normal, dot(w, normal), True
         elif look == 0 and touches and (rate > 0.0 if t > since else rate < 0.0 and depth == 0.0):
-            n = normal_beside(state, a, b, path, t, since, n)
+            n = normal_beside(state, a, b, path, (since, t, until), n, rate)
             rate = dot(w, n)
         if look == 0 or rate < 0.0 or hit:  # past the touch by a rounding error the normal may turn round
             normal, point = n, p
         found = touches and (straight or rate < 0.0)
         further = t
         if not found:
-            bend = dot(path[3], n)
-            further = t + first_root(
-                0.0 if touches else -depth, rate, dot(path[2], n) + 3.0 * t * bend, bend, until - t
-            )
+            further = closed_at(path, t, n, 0.0 if touches else -depth, rate, until)
             if not further <= until:
                 return APART, t, normal, point, at
             found = not further > t

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from worlds import EPS, Conserved, ball, both_dimensions, box, floor, make_world, position, run, velocity
+from worlds import EPS, MODES, Conserved, ball, both_dimensions, box, floor, make_world, position, run, velocity
 
 DT = 1 / 60
 LAG = {"explicit_euler": 0.5, "semi_implicit_euler": -0.5}  # they keep v^2/2 + g y + lag g dt v in free fall
@@ -167,6 +167,20 @@ def test_a_ball_whose_step_ends_in_touch_bounces_all_the_same():
     run(world, 40)
     assert velocity(world, mover)[0] == pytest.approx(-5.0, rel=1e-12)
     assert position(world, mover)[0] == pytest.approx(5.0 - 40 * 5 / 60, rel=1e-12)
+
+
+@both_dimensions
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("closing", [1e-18, 1e-12, 1e-6])
+def test_a_flat_floor_changes_no_speed_along_it(closing, mode, d):
+    """However slowly what slides on it comes nearer: v = v0 + g t along it. 1e-13 m at 1e-18 m/s take a day."""
+    world = make_world(d, collision=mode, gravity=(7, -0.05, 0)[:d], integrator="velocity_verlet")
+    floor(world)
+    slider = ball(world, (0, 0.5, 0)[:d], (-1, -closing, 0)[:d], restitution=0.4)
+    for k in range(1, 4):
+        world.step()
+        np.testing.assert_allclose(velocity(world, slider), (-1 + 7 * k * DT, 0, 0)[:d], atol=1e-3)
+        assert velocity(world, slider)[0] == pytest.approx(-1 + 7 * k * DT, abs=1e-14)
 
 
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet"])
