@@ -183,10 +183,10 @@ def support_along(bodies, a, b, normal):
 
 
 @part
-def still_bounces(state, dt, c, depth, normal):
+def still_bounces(state, dt, c, depth, normal, turns):
     """Whether a pair that bounces is no contact at rest: it meets in the next step only, or is on its way out.
 
-    Notes in pairs.parting how it parts.
+    Notes in pairs.parting how it parts. turns: so far that only sweeps search its impacts.
     """
     pairs, bodies = state.pairs, state.bodies
     a, b, velocity = pairs.a[c], pairs.b[c], bodies.linear_velocity
@@ -203,7 +203,8 @@ def still_bounces(state, dt, c, depth, normal):
         _, _, _, point = evaluate_pair(state, a, b, d)
         speed += closing_by_spin(bodies, a, b, arms_to(bodies, a, b, normal, point, d), normal)
         known = depth <= slop and not is_beyond_cap(state, a, b)
-        if (known or (e == 1.0 and depth <= FAST * extent)) and abs(speed) > threshold and is_turning(state, dt, a, b):
+        known = (known or (e == 1.0 and depth <= FAST * extent)) and (not turns or is_swept(state, a, b, extent))
+        if known and abs(speed) > threshold and is_turning(state, dt, a, b):
             return True  # its next impact is searched with the shapes as they are turned then
     touches = depth > (SAME_PLACE * extent if pairs.impulse[c] == 0.0 else 0.0)
     held = support_along(bodies, a, b, normal)  # without which they are nearer, and close faster
@@ -263,7 +264,7 @@ def is_resting(state, dt, c):
     if depth >= 0.0:
         near_contact[c] = True
     pairs.parting[c] = parts
-    if state.impacts.active and parts == STATIONARY and still_bounces(state, dt, c, depth, normal):
+    if state.impacts.active and parts == STATIONARY and still_bounces(state, dt, c, depth, normal, turns):
         return False
     return far or not meets_at_corner(state, a, b, d, (depth, normal), slop_of(state, a, b))
 

@@ -66,6 +66,29 @@ def test_a_thin_bar_passes_through_no_ball_and_strikes_none_that_it_does_not_mee
 
 
 @pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("e", [0.9, 1.0])
+@pytest.mark.parametrize("w", [1.0, 3.0, 9.0])
+def test_a_kinematic_bar_takes_along_what_stands_in_its_way(w, e, d, mode):
+    """However it bounces: it never is deeper in it than a twentieth of its width, and leaves as fast as it was hit."""
+    half, radius, x, y = np.array((2.0, 0.1, 0.5)), 0.15, 1.2, 0.5
+    with turning_world(d, collision=mode) as world:
+        about = w if d == 2 else (0.0, 0.0, w)
+        bar = world.create_entity(Transform((0,) * d), RigidBody(kind="kinematic"), Spin(about), BoxCollider(half[:d]))
+        collider = SphereCollider(radius, restitution=e)
+        ball = world.create_entity(Transform((x, y, 0)[:d]), RigidBody(), Spin(), collider)
+        least = np.inf
+        for _ in range(round(0.8 / w * 60)):
+            world.step()
+            q = np.atleast_1d(part(world, bar, Transform).rotation)
+            angle, at = q[0] if d == 2 else 2 * np.arctan2(q[3], q[0]), np.array(part(world, ball, Transform).position)
+            least = min(least, np.cos(angle) * at[1] - np.sin(angle) * at[0])  # of its middle above that of the bar
+        speed = np.linalg.norm(part(world, ball, RigidBody).linear_velocity)
+    assert least > half[1] + 0.9 * radius - 1e-6
+    assert speed > 0.9 * w * x
+
+
+@pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("w", [0.2, 2.0])
 def test_a_turntable_whose_rim_goes_far_carries_a_box_level(w, mode):
     """It leaves the circle by w dt / 2 of its way, outwards; but for the next order, w dt of that, and a little."""
