@@ -179,7 +179,8 @@ def advance_conservatively(state, a, b, path, kind, times, until, slop):
             if not hit or is_corner_touch(state, shape_a, a, shape_b, b, d, met, slop):
                 return AT_CORNER, time, normal, point, at
             return TOUCHES, time, n, point, at
-        touches = known or hit or abs(depth) <= ROUNDING * length(d) or look == MOST_ADVANCES - 1
+        last = look == MOST_ADVANCES - 1
+        touches = known or hit or abs(depth) <= ROUNDING * length(d) or last
         if look > 0 and rate > 0.0 and dot(n, normal) < 0.0 and -depth <= clear_of_rounding(state, a, b, path, t):
             n, rate, touches = normal, dot(w, normal), True
         elif look == 0 and touches and (rate > 0.0 if t > since else rate < 0.0 and depth == 0.0):
@@ -187,7 +188,7 @@ def advance_conservatively(state, a, b, path, kind, times, until, slop):
             rate = dot(w, n)
         if look == 0 or rate < 0.0 or hit:  # past the touch by a rounding error the normal may turn round
             normal, point = n, p
-        found = touches and (straight or rate < 0.0)
+        found = touches and (straight or rate < 0.0 or last)
         further = t
         if not found:
             further = closed_at(path, t, n, 0.0 if touches else -depth, rate, until)

@@ -366,3 +366,27 @@ def test_walls_that_joints_hold_gain_nothing_where_they_are_struck(seed):
             world.step()
             most = max(most, world.kinetic_energy())
     assert most <= before * (1 + STRUCK_GAIN), (most / before, mode)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", seeds(0, 60, (5004, 5007, 5010)))
+@pytest.mark.parametrize("kind", ["hinge", "distance"])
+def test_a_flat_floor_has_one_normal(kind, seed):
+    """However little a joint leaves of the speed at which they near it, or part from it: 1e-18 m/s."""
+    random, mode = np.random.default_rng(seed), MODES[seed % 3]
+    settings = Settings(collision=mode, integrator="yoshida4", on_fault="ignore")
+    with World(Physics(3, gravity=(0, -G, 0)), Rotation(), Joints(), settings=settings) as world:
+        floor = world.create_entity(Transform((0, -1, 0)), RigidBody(kind="static"), BoxCollider((200, 1, 200)))
+        balls = []
+        for k in range(2):
+            at, mass = (0.9 * k, random.uniform(0.8, 2), 0), random.uniform(0.5, 6)
+            body = RigidBody(mass, (*random.normal(0, 3, 2), 0))
+            collider = SphereCollider(random.uniform(0.2, 0.42), friction=0.0, restitution=0.4)
+            spin = (Spin(random.normal(0, 4, 3)),) if kind == "hinge" or seed % 2 else ()
+            balls.append(world.create_entity(Transform(at), body, collider, *spin))
+        middle = np.mean(world.bodies.position[world.bodies.rows_of(balls)], axis=0)
+        world.create_entity(Hinge(*balls, anchor=middle, axis=(0, 0, 1)) if kind == "hinge" else Distance(*balls))
+        for _ in range(200):
+            world.step()
+            for contact in world.contacts.of(floor):
+                assert abs(contact.normal[1]) > 1 - 1e-12
