@@ -21,6 +21,8 @@ def spin_energy(table: Table, rows: np.ndarray) -> float:
     if Spin not in table.mask_names:
         return 0.0
     rows = rows[table.has_mask(Spin)[rows]]
+    if not len(rows):
+        return 0.0
     spins = table.values("spin.angular_velocity", rows).reshape(len(rows), -1)
     turning = spins.any(axis=1)
     rows, spins = rows[turning], spins[turning]

@@ -235,7 +235,7 @@ def test_what_circles_strikes_with_its_energy_whenever_in_a_step(d, mode, seed):
                 axis = {} if d == 2 else {"axis": (0, 0, 1)}
                 world.create_entity(Hinge(None, ball, anchor=(0.2 * k, 0, *z), **axis))
             before, after = 0.0, []
-            while len(after) < 3:
+            while len(after) < 5:  # an impact where a step ends bends the way in the next one
                 start = world.kinetic_energy()
                 world.step()
                 if after or len(world.contacts.impacts) > 0:

@@ -94,6 +94,14 @@ def test_a_hundred_bodies_that_spin_take_no_more_python_than_ten(d):
     assert calls[0] == calls[1]
 
 
+def test_where_only_a_flipper_spins_the_energy_is_that_of_the_balls():
+    with space(2) as world:
+        world.create_entity(Transform((0, 0)), RigidBody(kind="kinematic"), SphereCollider(0.5), Spin(1.0))
+        assert world.kinetic_energy() == 0.0
+        world.create_entity(Transform((5, 0)), RigidBody(2.0, (3.0, 0.0)), SphereCollider(0.5))
+        assert world.kinetic_energy() == 9.0
+
+
 def test_a_body_whose_inertia_nothing_tells_is_named():
     with space(2) as world:
         entity = world.create_entity(Transform((0, 0)), RigidBody(), Spin(1.0))
