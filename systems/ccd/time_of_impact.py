@@ -148,18 +148,21 @@ def closed_at(path, t, normal, gap, rate, until):
 
 
 @part
-def normal_beside(state, a, b, path, times, normal, rate):
+def normal_beside(state, a, b, path, times, normal, rate, slop):
     """The normal of a touch that opens at this rate, seen from where they come from, or, at the first time, from where
     they go: another one only if that is on the other side, and within the times beyond what rounding makes of it.
 
     times: (since when the pair is looked at, that of the touch, until when)."""
-    (since, t, until), shape, clear = times, state.bodies.shape, clear_of_rounding(state, a, b, path, times[1])
+    bodies, (since, t, until), clear = state.bodies, times, clear_of_rounding(state, a, b, path, times[1])
     beside = max(since, t - clear / rate) if t > since else closed_at(path, t, normal, clear, rate, until)
-    if beside <= until:
-        n = evaluate(state, shape[a], a, shape[b], b, along(path, beside))[2]
-        if dot(n, normal) < 0.0:
-            return n
-    return normal
+    if not beside <= until:
+        return normal
+    d, shape_a, shape_b = along(path, beside), bodies.shape[a], bodies.shape[b]
+    _, depth, n, _ = evaluate(state, shape_a, a, shape_b, b, d)
+    if not dot(n, normal) < 0.0:
+        return normal
+    # What is beside a corner there parts along a normal that is none of a touch.
+    return normal if is_corner_touch(state, shape_a, a, shape_b, b, d, (depth, n), slop) else n
 
 
 @part
@@ -181,13 +184,12 @@ def advance_conservatively(state, a, b, path, kind, times, until, slop):
             return TOUCHES, time, n, point, at
         last = look == MOST_ADVANCES - 1
         touches = known or hit or abs(depth) <= ROUNDING * length(d) or last
-        if look > 0 and rate > 0.0 and dot(n, normal) < 0.0 and -depth <= clear_of_rounding(state, a, b, path, t):
-            n, rate, touches = normal, dot(w, normal), True
-        elif look == 0 and touches and (rate > 0.0 if t > since else rate < 0.0 and depth == 0.0):
-            n = normal_beside(state, a, b, path, (since, t, until), n, rate)
-            rate = dot(w, n)
-        if look == 0 or rate < 0.0 or hit:  # past the touch by a rounding error the normal may turn round
-            normal, point = n, p
+        turns = rate > 0.0 if t > since else rate < 0.0 and depth == 0.0  # past the touch, by rounding
+        if turns and (touches or -depth <= clear_of_rounding(state, a, b, path, t)):
+            normal = normal_beside(state, a, b, path, (since, t, until), n, rate, slop)
+            touches |= dot(normal, n) < 0.0
+            n, rate = normal, dot(w, normal)
+        normal, point, at, time = n, p, d, t
         found = touches and (straight or rate < 0.0 or last)
         further = t
         if not found:
@@ -196,7 +198,6 @@ def advance_conservatively(state, a, b, path, kind, times, until, slop):
                 return APART, t, normal, point, at
             found = not further > t
         if found:
-            at, time = d, t
             if not is_corner_touch(state, shape_a, a, shape_b, b, d, met, slop):
                 return TOUCHES, time, normal, point, at
             cornered = True

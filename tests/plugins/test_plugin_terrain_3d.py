@@ -148,6 +148,81 @@ def test_nothing_fast_passes_in_swept_worlds(mode):
     assert inside.sum() > 10
 
 
+def pipe_of(points, half=0.1):
+    """(vertices, triangles) of a mesh that is straight along z, over points in the plane of x and y."""
+    vertices = [(x, y, z) for x, y in points for z in (-half, half)]
+    pieces = range(0, 2 * len(points) - 2, 2)
+    return vertices, [face for k in pieces for face in ((k, k + 1, k + 3), (k, k + 3, k + 2))]
+
+
+@each_mode
+@pytest.mark.parametrize("restitution", [0.0, 0.05, 0.3, 0.9])
+def test_waves_that_lean_along_x_push_no_ball_along_z(mode, restitution):
+    """A face without friction pushes along its normal only."""
+    heights = np.repeat(0.3 * np.cos(np.pi / 6.0 * np.arange(81))[:, None], 9, axis=1)
+    for k, gravity in itertools.product(range(8), (G, 0.0)):
+        world = make_world((0.0, -gravity, 0.0), collision=mode)
+        create_height_field(world, heights, 0.5)
+        smooth = SphereCollider(0.3, restitution=restitution)
+        ball = throw(world, (6.0 + 0.137 * k, 0.61, 2.1), (6.0, -0.5, 0.0), smooth)
+        for _ in range(240):
+            world.step()
+            assert abs(velocity(world, ball)[2]) < 1e-9
+        world.close()
+
+
+@each_mode
+@pytest.mark.parametrize("facets", [8, 16])
+def test_a_ball_keeps_in_a_bend_of_facets_what_each_of_them_leaves_it(mode, facets):
+    """At each facet, without gravity and restitution, the part of its velocity along that: cos(turn)^2 of the energy;
+    at the first and the last, half a turn."""
+    turn, bend = 0.5 * math.pi / facets, 0.5
+    angles = turn * np.arange(facets + 1)
+    points = [(-2.0, 0.0), *zip(bend * np.sin(angles), bend - bend * np.cos(angles), strict=True), (bend, 4.0)]
+    for k in range(10):
+        world = make_world((0.0, 0.0, 0.0), collision=mode)
+        create_triangle_mesh(world, *pipe_of(points))
+        ball = throw(world, (-0.5 - 0.013 * k, 0.03, 0.0), (2.0, 0.0, 0.0), SphereCollider(0.03))
+        while position(world, ball)[1] < bend + 0.1 and world.time < 2.0:
+            world.step()
+        kept = math.cos(turn) ** (facets - 1) * math.cos(0.5 * turn) ** 2
+        assert velocity(world, ball) == pytest.approx((0.0, 2.0 * kept, 0.0), abs=1e-9)
+        world.close()
+
+
+@pytest.mark.parametrize("mode", MODES[1:])
+def test_a_ball_that_lands_on_a_plane_of_many_triangles_slides_on(mode):
+    """Without gravity, friction and restitution the plane takes the velocity along its normal, and no more."""
+    for degrees, k in itertools.product((0.0, 3.0, 45.0), range(12)):
+        tilt = math.radians(degrees)
+        way, up = np.array((math.cos(tilt), math.sin(tilt), 0.0)), np.array((-math.sin(tilt), math.cos(tilt), 0.0))
+        world = make_world((0.0, 0.0, 0.0), collision=mode)
+        create_triangle_mesh(world, *pipe_of([(0.4 * n * way)[:2] for n in range(-2, 9)], 0.2))
+        ball = throw(world, 0.05 * up + (0.031 * k - 0.4) * way, 2.0 * way - 0.2 * up, SphereCollider(0.03))
+        for _ in range(78):
+            world.step()
+        assert velocity(world, ball) == pytest.approx(2.0 * way, abs=1e-9)
+        world.close()
+
+
+@each_mode
+@pytest.mark.parametrize("seed", range(3))
+def test_impacts_on_hills_have_normals_that_faces_have(mode, seed):
+    """All of these look up, by 45 degrees at least."""
+    rng, size, cell = np.random.default_rng(seed), 49, 0.25
+    i, j = np.meshgrid(np.arange(size), np.arange(size), indexing="ij")
+    for _ in range(8):
+        heights = 0.3 * np.sin(0.2 * i) * np.cos(0.15 * j) + 0.02 * rng.uniform(-1, 1, i.shape)
+        world = make_world(collision=mode, on_fault="ignore")
+        create_height_field(world, heights, cell, friction=0.0)
+        ball = SphereCollider(rng.uniform(0.2, 0.5), restitution=rng.choice((0.05, 0.3)), friction=0.0)
+        throw(world, (6.0, 0.4 + ball.radius, 6.0), rng.normal(size=3) * (3.0, 0.3, 3.0), ball)
+        for _ in range(90):
+            world.step()
+            assert all(impact.normal[1] > 0.7 for impact in world.contacts.impacts)
+        world.close()
+
+
 @each_mode
 def test_a_ball_rolls_down_a_slope_of_triangles_as_down_a_plane(mode):
     """By 5/7 g sin a, across inner edges at all angles; without a spin by g sin a."""
