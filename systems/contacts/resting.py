@@ -215,6 +215,9 @@ def still_bounces(state, dt, c, depth, normal, turns):
         return True  # the next step's impact
     if speed > 0.0:
         pairs.parting[c] = SEPARATES if speed > threshold and speed * dt > slop else SEPARATES_SLOWLY
+    if pairs.impulse[c] > 0.0 and speed > threshold:
+        before, _ = depth_at(state, c, centre_offset_at_start(bodies, a, b), extent, True)
+        return before < 0.0  # on its way out
     return False
 
 
