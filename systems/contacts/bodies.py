@@ -14,7 +14,7 @@ from ..joints.bodies import build_joint_rows
 from ..joints.order import order_direct
 from ..joints.records import DIRECT_BODIES
 from ..linking.parts import JOINED_BODIES, JOINED_START, TURN_BACK, call_of_step
-from ..parts.rows import next_row, owner_of
+from ..parts.rows import next_row, owner_of, place_of
 from ..parts.stages import copy_to_parts
 from ..records import (
     HELD_COLUMNS,
@@ -35,11 +35,9 @@ from .solving.rows import rotate_body
 
 
 @part
-def start_of_flight(state, i, v, a, dt):
-    """From where the substeps would take body i to the place of its last impact in time."""
-    bodies = state.bodies
-    t = bodies.last_impact[i]
-    there = sub(along(path_of(state, i), t), bodies.previous_position[i])
+def start_of_flight(state, i, v, a, t, dt):
+    """From where the substeps would take body i to the place of an impact at time t."""
+    there = sub(along(path_of(state, i), t), state.bodies.previous_position[i])
     return add_scaled(add_scaled(there, v, -t), a, -0.5 * t * (t + dt / state.substeps))
 
 
@@ -97,6 +95,7 @@ def gather(state, dt):
     Neighbours of one colour share no body that moves, so that the processor can work on several at once.
     """
     solver, bodies, moving = state.solver, state.bodies, state.moving
+    pairs, impacts = state.pairs, state.impacts
     for i in range(state.first, moving if len(bodies.held) > 0 else 0):
         bodies.held[i] = False
     if rows_at_rest(state) == 0:
@@ -123,9 +122,13 @@ def gather(state, dt):
                 if bodies.warm_started[i]:
                     a = sub(a, bodies.warm_start_velocity[i])
                 a = scale(a, 1.0 / dt)
-                if state.collides and state.impacts.sweeps and bodies.impact_count[i] > 0:  # in this step
-                    x = start_of_flight(state, i, v, a, dt)
         solver.velocity[q], solver.shift[q], solver.acceleration[q] = v, x, a
+    for k in range(impacts.logged if state.collides else 0):  # the last one of each body counts
+        for i in (pairs.a[impacts.log_pair[k]], pairs.b[impacts.log_pair[k]]):
+            q = place_of(state, i)
+            if q >= 0 and solver.inverse_mass[q] > 0.0:
+                v, a, t = solver.velocity[q], solver.acceleration[q], impacts.log_time[k]
+                solver.shift[q] = start_of_flight(state, owner_of(state, i), v, a, t, dt)
     for q in range(solver.bodies if state.spinning else 0):
         i = solver.body_row[q]
         solver.spin[q], solver.middle[q] = bodies.spin[i], nothing
