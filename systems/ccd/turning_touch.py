@@ -2,7 +2,9 @@
 turned as they are at each time. What a flipper passes is behind it where the step ends.
 
 The gap closes no faster than the bodies approach along its normal, plus the speed by spin of the farthest point of
-each. An impact needs a point that approaches: after one the two still touch, and another corner may come in.
+each; nor than it does as seen from what turns with one of them, where of spins only the difference counts, at the
+other: so what a turning body carries along takes few looks. An impact needs a point that approaches: after one the two
+still touch, and another corner may come in.
 (B. Mirtich, "Impulse-based dynamic simulation of rigid body systems", 1996.)
 """
 
@@ -15,7 +17,7 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, length, negative, replace, row, scale, sub
 from ..integration.trajectory import ROUNDING, along, path_of, rate_along, travel_of
-from ..integration.turning import arms_to, closing_by_spin, is_turned, size_of_turn
+from ..integration.turning import arms_to, closing_by_spin, cross_spin, is_turned, size_of_turn
 from ..joints.groups import is_joined
 from ..linking.parts import CLOSING_POINT, TURNING_TOUCH, call_closing_point, call_turning_touch
 from ..shapes.convex.points import MOST_POINTS, contact_points
@@ -86,6 +88,37 @@ def thickness_of(state, i):
     return least
 
 
+@inlined
+def speed_seen_turning(spin, motion, span):
+    """How fast the centre of b comes along a normal, at most, in a span of time, but for what forces make of
+    that, as seen from what turns with that spin, which turns the velocity and the normal, too; a normal of 0: how fast
+    it moves in any direction. motion: see :func:`nearing_speed`."""
+    between, w, normal, gained = motion
+    seen, turn = sub(w, cross_spin(spin, between)), size_of_turn(spin) * span
+    size, bent = length(seen), turn * (length(w) + gained)
+    if dot(normal, normal) > 0.0:
+        size = min(size, max(0.0, -dot(seen, normal)) + turn * (size + bent))
+    return size + bent
+
+
+@part
+def nearing_speed(bodies, a, b, spins, motion, span):
+    """How fast points of two come nearer to each other, at most, in a span of time from now on: as seen from what does
+    not turn, or from what turns with one of them, where what lies on it stands still. motion: (from a's centre of mass
+    to b's, b's velocity as a's centre sees it, the normal of a plane between them; 0 if they touch; m/s by which forces
+    change that velocity, at most)."""
+    ways = way_of_turning(bodies, a, spins[0]) + way_of_turning(bodies, b, spins[1])
+    spin_a = spins[1] if bodies.rolling_radius[a] > 0.0 else spins[0]  # round things look the same, however they spin
+    spin_b = spins[0] if bodies.rolling_radius[b] > 0.0 else spins[1]
+    turned = sub(spin_b, spin_a)
+    nearing = min(
+        speed_seen_turning(scale(spin_a, 0.0), motion, span) + ways,
+        speed_seen_turning(spin_a, motion, span) + way_of_turning(bodies, b, turned),
+        speed_seen_turning(spin_b, motion, span) + way_of_turning(bodies, a, turned),
+    )
+    return nearing + motion[3]
+
+
 @part
 def has_to_stop(state, a, b, threshold):
     """Whether one of two whose way an impact search cannot follow still moves."""
@@ -135,7 +168,9 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
         depth -= least
         if crept == EXACT_LOOKS:
             near = max(near, min(graze, thin))
-        fastest, touches = turning + length(w) + bend * (until - t), -depth <= near
+        left, touches, between = until - t, -depth <= near, sub(d, sub(bodies.offset[b], bodies.offset[a]))
+        motion = between, w, scale(normal, 1.0 if convex and not touches else 0.0), bend * left
+        fastest = nearing_speed(bodies, a, b, spins, motion, left)
         if touches:
             rate = 0.0
             if threshold > -math.inf:
@@ -146,8 +181,6 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
             if closes and (corners or not is_corner_touch(state, shape_a, a, shape_b, b, d, there, slop)):
                 touch, found, gap = (t, normal, point, d), True, -depth
                 high = t if fast else high
-        elif convex:
-            fastest += max(0.0, -dot(w, normal)) - length(w)
         low = low if high <= t else t
         exact = (holds and depth <= near) or (high - low) * fastest <= near  # else the touch is bisected
         ended = exact if high < math.inf else t >= until
@@ -156,14 +189,15 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
         clear = max(-depth - 0.5 * near, 0.5 * near)
         if touches:
             clear = max(-depth, GRAZE * slop, min(graze, thin - (depth + least - begun)))
-        further = t + clear / fastest
+        further = t + clear / fastest if clear < fastest * left else until
         crept += 1 if holds or further < t + stride else 0
         if high < math.inf:
             further = 0.5 * (low + high)
         elif not holds:
             further = min(further, t + stride)
             if convex:  # what is beside the other one is looked at when it may be there
-                further = max(further, t + clear_along(state, a, b, d, normal) / (fastest + abs(dot(w, normal))))
+                along_it = turning + bend * left + abs(dot(w, normal))
+                further = max(further, t + clear_along(state, a, b, d, normal) / along_it)
         if not (found or ended):
             touch = t, normal, point, d
         t = further if further < until else until
