@@ -90,13 +90,13 @@ def axes_are_old(state):
 def read_bodies(state, dt):
     """1 / mass of what moves freely; whether any speed is limited, any body swept or rotated."""
     bodies, mass, inverse_mass, limited = state.bodies, state.bodies.mass, state.bodies.inverse_mass, False
-    limit, out, dynamic = bodies.max_linear_speed, bodies.quarantined, state.dynamic
-    for i in range(state.first, dynamic):
+    limit, out, first, dynamic = bodies.max_linear_speed, bodies.quarantined, state.first, state.dynamic
+    for i in range(first, dynamic):
         inverse_mass[i] = 1.0 / mass[i]
-    for i in range(state.first, dynamic if state.quarantining else 0):
+    for i in range(first, dynamic if state.quarantining else 0):
         if out[i]:
             inverse_mass[i] = 0.0
-    for i in range(state.first, dynamic if len(limit) > 0 else 0):
+    for i in range(first, dynamic if len(limit) > 0 else 0):
         limited |= (limit[i] == limit[i]) & (not out[i])
     every = state.read_version != state.statics_version or state.inverse_masses_exposed
     for i in range(dynamic, state.count if every else state.moving):

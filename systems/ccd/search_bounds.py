@@ -147,15 +147,15 @@ def measure_crowd(state, now):
     each one's speed in search_margin. Places are in ``search_lower``."""
     bodies = state.bodies
     margin, inverse_mass = bodies.search_margin, bodies.inverse_mass
-    energy, weighed, shaped = 0.0, 0, 0
+    energy, weighed, shaped, far = 0.0, 0, 0, math.inf
     lowest, highest = zero_of(state), zero_of(state)
     for k in range(len(lowest)):
-        lowest, highest = replace(lowest, k, math.inf), replace(highest, k, -math.inf)
+        lowest, highest = replace(lowest, k, far), replace(highest, k, -far)
     for i in range(state.first, state.moving):
         x, known = bodies.search_lower[i], bodies.shape[i] >= 0
         for k in range(len(x)):
-            lowest = replace(lowest, k, min(item(lowest, k), item(x, k) if known else math.inf))
-            highest = replace(highest, k, max(item(highest, k), item(x, k) if known else -math.inf))
+            lowest = replace(lowest, k, min(item(lowest, k), item(x, k) if known else far))
+            highest = replace(highest, k, max(item(highest, k), item(x, k) if known else -far))
         shaped += known
         margin[i] = speed_at(state, i, now)
         if inverse_mass[i] > 0.0 and known:

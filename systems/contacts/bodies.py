@@ -35,8 +35,9 @@ from .solving.rows import rotate_body
 
 
 @part
-def start_of_flight(state, i, v, a, t, dt):
-    """From where the substeps would take body i to the place of an impact at time t."""
+def start_of_flight(state, i, q, t, dt):
+    """From where the substeps would take row i, of body q, to the place of an impact at time t."""
+    v, a, i = state.solver.velocity[q], state.solver.acceleration[q], owner_of(state, i)
     there = sub(along(path_of(state, i), t), state.bodies.previous_position[i])
     return add_scaled(add_scaled(there, v, -t), a, -0.5 * t * (t + dt / state.substeps))
 
@@ -124,11 +125,11 @@ def gather(state, dt):
                 a = scale(a, 1.0 / dt)
         solver.velocity[q], solver.shift[q], solver.acceleration[q] = v, x, a
     for k in range(impacts.logged if state.collides else 0):  # the last one of each body counts
-        for i in (pairs.a[impacts.log_pair[k]], pairs.b[impacts.log_pair[k]]):
+        c = impacts.log_pair[k]
+        for i in (pairs.a[c], pairs.b[c]):
             q = place_of(state, i)
             if q >= 0 and solver.inverse_mass[q] > 0.0:
-                v, a, t = solver.velocity[q], solver.acceleration[q], impacts.log_time[k]
-                solver.shift[q] = start_of_flight(state, owner_of(state, i), v, a, t, dt)
+                solver.shift[q] = start_of_flight(state, i, q, impacts.log_time[k], dt)
     for q in range(solver.bodies if state.spinning else 0):
         i = solver.body_row[q]
         solver.spin[q], solver.middle[q] = bodies.spin[i], nothing

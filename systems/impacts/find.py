@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from ...framework.compilation import part
+from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST, is_swept, limits_of_sweep, rest_edge, turns_far
@@ -206,18 +206,23 @@ def approach_speed(state, c, path, touch, kind, dt):
     return IMPACT, speed
 
 
+@inlined
+def is_held(state, i):
+    """Whether contacts or joints have held row i in the last step."""
+    return state.any_warm_started and state.bodies.warm_started[i]
+
+
 @part
-def correct_speed(state, a, b, touch, speed, dt):
-    """A straight path has the flight's velocity in its middle only. With that of another time a bounce gains or loses,
-    and a ball that always meets the floor at the same phase of a step hops for ever. Elastic pairs do reflect the path:
-    their flight then runs backwards exactly, and nothing drifts."""
-    bodies, (t, normal, _, _) = state.bodies, touch
-    velocity, start = bodies.linear_velocity, bodies.start_velocity
-    bend = dot(sub(sub(velocity[b], start[b]), sub(velocity[a], start[a])), normal)
-    if state.any_warm_started and (bodies.warm_started[a] or bodies.warm_started[b]):  # that push is no force
-        forced = bodies.force_speed_change[a] + bodies.force_speed_change[b]
-        bend = min(max(bend, -forced), forced)
-    return min(0.0, speed + bend * (t / dt - 0.5))
+def bend_until(state, i, normal, t, dt):
+    """By how much body i is faster along a normal at time t than a straight path says. That has the velocity of the end
+    of the step, which free flight has in the middle of it, and what contacts hold in the middle of its last substep.
+    With that of another time what always meets the floor at the same phase of a step hops for ever."""
+    bodies, lag = state.bodies, 0.5
+    bend = dot(sub(bodies.linear_velocity[i], bodies.start_velocity[i]), normal)
+    if is_held(state, i):
+        lag, forced = 1.0 - 0.5 / state.substeps, bodies.force_speed_change[i]
+        bend = min(max(bend, -forced), forced)  # their push is no force
+    return bend * (t / dt - lag)
 
 
 @part
@@ -321,8 +326,9 @@ def queue_touch(state, c, path, found, touch, e, dt):
     if not passive:
         kind, speed = approach_speed(state, c, path, touch, found, dt)
         e = 0.0 if kind == HAND_OVER else e
-    if state.path_degree == 1 and e != 1.0 and kind == IMPACT:
-        speed = correct_speed(state, a, b, touch, speed, dt)
+    # Elastic pairs that fly freely reflect the path: their flight then runs backwards exactly, and nothing drifts.
+    if state.path_degree == 1 and kind == IMPACT and (e != 1.0 or is_held(state, a) or is_held(state, b)):
+        speed = min(0.0, speed + bend_until(state, b, normal, t, dt) - bend_until(state, a, normal, t, dt))
         if impacts.sweeps:
             rounding = ROUNDING * (length(bodies.path_velocity[a]) + length(bodies.path_velocity[b]))
             if not speed < -rounding:  # not in the flight

@@ -173,13 +173,14 @@ def end_worklist(state, dt):
 def search_worklist(state, dt, far):
     """Queue the next impact of each of its pairs; then it is empty."""
     impacts, pairs, listed = state.impacts, state.pairs, state.impacts.listed
+    worklist = impacts.worklist
     impacts.looked += listed
     for q in range(min(AHEAD, listed) if far else 0):
-        request_bodies(state, impacts.worklist[q])
+        request_bodies(state, worklist[q])
     for q in range(listed):
-        c = impacts.worklist[q]
+        c = worklist[q]
         if far and q + AHEAD < listed:
-            request_bodies(state, impacts.worklist[q + AHEAD])
+            request_bodies(state, worklist[q + AHEAD])
         if pairs.is_solid[c] or impacts.sweeps:
             queue_next_impact(state, c, impacts.listed_since[q], dt)
     impacts.listed = 0

@@ -63,12 +63,12 @@ def link_pairs(state):
 def list_pairs_of(state, i, but, dt):
     """Body i goes on from an impact: list its pairs but one from now on, and note when it may leave its bounds. What is
     known of them was with the shape as it was turned before."""
-    impacts, bodies = state.impacts, state.bodies
+    impacts, bodies, now = state.impacts, state.bodies, state.impacts.now
     i = owner_of(state, i)
     k = i if impacts.sweeps and bodies.impact_count[i] < STOPPED else -1
     while k >= 0:
-        bodies.last_impact[k] = impacts.now
-        impacts.until = min(impacts.until, leaves_bounds_at(state, k, impacts.now, dt))
+        bodies.last_impact[k] = now
+        impacts.until = min(impacts.until, leaves_bounds_at(state, k, now, dt))
         k = next_row(state, k)
     if not impacts.linked:
         link_pairs(state)
@@ -78,7 +78,7 @@ def list_pairs_of(state, i, but, dt):
         if state.spinning:
             forget_manifold(state.pairs, c)
         if c != but:
-            list_pair(impacts, c, impacts.now)
+            list_pair(impacts, c, now)
         entry = impacts.links[entry]
 
 

@@ -345,12 +345,13 @@ def check_flight(state, dt):
     """
     bodies, usual = state.bodies, state.flight_usual
     position, velocity = bodies.position, bodies.linear_velocity
-    for i in range(max(state.flight_seen, state.first), state.moving):
+    first, moving = state.first, state.moving
+    for i in range(max(state.flight_seen, first), moving):
         usual &= is_near_origin(position[i], velocity[i])
     state.flight_usual = usual
     if state.quarantining or (state.others_write and not are_columns_sound(state)):
         return CHECK_FLIGHT
-    for i in range(state.moving if usual else state.first, state.moving):
+    for i in range(moving if usual else first, moving):
         if is_out_of_range(state, i, dt):
             return CHECK_FLIGHT
     return OK
@@ -359,17 +360,18 @@ def check_flight(state, dt):
 def note_path(state, dt):
     """x(t) = x0 + p1 t + p2 t^2 + p3 t^3 for the dynamic bodies, x0 + v t for the kinematic ones."""
     bodies, degree, dynamic = state.bodies, state.path_degree, state.dynamic
+    first, moving = state.first, state.moving
     v0, v1, path = bodies.start_velocity, bodies.linear_velocity, bodies.path_velocity
-    for i in range(state.first, state.moving if state.sweeping else 0):
+    for i in range(first, moving if state.sweeping else 0):
         bodies.origin[i] = bodies.previous_position[i]
-    for i in range(state.first, state.moving):
+    for i in range(first, moving):
         path[i] = v1[i] if degree == LINE and not state.moves_with_old_velocity else v0[i]
     if degree == LINE:
         return 0
     second, third, zero = bodies.path_second, bodies.path_third, zero_of(state)
-    for i in range(dynamic, state.moving):
+    for i in range(dynamic, moving):
         second[i], third[i] = zero, zero
-    for i in range(state.first, dynamic):
+    for i in range(first, dynamic):
         travel = sub(bodies.position[i], bodies.previous_position[i])
         if state.flies:  # event-driven: the parabola itself
             path[i], second[i], third[i] = bodies.flight_velocity[i], bodies.acceleration[i], zero

@@ -87,7 +87,8 @@ def depth_bound(pairs, c, d):
 def depth_bound_on_path(state, c):
     """The most that the depth may be anywhere on the way of the step, however the two are turned there; infinity if
     one has had an impact, which leads it elsewhere."""
-    bodies, pairs, a, b = state.bodies, state.pairs, state.pairs.a[c], state.pairs.b[c]
+    bodies, pairs = state.bodies, state.pairs
+    a, b = pairs.a[c], pairs.b[c]
     if bodies.impact_count[a] + bodies.impact_count[b] > 0:
         return math.inf
     depth = depth_bound(pairs, c, centre_offset_at_start(bodies, a, b))

@@ -164,21 +164,21 @@ def make_find_all(
     @pasted
     def gather_of_grid(state, batch, grid, low, high, found):
         """The same of a grid."""
-        begin, outlined, cells = found, outline(grid, low, high), cells_around(grid, low, high)
+        begin, outlined, cells, rows = found, outline(grid, low, high), cells_around(grid, low, high), batch.row
         for n in range(-1, cells[1]):
             first, end = places_of(grid, cells, n)
-            if found + (end - first) > len(batch.row):
+            if found + (end - first) > len(rows):
                 return NO_ROOM
             for start in range(first, end, LANES):
                 bits = may_be_near_at(grid, n, start, end, outlined)
                 while bits != 0:
-                    batch.row[found] = row_at(grid, n, start + lowest_bit(bits))
+                    rows[found] = row_at(grid, n, start + lowest_bit(bits))
                     bits &= bits - 1
                     found += 1
         near = begin
         for k in range(begin, found):
-            i = batch.row[k]
-            batch.row[near] = i
+            i = rows[k]
+            rows[near] = i
             near += is_box_near(state, i, low, high)
         return near
 

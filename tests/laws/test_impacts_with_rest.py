@@ -113,6 +113,25 @@ def test_a_stack_is_hit_from_above(d, e, deepest):
     assert overlaps(world, ids).max() < SLOP
 
 
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("seed", seeds(4, 200))
+def test_a_ball_that_leans_on_a_wall_bounces_as_one_that_does_not(seed, mode):
+    """Gravity leads to the wall, too: with e = .3 to .9 the ball comes to rest in 20 s, wherever in a step it meets the
+    floor; with e = 1 it never gets higher than it was."""
+    random = np.random.default_rng(seed)
+    e, height, aside = float(random.choice([0.3, 0.5, 0.8, 0.9, 1.0])), random.uniform(0.05, 2), random.uniform(1, 10)
+    with make_world(2, gravity=(-aside, -9.81), collision=mode) as world:
+        floor(world)
+        box(world, (-1.0, 0.0), half=(0.5, 20.0), kind="static")
+        entity = ball(world, (0.0, 0.5 + height), restitution=e)
+        highest = 0.0
+        for _ in range(1200):
+            world.step()
+            highest = max(highest, position(world, entity)[1] - 0.5)
+        assert highest <= height * 1.005
+        assert e == 1.0 or np.abs(velocity(world, entity)).max() < 1e-3
+
+
 @pytest.mark.parametrize(("mode", "mass", "e"), pairwise(MODES, (1.0, 10.0, 40.0, 100.0), (0.3, 0.8)))
 def test_a_heavy_ball_falls_on_a_plank_that_lies(mode, mass, e):
     """Two metres onto a plank of 1 kg and .2 m, on a floor with e = 0: the floor stops both, and no energy comes in."""

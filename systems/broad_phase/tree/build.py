@@ -216,6 +216,7 @@ def assign_cells(tree):
     Crowding is the sum of squared cell counts: twice the candidates within cells.
     """
     levels, directory, used = tree.levels, tree.directory, build_levels(tree)
+    begin, end = tree.level_begin, tree.level_end
     for k in range(used + 2):
         directory[k] = 0
     find_tree_cells(tree, used)
@@ -227,11 +228,11 @@ def assign_cells(tree):
         directory[k + 2] = total
     for level in range(levels + 2):
         base = tree.level_base[level]
-        tree.level_begin[level] = directory[base + 1]
-        tree.level_end[level] = directory[base + tree.level_cells[level] + 1]
-    tree.crowding, tree.count = crowding, tree.level_end[levels]
-    found = tree.level_end[0] - tree.level_begin[0]
-    top = tree.level_end[levels] - tree.level_begin[levels]
+        begin[level] = directory[base + 1]
+        end[level] = directory[base + tree.level_cells[level] + 1]
+    tree.crowding, tree.count = crowding, end[levels]
+    found = end[0] - begin[0]
+    top = end[levels] - begin[levels]
     suits = crowding <= CROWDED_LEVEL * found and top <= TOO_MANY + (tree.stop - tree.start) // 256
     return SUITS if suits else CROWDED_CELLS
 

@@ -32,7 +32,7 @@ def cover(tree, low, high, level):
     shrink = tree.level_scale[level]
     scale = tree.inverse_cell * shrink
     origin, lowest, highest = tree.origin[0], tree.lowest[0], tree.highest[0]
-    first, size = tree.level_shift[level], tree.level_cells[level]
+    first, size, stride = tree.level_shift[level], tree.level_cells[level], tree.level_stride
     span, n0, n1, n2 = int64(1), int64(1), int64(1), int64(1)
     for q in range(len(low)):
         # Clamping to what is there keeps numbers small and makes a floor of any length cost no more than the scene.
@@ -51,11 +51,11 @@ def cover(tree, low, high, level):
         n0 = length if q == 0 else n0
         n1 = length if q == 1 else n1
         n2 = length if q == 2 else n2
-        first += index * tree.level_stride[level, q]
-        span += (length - 1) * tree.level_stride[level, q]
+        first += index * stride[level, q]
+        span += (length - 1) * stride[level, q]
     if span >= size:  # always so for the top level's only cell
         return int64(0), size, int64(1), int64(1)
-    row, layer = tree.level_stride[level, 1], tree.level_stride[level, 2]
+    row, layer = stride[level, 1], stride[level, 2]
     if n0 >= row:  # runs as long as a row join into one
         n0, n1 = n0 + (n1 - 1) * row, int64(1)
         if n0 >= layer:

@@ -24,13 +24,14 @@ from .records import WARM_START_ROWS
 def scale_to(state, dt):
     """The impulses that belong to steps of other length than this one."""
     memory, now = state.warm_start, state.warm_start.now
-    if dt != memory.step[now]:
-        by = dt / memory.step[now]
+    step = memory.step
+    if dt != step[now]:
+        by = dt / step[now]
         for m in range(memory.counts[now]):
             memory.impulse[now, m] *= by
             memory.tangent[now, m] = scale(memory.tangent[now, m], by)
             memory.total[now, m] *= by
-        memory.step[now] = dt
+        step[now] = dt
 
 
 @part
