@@ -213,15 +213,18 @@ def is_held(state, i):
 
 
 @part
-def bend_until(state, i, normal, t, dt):
+def bend_until(state, i, e, normal, t, dt):
     """By how much body i is faster along a normal at time t than a straight path says. That has the velocity of the end
     of the step, which free flight has in the middle of it, and what contacts hold in the middle of its last substep.
-    With that of another time what always meets the floor at the same phase of a step hops for ever."""
+    With that of another time what always meets the floor at the same phase of a step hops for ever. Where e is 1 what
+    flies freely reflects its path: its flight then runs backwards exactly, and nothing drifts."""
     bodies, lag = state.bodies, 0.5
     bend = dot(sub(bodies.linear_velocity[i], bodies.start_velocity[i]), normal)
     if is_held(state, i):
         lag, forced = 1.0 - 0.5 / state.substeps, bodies.force_speed_change[i]
         bend = min(max(bend, -forced), forced)  # their push is no force
+    elif e == 1.0:
+        bend = 0.0
     return bend * (t / dt - lag)
 
 
@@ -326,9 +329,8 @@ def queue_touch(state, c, path, found, touch, e, dt):
     if not passive:
         kind, speed = approach_speed(state, c, path, touch, found, dt)
         e = 0.0 if kind == HAND_OVER else e
-    # Elastic pairs that fly freely reflect the path: their flight then runs backwards exactly, and nothing drifts.
     if state.path_degree == 1 and kind == IMPACT and (e != 1.0 or is_held(state, a) or is_held(state, b)):
-        speed = min(0.0, speed + bend_until(state, b, normal, t, dt) - bend_until(state, a, normal, t, dt))
+        speed = min(0.0, speed + bend_until(state, b, e, normal, t, dt) - bend_until(state, a, e, normal, t, dt))
         if impacts.sweeps:
             rounding = ROUNDING * (length(bodies.path_velocity[a]) + length(bodies.path_velocity[b]))
             if not speed < -rounding:  # not in the flight
