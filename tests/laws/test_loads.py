@@ -126,12 +126,9 @@ def blow(mode, mass, e, *, d=2, height=14.0):
         return Blow(thinnest, speed(world))
 
 
-THINNEST = {0.0: 0.98, 0.5: 0.48}  # by restitution: that of a plastic blow, and of one that throws the boxes up
-
-
 @both_dimensions
-@pytest.mark.parametrize(("e", "mode"), list(itertools.product(THINNEST, MODES)))
+@pytest.mark.parametrize(("e", "mode"), list(itertools.product((0.0, 0.5), MODES)))
 def test_a_blow_squeezes_nothing(e, mode, d):
     found = blow(mode, 100.0, e, d=d)
-    assert found.thinnest >= THINNEST[e]
+    assert found.thinnest >= 0.98
     assert np.isfinite(found.speed)
