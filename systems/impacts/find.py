@@ -214,18 +214,17 @@ def is_held(state, i):
 
 @part
 def bend_until(state, i, e, normal, t, dt):
-    """By how much body i is faster along a normal at time t than a straight path says. That has the velocity of the end
-    of the step, which free flight has in the middle of it, and what contacts hold in the middle of its last substep.
-    With that of another time what always meets the floor at the same phase of a step hops for ever. Where e is 1 what
-    flies freely reflects its path: its flight then runs backwards exactly, and nothing drifts."""
-    bodies, lag = state.bodies, 0.5
+    """By how much body i is faster along a normal at time t than a straight path says, which has the velocity of the
+    middle of the step. With that of another time what always meets the floor at the same phase of a step hops for ever.
+    Where e is 1 what flies freely reflects its path: its flight then runs backwards exactly, and nothing drifts."""
+    bodies = state.bodies
     bend = dot(sub(bodies.linear_velocity[i], bodies.start_velocity[i]), normal)
     if is_held(state, i):
-        lag, forced = 1.0 - 0.5 / state.substeps, bodies.force_speed_change[i]
+        forced = bodies.force_speed_change[i]
         bend = min(max(bend, -forced), forced)  # their push is no force
     elif e == 1.0:
         bend = 0.0
-    return bend * (t / dt - lag)
+    return bend * (t / dt - 0.5)
 
 
 @part

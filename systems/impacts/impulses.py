@@ -106,8 +106,9 @@ def is_immovable(bodies, i):
 @inlined
 def touch_of_event(state, event):
     """(point from the centre of a's shape, normal, from that centre to that of b's shape) of an impact."""
-    impacts, c, t = state.impacts, state.impacts.event_pair[event], state.impacts.event_time[event]
-    one, other = centre_at(state, state.pairs.a[c], t), centre_at(state, state.pairs.b[c], t)
+    impacts, pairs = state.impacts, state.pairs
+    c, t = impacts.event_pair[event], impacts.event_time[event]
+    one, other = centre_at(state, pairs.a[c], t), centre_at(state, pairs.b[c], t)
     return sub(impacts.event_point[event], one), impacts.event_normal[event], sub(other, one)
 
 
@@ -137,18 +138,17 @@ def bounce_pair(state, event, dt):
     if state.spinning and is_joined(state, a, b):  # what joints answer may leave less of it
         impulse, friction = impacts.event_change[event] * mass, scale(impacts.event_pull[event], mass)
         call_turn_by_impact(state.links[JOINED_IMPACT], state, event, impulse, friction, dt)
-    # of the bodies' relative velocity, with what friction adds to it
-    change = add(scale(impacts.event_normal[event], impacts.event_change[event]), impacts.event_pull[event])
+    faster, pull = impacts.event_change[event], impacts.event_pull[event]
+    change = add(scale(impacts.event_normal[event], faster), pull)  # of the bodies' relative velocity, by friction too
     if state.spinning:
-        impulse, friction = impacts.event_change[event] * mass, scale(impacts.event_pull[event], mass)
-        call_turn_by_impact(state.links[TURN_BY_IMPACT], state, event, impulse, friction, dt)
+        call_turn_by_impact(state.links[TURN_BY_IMPACT], state, event, faster * mass, scale(pull, mass), dt)
     for i, push in ((a, -mass), (b, mass)):
         if inverse_mass[i] > 0.0:  # what cannot be moved is as it was: its other impacts stand, and no cap is on it
             count_impact(state, i, counted)
             if impacts.sweeps:
                 note_trapped(state, i, is_immovable(bodies, a + b - i))
             deflect(state, i, scale(change, push * inverse_mass[i]), now, dt)
-    log_impact(state, event, impacts.event_change[event] * mass)
+    log_impact(state, event, faster * mass)
 
 
 @part

@@ -190,7 +190,7 @@ def given_in_flight(state, i):
         return zero_of(state)
     share = 2.0 * (impacts.now - impacts.since) / impacts.end
     if state.path_degree == 1:
-        share = state.force_travels if impacts.since == 0.0 else 0.0
+        share = 0.5 + 0.5 / state.substeps if impacts.since == 0.0 else 0.0
     return scale(bodies.warm_start_velocity[k], share)
 
 

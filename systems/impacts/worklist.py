@@ -104,7 +104,9 @@ def list_landings(state, c, now):
         entry = impacts.heads[owner_of(state, i)] if free else -1
         while entry >= 0:
             p = entry // 2
-            one, other = (pairs.a[p], pairs.b[p]) if entry % 2 == 0 else (pairs.b[p], pairs.a[p])
+            one, other = pairs.a[p], pairs.b[p]
+            if entry % 2 == 1:
+                one, other = other, one
             fixed, room = bodies.inverse_mass[other] == 0.0, FAST * smaller_extent(bodies, one, other)
             if p != c and pairs.is_solid[p] and fixed and bounce_threshold(state, one, other) * now > room:
                 list_pair(impacts, p, 0.0)

@@ -63,24 +63,24 @@ def phi3(z):
 def keep_start(state, dt):
     """previous_position and start_velocity are the state at the start of the step; for going back, kept_previous is the
     start of the one before."""
-    bodies, first = state.bodies, state.first
+    bodies, first, kept = state.bodies, state.first, state.kept_rows
     state.path_degree, state.drifted = state.usual_path_degree, False
     state.flight_usual, state.flight_seen = True, 0
     previous, position = bodies.previous_position, bodies.position
     start, velocity = bodies.start_velocity, bodies.linear_velocity
     # Of sleepers and static bodies the two are equal, see box_statics.
     if state.others_write:  # every column is kept
-        for i in range(first, state.kept_rows):
+        for i in range(first, kept):
             previous[i] = position[i]
     else:
         state.kept |= KEEPS_START
-        for i in range(first, state.kept_rows):
+        for i in range(first, kept):
             bodies.kept_previous[i] = previous[i]
             previous[i] = position[i]
     turned, rotation, width = bodies.previous_rotation, bodies.rotation, 1 if len(zero_of(state)) == 2 else 4
     if len(turned) > 0 and len(rotation) > 0:
         start_row = first if state.boxed_version == state.statics_version else 0  # else other rows sleep
-        for k in range(width * start_row, width * state.kept_rows):
+        for k in range(width * start_row, width * kept):
             turned[k] = rotation[k]
     if state.limits_speed:  # systems may have pushed since the forces were summed
         for i in range(first, state.dynamic):
@@ -305,7 +305,8 @@ def end_flight(state, dt):
     """Limits of speed, kinematic bodies, and the forces of this step, which have done their work."""
     bodies, dynamic = state.bodies, state.dynamic
     position, velocity = bodies.position, bodies.linear_velocity
-    pushed = (state.pushed or state.others_write) and len(bodies.step_force) > 0
+    force = bodies.step_force
+    pushed = (state.pushed or state.others_write) and len(force) > 0
     if state.limits_speed:
         state.flight_usual, state.flight_seen = True, 0
         for i in range(state.first, dynamic):
@@ -317,9 +318,9 @@ def end_flight(state, dt):
     if has_pushes(state):
         state.kept |= KEEPS_FORCE
         for i in range(state.force_first, dynamic):
-            bodies.kept_step_force[i] = bodies.step_force[i]
+            bodies.kept_step_force[i] = force[i]
     for i in range(state.force_first, dynamic if pushed else 0):
-        bodies.step_force[i] = zero_of(state)
+        force[i] = zero_of(state)
     state.forces_summed, state.moved = False, True
     state.motion_version += 1
     return 0

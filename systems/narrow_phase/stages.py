@@ -267,8 +267,8 @@ def evaluate_levels(state, dt):
         a, b, solid = pairs.a[c], pairs.b[c], pairs.is_solid[c]
         margin = contact_margin(state, span, a, b) if span > 0.0 and solid else 0.0
         loose = bodies.level_not_enclosing[a] or bodies.level_not_enclosing[b]
-        pairs.early[kept] = pairs.early[c] and not loose
-        position = bodies.previous_position if pairs.early[kept] else bodies.position
+        pairs.early[kept] = early = pairs.early[c] and not loose
+        position = bodies.previous_position if early else bodies.position
         dropped, hit, depth, normal, point = evaluate_levels_of(state, a, b, position, loose, margin)
         pairs.a[kept], pairs.b[kept], pairs.is_solid[kept] = a, b, solid
         pairs.hit[kept], pairs.depth[kept] = hit, depth

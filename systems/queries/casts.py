@@ -144,14 +144,14 @@ def cast_at(state, batch, q, path, i, box, between):
 @pasted
 def cast_in_grid(state, batch, grid, q):
     """What query q meets of the bodies in a grid: first of those outside of it, then slice by slice."""
-    lowest, highest = frame_of(grid)
+    (lowest, highest), limits = frame_of(grid), batch.search_limit
     path = cast_path(state, batch, q, box_rounding(batch.centre[q], lowest, highest))
     enter, leave = box_interval(lowest, highest, path, math.inf)
-    meets, first = enter <= leave and enter <= batch.search_limit[q] * SLICE_SLACK, -1
+    meets, first = enter <= leave and enter <= limits[q] * SLICE_SLACK, -1
     enter, leave = (enter, leave) if meets else (0.0, 0.0)
     begin = enter
     while True:
-        reach = batch.search_limit[q] * SLICE_SLACK
+        reach = limits[q] * SLICE_SLACK
         end = min(begin + SLICE / grid.inverse_cell, leave)
         low, high = slice_box(path, begin, min(end, reach))
         outlined, cells = outline(grid, low, high), cells_around(grid, low, high)
@@ -165,7 +165,7 @@ def cast_in_grid(state, batch, grid, q):
                     i = row_at(grid, n, start + lowest_bit(bits))
                     bits &= bits - 1
                     cast_at(state, batch, q, path, i, (state.bodies.lower[i], state.bodies.upper[i]), between)
-        if last or not end <= batch.search_limit[q] * SLICE_SLACK:
+        if last or not end <= limits[q] * SLICE_SLACK:
             return
         begin, first = end, 0
 
@@ -202,8 +202,8 @@ def begin_cast(state, batch, q):
     way = batch.direction[q]
     size = length(way)
     batch.direction[q] = divided(way, size) if size > 0.0 else way
-    batch.limit[q] = min(batch.limit[q] if batch.is_ray else size, ENDLESS)
-    batch.search_limit[q] = batch.limit[q]
+    limit = min(batch.limit[q] if batch.is_ray else size, ENDLESS)
+    batch.limit[q] = batch.search_limit[q] = limit
     if batch.only_nearest:
         batch.row[q], batch.entity[q], batch.distance[q], batch.fraction[q] = -1, -1, math.inf, 1.0
         batch.normal[q] = batch.point[q] = nan_vector(zero_of(state))

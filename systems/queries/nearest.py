@@ -27,13 +27,13 @@ def squared_gap(low, high, point, slack):
 @pasted
 def improve_nearest(state, batch, q, i, gap):
     """Compare what query q has as its nearest with row i, the square of the distance to whose box is ``gap``."""
-    point, ids, best = batch.centre[q], state.bodies.entity, batch.distance[q]
+    point, ids, best, known = batch.centre[q], state.bodies.entity, batch.distance[q], batch.row[q]
     outside = max(best, 0.0)
     if gap <= outside * outside and is_wanted(state, batch, q, i):
         d = to_collider(state, point, i)
         _, depth, normal, _ = evaluate_against(state, batch.query, q, state.bodies.shape[i], i, d)
         distance = -depth
-        if distance < best or (distance == best and not (batch.row[q] >= 0 and ids[batch.row[q]] <= ids[i])):
+        if distance < best or (distance == best and not (known >= 0 and ids[known] <= ids[i])):
             batch.row[q], batch.distance[q] = i, distance
             batch.normal[q] = sub(zero_of(state), normal)
             batch.point[q] = add_scaled(point, normal, distance)

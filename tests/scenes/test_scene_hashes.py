@@ -11,10 +11,10 @@ import pytest
 from carom import scenes
 
 HASHES = {
-    "pile2d": ({"n": 40}, "e1f24cf748c2498c94db16321141435a51433acf680f5b48024c365de7b970a9"),
-    "pile3d": ({"n": 27}, "cab0d89851ae420ef135f53298726e508c298dcf1f3f717bb124baaf2908392b"),
+    "pile2d": ({"n": 40}, "0aa00ce13adbdce832b73464c7130bd7a97ad99ad58cfc1ee88787df4601e4a2"),
+    "pile3d": ({"n": 27}, "e4300420ce26b5aeb4f1edcdd696e3de5685e6fdb56dc708878a2864b2334ad6"),
     "tumbler": ({"n": 12}, "0c1980139e89fde1c589cce28d44e01f52c316eeab435314c4e599fccb103c62"),
-    "bridge": ({"n": 8, "crates": 2}, "13bf94e626147b1517fb307cd0608a3d8ec0945c8f392456ac5c43341bfd9404"),
+    "bridge": ({"n": 8, "crates": 2}, "89b02bbea34e848cb5dd40e7357479776f5ad7175bf5e11c378742a1b600cc65"),
     "ragdoll": ({"n": 1}, "de743f5efcba4ed41888d4a8590839b475e44f4c8fe3caadd0b6517e8826df34"),
 }
 STEPS = 60

@@ -75,12 +75,21 @@ ROOM_FOR_SUPPORT = (
 )  # fmt: skip
 
 
+@part
+def lead_of_hold(state, i):
+    """By how much faster body i moves in the substeps of the solver, each with the velocity of its end, than the
+    integrator moves it, which lets a change of velocity by forces act for the share ``force_travels`` of the step."""
+    bodies, travels = state.bodies, state.force_travels
+    change = sub(bodies.linear_velocity[i], bodies.start_velocity[i])
+    lead = scale(change, 0.5 + 0.5 / state.substeps - travels)
+    return add_scaled(lead, bodies.warm_start_velocity[i], travels)
+
+
 @packed
 def predict_rest(state, dt):
     """Correct velocity, position and path of the bodies that were held in the last step.
 
-    What held them acts like a force throughout the step, which displaces by ``force_travels`` times dt times the change
-    of velocity: what the integrator makes of a force.
+    What held them acts like a force throughout the step, and they move as the solver is to move them.
     """
     bodies = state.bodies
     state.any_warm_started = False
@@ -103,11 +112,12 @@ def predict_rest(state, dt):
                 dv = scale(dv, most / given)
             bodies.linear_velocity[i] = add(flown, dv)
             bodies.warm_start_velocity[i] = dv
-            bodies.position[i] = add_scaled(bodies.position[i], dv, travels * dt)
+            lead = lead_of_hold(state, i)
+            bodies.position[i] = add_scaled(bodies.position[i], lead, dt)
             if state.path_degree > 1:
+                lead = add_scaled(lead, dv, -travels)
                 bodies.path_second[i] = add_scaled(bodies.path_second[i], dv, travels / dt)
-            else:
-                bodies.path_velocity[i] = add_scaled(bodies.path_velocity[i], dv, travels)
+            bodies.path_velocity[i] = add(bodies.path_velocity[i], lead)
     copy_prediction_to_parts(state)
     return OK
 
@@ -116,10 +126,9 @@ def predict_rest(state, dt):
 def drop_support(state, dt):
     """Bodies that no contact has pushed after all fly as the integrator said. What has had an impact stays on the path
     that this has given it: beside it there may be a wall."""
-    bodies, travels = state.bodies, state.force_travels
+    bodies = state.bodies
     for i in range(state.first, state.moving):
         if bodies.warm_started[i] and not bodies.held[i]:
-            dv = bodies.warm_start_velocity[i]
             if bodies.impact_count[i] == 0:
-                bodies.position[i] = add_scaled(bodies.position[i], dv, -travels * dt)
-            bodies.linear_velocity[i] = sub(bodies.linear_velocity[i], dv)
+                bodies.position[i] = add_scaled(bodies.position[i], lead_of_hold(state, i), -dt)
+            bodies.linear_velocity[i] = sub(bodies.linear_velocity[i], bodies.warm_start_velocity[i])
