@@ -270,7 +270,7 @@ PAIR_COLUMNS = Section(
     crossed=flags(),  # they have met on their way, and have not pushed
     impulse=floats(unit="N s"),
     struck=floats(unit="s"),  # time of its last impact in this step, where there is an impulse
-    parting=ints("uint8"),
+    parts=flags(),  # and if it rests, is borne so that it may be sent back
     # the manifold, made once in a step: what the pair's function says of
     at=vectors(unit="m"),  # this way from the centre of a's shape to that of b's; nan: of none
     depth=floats(unit="m"),

@@ -15,7 +15,6 @@ from ..forces.stages import is_zero
 from ..impacts.impulses import STOPPED, is_beyond_cap, is_trapped
 from ..integration.trajectory import ROUNDING, along, relative_path
 from ..integration.turning import arms_to, closing_by_spin, is_turned, size_of_turn
-from ..joints.groups import is_joined
 from ..linking.parts import ARMS_AT_REST, TOUCH_OF_TURN, call_of_step, call_touch_of_turn
 from ..narrow_phase.manifolds import (
     centre_offset,
@@ -60,7 +59,6 @@ ENTRY_ITERATIONS = 24
 STAYS_SLOPS = 1e-3  # slops: two bodies that go less far past each other in a step stay where they are
 REST_GAP = 1e-11  # of the extent: a smaller gap is none, not even as seen past a round corner
 NORMAL_PROBE, NORMAL_VARIATION = 1e-6, 1e-9  # of the extent: so near the normal differs, by this much of its cosine
-STATIONARY, SEPARATES_SLOWLY, SEPARATES = range(3)  # what an elastic pair does at the end of the step
 
 
 @inlined
@@ -186,7 +184,7 @@ def support_along(bodies, a, b, normal):
 def still_bounces(state, dt, c, depth, normal, turns):
     """Whether a pair that bounces is no contact at rest: it meets in the next step only, or is on its way out.
 
-    Notes in pairs.parting how it parts. turns: so far that only sweeps search its impacts.
+    Notes in pairs.parts whether it parts. turns: so far that only sweeps search its impacts.
     """
     pairs, bodies = state.pairs, state.bodies
     a, b, velocity = pairs.a[c], pairs.b[c], bodies.linear_velocity
@@ -206,26 +204,23 @@ def still_bounces(state, dt, c, depth, normal, turns):
         known = (known or (e == 1.0 and depth <= FAST * extent)) and (not turns or is_swept(state, a, b, extent))
         if known and abs(speed) > threshold and is_turning(state, dt, a, b):
             return True  # its next impact is searched with the shapes as they are turned then
-    touches = depth > (SAME_PLACE * extent if pairs.impulse[c] == 0.0 else 0.0)
+    struck = pairs.impulse[c] > 0.0
     held = support_along(bodies, a, b, normal)  # without which they are nearer, and close faster
     near = driven_travel(state, a) + driven_travel(state, b)  # as a motor may bring them together in this step
     if speed >= -held:
         near += held * state.force_travels * dt
-    if not touches and speed < -threshold and not (near > 0.0 and depth >= -near):
+    farthest = -near if near > 0.0 else 0.0 if struck else SAME_PLACE * extent
+    if speed < -threshold and depth <= farthest:
         return True  # the next step's impact
-    if speed > 0.0:
-        pairs.parting[c] = SEPARATES if speed > threshold and speed * dt > slop else SEPARATES_SLOWLY
-    if pairs.impulse[c] > 0.0 and speed > threshold:
-        before, _ = depth_at(state, c, centre_offset_at_start(bodies, a, b), extent, True)
-        return before < 0.0  # on its way out
-    return False
+    pairs.parts[c] = parts = speed > threshold
+    return parts and struck  # on its way out
 
 
 @inlined
 def is_borne(state, i):
-    """Whether contacts have held row i in the last step."""
-    bodies, k = state.bodies, owner_of(state, i)
-    return bodies.warm_started[k] and not (is_joined(state, k, k) and bodies.swings[k])
+    """Whether a contact at rest that has been found bears row i."""
+    k = owner_of(state, i)
+    return state.impacts.borne[k] and state.bodies.inverse_mass[k] > 0.0
 
 
 @part
@@ -242,10 +237,9 @@ def is_resting(state, dt, c):
         return False
     d = centre_offset(bodies, a, b)
     turns = state.spinning and turns_far(state, a, b)
-    struck, parts = pairs.impulse[c] > 0.0, STATIONARY
-    if struck and (is_borne(state, a) or is_borne(state, b)):  # what bears one may send it back to the other
-        parts = SEPARATES
-    elif struck and turns and state.impacts.sweeps and restitution_of(state, a, b) > 0.0:  # it has left
+    struck = pairs.impulse[c] > 0.0
+    parts = struck and (pairs.early[c] or is_borne(state, a) or is_borne(state, b))  # what bears one may send it back
+    if struck and not parts and turns and state.impacts.sweeps and restitution_of(state, a, b) > 0.0:  # it has left
         return False
     if pairs.early[c] and not hit and not turns and is_at_manifold(pairs, c, d, smaller_extent(bodies, a, b)):  # usual
         depth, normal, far = depth_by_plane(pairs, c, d), pairs.normal[c], False
@@ -261,26 +255,33 @@ def is_resting(state, dt, c):
                 if before >= -margin:
                     depth, normal, far = before, across, True
     was_near = near_contact[c] and has_manifold(pairs, c)  # not so pairs that were found within the step
-    stays = depth >= 0.0 or parts != STATIONARY or (was_near and not hit and not turns)
+    stays = depth >= 0.0 or parts or (was_near and not hit and not turns)
     if not stays and depth < -turning_margin(state, dt, a, b):
         return False  # else it may have been pushed too much by the prediction
     if depth >= 0.0:
         near_contact[c] = True
-    pairs.parting[c] = parts
-    if state.impacts.active and parts == STATIONARY and still_bounces(state, dt, c, depth, normal, turns):
+    pairs.parts[c] = parts
+    if not parts and state.impacts.active and still_bounces(state, dt, c, depth, normal, turns):
         return False
     return far or not meets_at_corner(state, a, b, d, (depth, normal), slop_of(state, a, b))
 
 
 def find_resting(state, dt):
-    """The pairs that are contacts at rest, in canonical order."""
-    pairs, count, rows = state.pairs, 0, 0
-    if not state.response_idle:
-        for c in range(pairs.count):
-            pairs.rests[c] = pairs.is_solid[c] and is_resting(state, dt, c)
-            if pairs.rests[c]:
-                pairs.resting[count], pairs.near_contact[c] = c, True
-                count, rows = count + 1, rows + (points_of(state, c) if state.spinning else 1)
+    """The pairs that are contacts at rest, in canonical order. What impacts have parted, and did not rest before, is
+    looked at last: what bears one of the two may send it back to the other."""
+    pairs, borne, count, rows = state.pairs, state.impacts.borne, 0, 0
+    a, b, impulse, rests, bounced = pairs.a, pairs.b, pairs.impulse, pairs.rests, state.impacts.logged > 0
+    looked = 0 if state.response_idle else pairs.count
+    for last in range(1 + bounced):
+        for c in range(looked):
+            if (impulse[c] > 0.0 and not pairs.early[c]) == last:
+                rests[c] = pairs.is_solid[c] and is_resting(state, dt, c)
+                if bounced and rests[c]:
+                    borne[owner_of(state, a[c])] = borne[owner_of(state, b[c])] = True
+    for c in range(looked):
+        if rests[c]:
+            pairs.resting[count], pairs.near_contact[c] = c, True
+            count, rows = count + 1, rows + (points_of(state, c) if state.spinning else 1)
     pairs.resting_count, state.solver.contacts, state.solver.any_tips = count, rows, rows > count
     state.resting_counted += count
     return OK if count == 0 or state.rest_ready else NEED_REST
@@ -355,7 +356,7 @@ def linearise(state, dt):
         if solver.point[r] > 0:  # as the first of the pair
             continue
         c = solver.pair[r]
-        a, b, parting = pairs.a[c], pairs.b[c], pairs.parting[c]
+        a, b, parts = pairs.a[c], pairs.b[c], pairs.parts[c]
         extent, d = smaller_extent(bodies, a, b), centre_offset_at_start(bodies, a, b)
         slop, end, struck_along = slop_for(state, extent), centre_offset(bodies, a, b), pairs.normal[c]
         if not is_at_manifold(pairs, c, d, extent):
@@ -365,26 +366,28 @@ def linearise(state, dt):
         varies = not convex and normal_varies(state, a, b, d, normal)
         way, struck = sub(end, d), bodies.impact_count[a] + bodies.impact_count[b] > 0
         slides = convex and not struck and gap + dot(way, normal) >= -STAYS_SLOPS * slop  # its plane parts them
-        moves, nears = not is_stationary(way, slop), apart and not slides
-        if moves and (nears or parting != STATIONARY or meets_at_corner(state, a, b, d, (-gap, normal), slop)):
+        if not is_stationary(way, slop) and (
+            parts or (apart and not slides) or meets_at_corner(state, a, b, d, (-gap, normal), slop)
+        ):
             flush = far = False
-            if convex and parting == STATIONARY:
+            if convex and not parts:
                 flush, gap, normal = plane_of_end(state, a, b, d, way, slop)
-            if not flush:
+            if not (flush or parts):
                 far, gap, normal = touch_of_long_way(state, dt, a, b, end)
-            if not flush and (not far or parting != STATIONARY):
-                gap, normal = entry(state, a, b, d, way, parting != STATIONARY, slop)
+            if not (flush or far):
+                gap, normal = entry(state, a, b, d, way, parts, slop)
             forget_manifold(pairs, c)
         if gap == math.inf:  # deep in a map that has no face there, at neither end: one that it does not reach
             gap = extent + length(way)
-        if pairs.impulse[c] > 0.0 and dot(normal, struck_along) <= 0.0:
+        bounced = pairs.impulse[c] > 0.0
+        if bounced and dot(normal, struck_along) <= 0.0:
             normal = struck_along  # coincident centres have parted: not back again
             forget_manifold(pairs, c)
         pairs.normal[c] = normal
         if apart and state.spinning and is_ball(state, a, normal) and is_ball(state, b, normal):
             apart = False  # neither has a corner to slide past
         # After an impact at time t the body seems to come from dv t behind: no overlap to be pushed out.
-        parts = parting == SEPARATES or (pairs.impulse[c] > 0.0 and gap > 0.0)
+        parts |= bounced and gap > 0.0
         mu = friction_at(state, a, b, (pairs.point[c], normal, d))
         has_friction |= mu != 0.0
         for e in range(r, r + rows_from(solver, r)):

@@ -78,14 +78,13 @@ def note_trapped(state, i, still):
 def log_impact(state, event, impulse):
     """Note its pair, time, impulse, normal and point; also with the pair."""
     impacts, pairs = state.impacts, state.pairs
-    logged, c = impacts.logged, impacts.event_pair[event]
-    pairs.normal[c] = impacts.event_normal[event]
+    logged, c, t = impacts.logged, impacts.event_pair[event], impacts.event_time[event]
+    normal = impacts.event_normal[event]
     pairs.impulse[c] += impulse
-    pairs.struck[c] = impacts.event_time[event]
+    pairs.normal[c], pairs.struck[c] = normal, t
     forget_manifold(pairs, c)
-    impacts.log_pair[logged], impacts.log_time[logged] = c, impacts.event_time[event]
-    impacts.log_impulse[logged] = impulse
-    impacts.log_normal[logged], impacts.log_point[logged] = impacts.event_normal[event], impacts.event_point[event]
+    impacts.log_pair[logged], impacts.log_time[logged], impacts.log_impulse[logged] = c, t, impulse
+    impacts.log_normal[logged], impacts.log_point[logged] = normal, impacts.event_point[event]
     impacts.logged += 1
 
 

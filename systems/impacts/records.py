@@ -22,7 +22,11 @@ EVENTS = Section(
     listed_since=floats(unit="s"),  # each from this time on
     links=ints("int32"),  # to a body's next pair
 )  # fmt: skip
-HEADS = Section("impact", "impacts", BOUNCED, heads=ints("int32"))  # the first pair of each body
+BEARINGS = Section(
+    "impact", "impacts", BOUNCED,
+    heads=ints("int32"),  # the first pair of each body
+    borne=flags(),  # a contact at rest bears it
+)  # fmt: skip
 # Impacts at the same time: the events, by member; lists of the members of each body.
 MEMBER_LISTS = Section("impact", "impacts", BOUNCED, next_member=ints("int32"))
 MEMBERS = Section(
@@ -54,7 +58,7 @@ LOG = Section(
     log_point=vectors(unit="m"),
 )  # fmt: skip
 IMPACTS = Schema(
-    "Impacts", EVENTS, HEADS, MEMBER_LISTS, MEMBERS, BODIES_OF_MEMBERS, LOG,
+    "Impacts", EVENTS, BEARINGS, MEMBER_LISTS, MEMBERS, BODIES_OF_MEMBERS, LOG,
     active=flag(),  # something may bounce in this step
     sweeps=flag(),  # bodies are swept
     waiting=integer(),

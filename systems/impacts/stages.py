@@ -14,7 +14,7 @@ from ..narrow_phase.stages import flag_fast_bodies
 from .find import queue_next_impact
 from .heap import heap_pop, is_current
 from .impulses import CROSSING, IMPACT, STOPPED, bounce_pair, hand_over, note_crossing, stop_body
-from .records import BODIES_OF_MEMBERS, EVENTS, HEADS, LOG, MEMBERS
+from .records import BEARINGS, BODIES_OF_MEMBERS, EVENTS, LOG, MEMBERS
 from .together import EQUAL, requeue
 from .worklist import list_contacts, list_landings, list_neighbours, list_pairs_of, most_listed
 
@@ -194,7 +194,7 @@ def events(state):
 
 ROOM_FOR_IMPACTS = (
     Rows("impacts", EVENTS, lambda s: events(s) if s.impacts.active else 0),
-    Rows("impacts", HEADS, lambda s: s.count if s.impacts.active else 0),
+    Rows("impacts", BEARINGS, lambda s: s.count if s.impacts.active else 0),
     Rows("impacts", LOG, lambda s: s.impacts.logged + max(s.impacts.together, 1) if s.impacts.active else 0),
     Rows("impacts", MEMBERS, lambda s: s.impacts.together),
     Rows("impacts", ("next_member",), lambda s: 2 * s.impacts.together),  # one for each of two bodies

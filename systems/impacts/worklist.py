@@ -43,12 +43,12 @@ def list_contacts(state):
 @part
 def link_pairs(state):
     """Chain the pairs of each body that moves, ascending: heads[i] is the first of row i, then follows links[it], till
-    -1. An entry is twice the pair for its first body, one more for its second.
+    -1. An entry is twice the pair for its first body, one more for its second. Contacts bear none yet.
     """
     impacts, pairs = state.impacts, state.pairs
     heads, links = impacts.heads, impacts.links
     for i in range(state.first, state.moving):
-        heads[i] = -1
+        heads[i], impacts.borne[i] = -1, False
     for c in range(pairs.count - 1, -1, -1):
         for side in range(2):
             i = pairs.a[c] if side == 0 else pairs.b[c]
