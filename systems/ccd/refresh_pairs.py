@@ -60,7 +60,7 @@ def add_pair(state, a, b, found, dt):
     new.is_solid[found] = is_solid_pair(state, a, b)
     new.near_contact[found], new.crossed[found], new.disabled[found] = True, False, False
     new.early[found], new.impulse[found] = False, 0.0
-    new.normal[found] = zero_of(state)
+    new.normal[found] = new.point[found] = zero_of(state)
     forget_manifold(new, found)
     if new.is_solid[found] and (is_one_way(state, a) or is_one_way(state, b)):
         path, now = relative_path(state, a, b), state.impacts.until
