@@ -69,7 +69,7 @@ def find_rows(state):
 @part
 def start_with(solver, memory, k, several, span):
     """Row k starts with the impulses of the point of its pair, remembered in a range, that is nearest to it; of the
-    only one if there are not several, then or now."""
+    first one if there are not several, then or now, or where points have no places as nothing turns."""
     now, m = memory.now, span[0]
     if several:
         farthest = SAME_PLACE_EXTENTS * solver.extent[k]
@@ -91,16 +91,16 @@ def match_warm_start(state, dt):
     """Start each contact with the impulses that its pair had, along the normal of now. The memory is that of a step of
     this length already, see ``predict_rest``. Both lists are in canonical order."""
     solver, memory, pairs, entity = state.solver, state.warm_start, state.pairs, state.bodies.entity
-    now, zero, r, m = memory.now, zero_of(state), 0, 0
-    while r < solver.contacts:
-        c, begin = solver.pair[r], r
+    now, zero, r, m, pair, contacts = memory.now, zero_of(state), 0, 0, solver.pair, solver.contacts
+    while r < contacts:
+        c, begin = pair[r], r
         a, b = pairs.a[c], pairs.b[c]
         stop = m = skip_before(memory, m, entity[a], entity[b])
         while stop < memory.counts[now] and memory.first[now, stop] == a and memory.second[now, stop] == b:
             stop += 1
-        while r < solver.contacts and solver.pair[r] == c:
+        while r < contacts and pair[r] == c:
             r += 1
-        several = stop - m > 1 or r - begin > 1
+        several = state.spinning and (stop - m > 1 or r - begin > 1)
         for one in range(begin, r):
             k = solver.slot[one]
             solver.impulse[k], solver.tangent[k] = 0.0, zero
