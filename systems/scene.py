@@ -33,7 +33,7 @@ from .shapes.quaternions import axes_of
 
 # What is kept of bodies from step to step, and moves with their rows: static bodies are not boxed again for others. The
 # shape comes first: it tells which bodies have arrived.
-KEPT_COLUMNS = ("shape", "collider_slot", "offset", "half_extents", "min_extent", "lower", "upper", "origin")
+KEPT_COLUMNS = ("shape", "collider_slot", "offset", "half_extents", "min_extent", "reach", "lower", "upper", "origin")
 ENABLED = f"{Collider.stack}.enabled"
 ARRIVED = np.array([-2], np.int8)  # in place of the shape of a body that has come since the last refresh
 # Static bodies do not move: what stands in their rows of these stays 0.

@@ -41,20 +41,21 @@ def find_extents(state, level, start, stop):
     The smallest extent of the last level stays. Returns the least of these, but for bodies without any.
     """
     bodies, offset, slots, thinnest = state.bodies, state.colliders.offset, state.shapes.slots, math.inf
+    offsets, reach, rotated = bodies.level_offsets, bodies.reach, state.rotated
     for i in range(start, stop):
         shape, half = bodies.levels[level, i], filled(zero_of(state), math.nan)
         if shape >= 0:
             at = offset[slots[shape], i]
-            if state.rotated:
+            if rotated:
                 at = along_world(state, i, at)
-                write_rotated(state, shape, i, state.rotated)
-            bodies.level_offsets[level, i] = at
+                write_rotated(state, shape, i, rotated)
+            offsets[level, i] = at
             half = half_extents(state, shape, i)
         least = smallest(half)
         extent = 2.0 * least if least < math.inf else 0.0  # what has no end is to others as a point
         bodies.half_extents[i], bodies.min_extent[i] = half, extent
-        if state.spinning:
-            bodies.reach[i] = reach_of(half, bodies.level_offsets[level, i])
+        if len(reach) > 0:
+            reach[i] = reach_of(half, offsets[level, i])
         thinnest = extent if 0.0 < extent < thinnest else thinnest
     return thinnest
 
@@ -121,12 +122,13 @@ def hold_turns(state, start, stop):
     """Boxes hold what bodies sweep by turning, and as far as motors may turn them: they are those of shapes as they are
     turned where the step ends."""
     bodies = state.bodies
+    lower, upper = bodies.lower, bodies.upper
     for i in range(start, stop):
         angle, driven = size_of_turn(bodies.turn[i]), driven_travel(state, i)
         turned = angle > 0.0 and bodies.rolling_radius[i] == 0.0
         if turned or driven > 0.0:
             way = (min(angle, 2.0) * bodies.reach[i] if turned else 0.0) + driven
-            bodies.lower[i], bodies.upper[i] = shifted(bodies.lower[i], -way), shifted(bodies.upper[i], way)
+            lower[i], upper[i] = shifted(lower[i], -way), shifted(upper[i], way)
 
 
 # Where the motion of a box begins and ends. STAYING: where the body is, and the box may be one of the uniform grid.
@@ -140,7 +142,8 @@ def box_rows(state, start, stop, motion):
 
     A box holds every level, so that what the first one meets is looked at.
     """
-    bodies, starts, ends = state.bodies, state.bodies.position, state.bodies.position
+    bodies = state.bodies
+    starts = ends = bodies.position
     lower, upper = bodies.lower, bodies.upper
     if motion == MOVING and state.moved:
         starts = bodies.previous_position
@@ -219,19 +222,19 @@ def bound_searches(state, now, dt):
     search_lower, search_upper: the place at ``now`` and at the end when this is called, afterwards the bounds.
     """
     bodies = state.bodies
+    starts, ends = bodies.search_lower, bodies.search_upper
     crossing = find_margins(state, now, dt - now)
     state.neighbours_known_until = now + crossing if now + crossing < dt else math.inf
     if now > 0.0 or state.neighbours_known_until < dt:
         for i in range(state.first, state.moving):
-            bodies.search_upper[i] = place_at(state, i, min(state.neighbours_known_until, dt), dt)
+            ends[i] = place_at(state, i, min(state.neighbours_known_until, dt), dt)
         box_rows(state, state.first, state.moving, SEARCHING)
     for i in range(state.first, state.moving):
         margin = bodies.search_margin[i]
         give = margin + GIVE * bodies.min_extent[i]
-        before, after = bodies.search_lower[i], bodies.search_upper[i]
+        before, after = starts[i], ends[i]
         bodies.lower[i], bodies.upper[i] = shifted(bodies.lower[i], -margin), shifted(bodies.upper[i], margin)
-        bodies.search_lower[i] = shifted(smaller(before, after), -give)
-        bodies.search_upper[i] = shifted(larger(before, after), give)
+        starts[i], ends[i] = shifted(smaller(before, after), -give), shifted(larger(before, after), give)
     measure_frame(state)
     return 0
 
