@@ -61,7 +61,7 @@ def follow(state, i):
         if state.rotated:
             write_axes(state, i)
             at = along_world(state, i, at)
-            write_rotated(state, shape, i, state.rotated)
+            write_rotated(state, shape, i)
         bodies.offset[i] = at
 
 

@@ -11,7 +11,7 @@ from ..ccd.search_bounds import GIVE, find_margins, place_at
 from ..codes import OK
 from ..integration.turning import size_of_turn
 from ..linking.parts import BOUND_SEARCHES, call_bound_searches
-from ..shapes.dispatch import half_extents, write_rotated
+from ..shapes.dispatch import half_extents, least_half_extent, write_rotated
 from ..shapes.surfaces import along_world
 from ..shapes.tolerances import driven_travel, reach_of
 from .brute_force import BRUTE_FORCE_MAX
@@ -38,20 +38,22 @@ def fixed_row(state, k):
 def find_extents(state, level, start, stop):
     """Half extents of one level of rows start..stop-1 and where it stands from the body's position; nan without one.
 
-    The smallest extent of the last level stays. Returns the least of these, but for bodies without any.
+    The smallest extent of the last level stays, along the axes of the world or of its body. Returns the least of these,
+    but for bodies without any.
     """
     bodies, offset, slots, thinnest = state.bodies, state.colliders.offset, state.shapes.slots, math.inf
-    offsets, reach, rotated = bodies.level_offsets, bodies.reach, state.rotated
+    offsets, reach = bodies.level_offsets, bodies.reach
     for i in range(start, stop):
-        shape, half = bodies.levels[level, i], filled(zero_of(state), math.nan)
+        shape, half, least = bodies.levels[level, i], filled(zero_of(state), math.nan), math.inf
         if shape >= 0:
             at = offset[slots[shape], i]
-            if rotated:
+            if state.rotated:
                 at = along_world(state, i, at)
-                write_rotated(state, shape, i, rotated)
+                write_rotated(state, shape, i)
+                least = least_half_extent(state, shape, i)
             offsets[level, i] = at
             half = half_extents(state, shape, i)
-        least = smallest(half)
+        least = min(smallest(half), least)
         extent = 2.0 * least if least < math.inf else 0.0  # what has no end is to others as a point
         bodies.half_extents[i], bodies.min_extent[i] = half, extent
         if len(reach) > 0:
@@ -142,9 +144,8 @@ def box_rows(state, start, stop, motion):
 
     A box holds every level, so that what the first one meets is looked at.
     """
-    bodies = state.bodies
+    bodies, lower, upper = state.bodies, state.bodies.lower, state.bodies.upper
     starts = ends = bodies.position
-    lower, upper = bodies.lower, bodies.upper
     if motion == MOVING and state.moved:
         starts = bodies.previous_position
     if motion == SEARCHING:
@@ -221,20 +222,18 @@ def bound_searches(state, now, dt):
 
     search_lower, search_upper: the place at ``now`` and at the end when this is called, afterwards the bounds.
     """
-    bodies = state.bodies
-    starts, ends = bodies.search_lower, bodies.search_upper
-    crossing = find_margins(state, now, dt - now)
+    bodies, first, moving = state.bodies, state.first, state.moving
+    lower, upper, crossing = bodies.search_lower, bodies.search_upper, find_margins(state, now, dt - now)
     state.neighbours_known_until = now + crossing if now + crossing < dt else math.inf
     if now > 0.0 or state.neighbours_known_until < dt:
-        for i in range(state.first, state.moving):
-            ends[i] = place_at(state, i, min(state.neighbours_known_until, dt), dt)
-        box_rows(state, state.first, state.moving, SEARCHING)
-    for i in range(state.first, state.moving):
-        margin = bodies.search_margin[i]
+        for i in range(first, moving):
+            upper[i] = place_at(state, i, min(state.neighbours_known_until, dt), dt)
+        box_rows(state, first, moving, SEARCHING)
+    for i in range(first, moving):
+        margin, before, after = bodies.search_margin[i], lower[i], upper[i]
         give = margin + GIVE * bodies.min_extent[i]
-        before, after = starts[i], ends[i]
         bodies.lower[i], bodies.upper[i] = shifted(bodies.lower[i], -margin), shifted(bodies.upper[i], margin)
-        starts[i], ends[i] = shifted(smaller(before, after), -give), shifted(larger(before, after), give)
+        lower[i], upper[i] = shifted(smaller(before, after), -give), shifted(larger(before, after), give)
     measure_frame(state)
     return 0
 

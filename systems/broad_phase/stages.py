@@ -222,7 +222,8 @@ def search_uniform_grid(state, dt):
     """Many bodies move: pairs of what is in the grid, and those with static bodies that are in none."""
     if state.pair_search != UNIFORM_GRID:
         return OK
-    grid, at, found, count = state.grid, 0, 0, state.grid.directory[state.grid.total]  # without invalid boxes
+    grid, at, found = state.grid, 0, 0
+    count = grid.directory[grid.total]  # without invalid boxes
     while at < count and found != FULL:
         held, at = look_around(grid, at, count)
         found = test_notes(state, held, found)

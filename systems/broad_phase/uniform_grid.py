@@ -239,8 +239,9 @@ def look_around(grid, start, count):
 @part
 def test_notes(state, held, found):
     """Compare exact corners; returns the number of pairs, or FULL."""
-    grid, lower, upper, room = state.grid, state.bodies.lower, state.bodies.upper, len(state.candidates.first)
-    order, notes, first, second = grid.order, grid.notes, state.candidates.first, state.candidates.second
+    grid, lower, upper, candidates = state.grid, state.bodies.lower, state.bodies.upper, state.candidates
+    order, notes, first, second = grid.order, grid.notes, candidates.first, candidates.second
+    room = len(first)
     for r in range(held):
         here, bits = notes[r, 0], int64(notes[r, 3])
         low, high = lower[here], upper[here]
@@ -354,7 +355,8 @@ def look_inside(state, grid, i, low, high, found):
     """Pairs of body i, which is not in the grid, with what of it overlaps this box of any size; returns as
     ``test_notes``."""
     lower, upper, order, codes, one = state.bodies.lower, state.bodies.upper, grid.order, grid.codes, int64(1)
-    first, second, room = state.candidates.first, state.candidates.second, len(state.candidates.first)
+    first, second = state.candidates.first, state.candidates.second
+    room = len(first)
     if not at_most(low, high):
         return found
     code, guards = outline(grid, low, high)

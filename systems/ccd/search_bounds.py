@@ -50,15 +50,15 @@ def is_swept(state, a, b, travel):
 @part
 def turns_far(state, a, b):
     """Whether a pair has to be looked at on its way: one of the two turns by more than a part of the smaller one. Where
-    they may bounce, only if it turns by itself: impacts have the others."""
-    bodies = state.bodies
+    they may bounce, only if it turns by itself, past the middle of the other: impacts have the rest."""
+    bodies, extent, inverse_mass = state.bodies, state.bodies.min_extent, state.bodies.inverse_mass
     if len(bodies.axes) == 0:
         return False
     way_a, way_b = way_of_turning(bodies, a, bodies.turn[a]), way_of_turning(bodies, b, bodies.turn[b])
-    far = FAST * smaller_extent(bodies, a, b)
-    if way_a + way_b <= far:
+    if way_a + way_b <= FAST * smaller_extent(bodies, a, b):
         return False
-    if (way_a > far and bodies.inverse_mass[a] == 0.0) or (way_b > far and bodies.inverse_mass[b] == 0.0):
+    middle = 0.5 * (extent[a] + extent[b])
+    if (way_a > middle and inverse_mass[a] == 0.0) or (way_b > middle and inverse_mass[b] == 0.0):
         return True
     return restitution_of(state, a, b) == 0.0
 
@@ -177,10 +177,11 @@ def find_margins(state, now, span):
     """
     bodies = state.bodies
     margin, inverse_mass, shape = bodies.search_margin, bodies.inverse_mass, bodies.shape
+    first, moving = state.first, state.moving
     energy, shaped, extents = measure_crowd(state, now)
     cell = width_that_holds(1.0 / max(1, shaped), extents)
     crowd, wide = 0.0, 0
-    for i in range(state.first, state.moving):
+    for i in range(first, moving):
         speed = max(margin[i], SPREAD * math.sqrt(2.0 * energy * inverse_mass[i]))
         margin[i] = 0.0
         if inverse_mass[i] > 0.0 and shape[i] >= 0 and has_search_bounds(state, i, speed, span):
@@ -193,7 +194,7 @@ def find_margins(state, now, span):
         return math.inf
     largest = 0.5 * width_that_holds(CROWD / max(1, wide), extents)
     speeds, fast = 0.0, 0
-    for i in range(state.first, state.moving):
+    for i in range(first, moving):
         speed = speed_at(state, i, now)
         if shape[i] >= 0 and speed * span > largest:
             speeds += speed
@@ -202,7 +203,7 @@ def find_margins(state, now, span):
     if crossing < (now + span) / MOST_SEARCHES:  # rather more neighbours than more searches
         largest *= (now + span) / (MOST_SEARCHES * crossing)
         crossing = (now + span) / MOST_SEARCHES
-    for i in range(state.first, state.moving):
+    for i in range(first, moving):
         margin[i] = min(margin[i], largest)
     return crossing
 

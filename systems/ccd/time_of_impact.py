@@ -108,7 +108,8 @@ def first_touch(state, a, b, path, since, until, limits):
 def march(state, a, b, path, since, until, limits):
     """The same for concave shapes; the time is bisected between the look that finds an approach and the one before."""
     _, stride, threshold, _ = limits
-    shape_a, shape_b = state.bodies.shape[a], state.bodies.shape[b]
+    shape = state.bodies.shape
+    shape_a, shape_b = shape[a], shape[b]
     low, high, t, looks = since, math.inf, since, 0
     normal = point = at = zero_of(state)
     while True:
@@ -132,10 +133,10 @@ def march(state, a, b, path, since, until, limits):
 @inlined
 def clear_of_rounding(state, a, b, path, t):
     """A distance of the two at time t, m, beyond what rounding makes of it; of what has an extent a part of that."""
-    origin, speed = state.bodies.origin, state.bodies.path_velocity
+    bodies = state.bodies
+    origin, speed, extent = bodies.origin, bodies.path_velocity, smaller_extent(bodies, a, b)
     places = length(origin[a]) + length(origin[b]) + length(path[0])
     rounding = CLEAR * (places + (length(speed[a]) + length(speed[b])) * t)
-    extent = smaller_extent(state.bodies, a, b)
     return min(rounding, DEPTH * extent) if extent > 0.0 else rounding
 
 
@@ -170,7 +171,8 @@ def advance_conservatively(state, a, b, path, kind, times, until, slop):
     """Conservative advancement; kind: (the path is straight, the first touch is known); times: (since when the pair is
     looked at, the time to begin with: that of the touch if it is known)."""
     (straight, known), (since, t) = kind, times
-    shape_a, shape_b = state.bodies.shape[a], state.bodies.shape[b]
+    shape = state.bodies.shape
+    shape_a, shape_b = shape[a], shape[b]
     normal = point = at = zero_of(state)
     found, cornered, time = False, False, t
     for look in range(MOST_ADVANCES):

@@ -15,7 +15,7 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.jit.stack_arrays import stack_array
-from ...framework.vectors import add, add_scaled, dot, length, negative, replace, row, scale, sub
+from ...framework.vectors import add, add_scaled, dot, length, negative, row, scale, sub
 from ..integration.trajectory import ROUNDING, along, path_of, rate_along, travel_of
 from ..integration.turning import arms_to, closing_by_spin, cross_spin, is_turned, size_of_turn
 from ..joints.groups import is_joined
@@ -75,17 +75,6 @@ def clear_along(state, a, b, d, normal):
     out, way = negative(normal), dot(d, normal)
     ahead = way - reach_along(state, a, normal) - reach_along(state, b, out)
     return max(0.0, ahead, -way - reach_along(state, a, out) - reach_along(state, b, normal))
-
-
-@part
-def thickness_of(state, i):
-    """The least width of a shape along the axes of its body, however that is turned; infinity if it has no end."""
-    axes, axis, d, least = state.bodies.axes, zero_of(state), len(zero_of(state)), math.inf
-    for j in range(d):
-        for k in range(d):
-            axis = replace(axis, k, axes[(i * d + k) * d + j])
-        least = min(least, reach_along(state, i, axis) + reach_along(state, i, negative(axis)))
-    return least
 
 
 @inlined
@@ -153,7 +142,7 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
     poses = pose_of(state, a), pose_of(state, b)
     touch, found, gap, crept, ended = (until, zero_of(state), zero_of(state), zero_of(state)), False, 0.0, 0, False
     t, least, begun, low, high = since, 0.0, 0.0, since, math.inf
-    thin = max(THIN * (thickness_of(state, a) + thickness_of(state, b)), GRAZE * slop)  # infinity if one has no end
+    thin = max(THIN * (bodies.min_extent[a] + bodies.min_extent[b]), GRAZE * slop)
     for look in range(MOST_STRIDES + strides):
         turn_to(state, a, poses[0], spin_a, until, t)
         turn_to(state, b, poses[1], spin_b, until, t)
@@ -218,9 +207,10 @@ def is_struck(state, i):
 @part
 def turn_of_path(state, i, dt):
     """By how much body i turns in the step, as seen from what the last impact has made of its spin."""
-    led = state.impacts.logged > 0 and state.bodies.impact_count[i] > 0
+    bodies = state.bodies
+    led = state.impacts.logged > 0 and bodies.impact_count[i] > 0
     struck = is_struck(state, i) or (led and (has_unequal_moments(state, i) or is_joined(state, i, i)))
-    return scale(state.bodies.spin[i], dt) if struck else state.bodies.turn[i]
+    return scale(bodies.spin[i], dt) if struck else bodies.turn[i]
 
 
 @part

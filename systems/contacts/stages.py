@@ -89,7 +89,7 @@ def compare_contacts(state, dt):
     """Rows of the contacts that ceased, began and stayed; both lists are in canonical order."""
     if state.found_current:
         publish_found(state, dt)
-    contacts = state.contacts
+    contacts, impacts = state.contacts, state.impacts
     now = contacts.now
     old, i, j, ends, begins, stays = 1 - now, 0, 0, 0, 0, 0
     a0, b0, enabled = contacts.entity_a, contacts.entity_b, contacts.enabled
@@ -117,10 +117,10 @@ def compare_contacts(state, dt):
             j += 1
     state.ids_changed = False
     contacts.ends, contacts.begins, contacts.stays[now] = ends, begins, stays
-    faults = state.impacts.capped + state.impacts.halted + state.too_fast_for_discrete
+    faults = impacts.capped + impacts.halted + state.too_fast_for_discrete
     faults += state.turns_too_far
     for kind in range(KINDS_OF_FAULT):
         faults += state.solver.faults[kind]
     staying = stays + contacts.stored if state.stay_wanted else 0
-    state.event_count = ends + begins + staying + state.impacts.logged + faults
+    state.event_count = ends + begins + staying + impacts.logged + faults
     return FAULTS if faults > 0 and not state.others_write else OK

@@ -63,7 +63,7 @@ def any_nonzero(state, vectors):
 
 def sum_forces(state, dt):
     """force = m g s + the constant force + what was applied; nothing is summed where nothing acts."""
-    bodies, dynamic, gravity = state.bodies, state.dynamic, state.gravity[0]
+    bodies, first, dynamic, gravity = state.bodies, state.force_first, state.dynamic, state.gravity[0]
     force, applied, for_step = bodies.force, bodies.applied_force, bodies.step_force
     state.forces_summed = True
     if dynamic == 0:
@@ -71,7 +71,7 @@ def sum_forces(state, dt):
     pushed = any_nonzero(state, applied) or any_nonzero(state, for_step)
     given = pushed or state.has_force_systems or not is_zero(gravity) or any_nonzero(state, bodies.constant_force)
     if not given:
-        for i in range(state.force_first, dynamic if any_nonzero(state, force) else 0):
+        for i in range(first, dynamic if any_nonzero(state, force) else 0):
             force[i] = zero_of(state)
         state.unforced, state.pushed = True, False
         return 0
@@ -80,9 +80,9 @@ def sum_forces(state, dt):
         return NEED_ROOM
     state.force_evaluations += 1
     mass, gravity_scale, constant = bodies.mass, bodies.gravity_scale, bodies.constant_force
-    for i in range(state.force_first, dynamic):
+    for i in range(first, dynamic):
         force[i] = add(scale(gravity, mass[i] * gravity_scale[i]), constant[i])
-    for i in range(state.force_first, dynamic if pushed else 0):
+    for i in range(first, dynamic if pushed else 0):
         force[i] = add(add(force[i], applied[i]), for_step[i])
     state.pushed = pushed
     return 0

@@ -180,8 +180,8 @@ def is_missed_by_discrete(state, a, b, path, touch, dt):
 @part
 def approach_speed(state, c, path, touch, kind, dt):
     """Of a solid pair: (NO_EVENT, HAND_OVER if it lands, too slow to bounce, or IMPACT; speed along the normal)."""
-    bodies, impacts, (t, normal, point, apart) = state.bodies, state.impacts, touch
-    a, b = state.pairs.a[c], state.pairs.b[c]
+    bodies, impacts, pairs, (t, normal, point, apart) = state.bodies, state.impacts, state.pairs, touch
+    a, b = pairs.a[c], pairs.b[c]
     speed = dot(rate_along(path, t), normal)
     if state.spinning:
         speed += closing_by_spin(bodies, a, b, arms_to(bodies, a, b, normal, point, apart), normal)
@@ -197,7 +197,7 @@ def approach_speed(state, c, path, touch, kind, dt):
     if has_corner_rule(state, bodies.shape[a], bodies.shape[b]):  # what turns reaches the edge by that as well
         slides &= not turns
     if slides and turns:  # what tips over on another body lands on its next corner while the one before holds it
-        slides = state.pairs.early[c] and restitution_at(state, a, b, (point, normal, apart)) == 0.0
+        slides = pairs.early[c] and restitution_at(state, a, b, (point, normal, apart)) == 0.0
         slides &= turning * (dt - t) - speed * dt <= smaller_extent(bodies, a, b)
     elif slides:
         slides = is_held_by_edge(state, a, b, path, touch, speed, dt)

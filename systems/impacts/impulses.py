@@ -115,15 +115,16 @@ def touch_of_event(state, event):
 def is_counted(state, event):
     """Whether the cap counts an impact: in an event-driven world an elastic one only if something drives the bodies or
     no time has passed, so that it need not end."""
-    impacts, last = state.impacts, state.bodies.last_impact
+    impacts, bodies = state.impacts, state.bodies
     if not (impacts.sweeps and state.mode == EVENT_DRIVEN and impacts.event_kind[event] == IMPACT):
         return True
-    c, t, inverse_mass = impacts.event_pair[event], impacts.event_time[event], state.bodies.inverse_mass
+    c, t = impacts.event_pair[event], impacts.event_time[event]
+    inverse_mass, last = bodies.inverse_mass, bodies.last_impact
     a, b = state.pairs.a[c], state.pairs.b[c]
     if restitution_at(state, a, b, touch_of_event(state, event)) != 1.0 or t <= last[a] or t <= last[b]:
         return True
     one = a if inverse_mass[a] == 0.0 else b
-    return inverse_mass[one] == 0.0 and not is_immovable(state.bodies, one)
+    return inverse_mass[one] == 0.0 and not is_immovable(bodies, one)
 
 
 @part

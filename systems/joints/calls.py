@@ -15,6 +15,7 @@ from ..linking.parts import call_joined_range
 def for_joints(solver, what, numbers, span, arms):
     """Ask it of the joints of a range, if there are some. numbers: two that it needs, most often s of a substep and of
     the step; returns the first one, or what joints add to it."""
-    if len(arms) > 0 and solver.joints.begin < solver.joints.end:
-        return call_joined_range(solver.joints.solver, solver, what, numbers, span)
+    joints = solver.joints
+    if len(arms) > 0 and joints.begin < joints.end:
+        return call_joined_range(joints.solver, solver, what, numbers, span)
     return numbers[0]

@@ -18,6 +18,7 @@ from .linking.signatures import (
     call_bounds,
     call_corner,
     call_evaluate,
+    call_least,
     call_moments,
     call_rotated,
     call_sweep,
@@ -86,7 +87,8 @@ def has_corner_rule(state, shape_a, shape_b):
 @inlined
 def both_sharp(state, shape_a, shape_b):
     """Whether both have corners."""
-    return state.shapes.sharp[shape_a] and state.shapes.sharp[shape_b]
+    sharp = state.shapes.sharp
+    return sharp[shape_a] and sharp[shape_b]
 
 
 @inlined
@@ -124,7 +126,8 @@ def sweep(state, shape_a, a, shape_b, b, d, v):
 @inlined
 def both_convex(state, shape_a, shape_b):
     """Whether a plane parts the two shapes wherever they do not touch."""
-    return not (state.shapes.concave[shape_a] or state.shapes.concave[shape_b])
+    concave = state.shapes.concave
+    return not (concave[shape_a] or concave[shape_b])
 
 
 @inlined
@@ -134,15 +137,23 @@ def half_extents(state, shape, i):
 
 
 @inlined
+def least_half_extent(state, shape, i):
+    """That of row i's shape along the axes of its body; infinity if rotation does not change the shape."""
+    shapes = state.shapes
+    address = shapes.least[shape]
+    return call_least(address, shapes.own_parameters[shape], i) if address != 0 else math.inf
+
+
+@inlined
 def second_moments(state, shape, i):
     """Measure, centre and second moments of row i's shape, not rotated; the shape must tell them."""
     return call_moments(state.shapes.moments[shape], state, state.shapes.own_parameters[shape], i)
 
 
 @inlined
-def write_rotated(state, shape, i, rotated):
-    """Write row i's parameters as they are in the world; ``rotated``: whether any body is."""
+def write_rotated(state, shape, i):
+    """Write row i's parameters as they are in the world."""
     shapes = state.shapes
     address, own, world = shapes.rotated[shape], shapes.own_parameters[shape], shapes.parameters[shape]
     if address != 0 and own != world:
-        call_rotated(address, state, own, world, i, rotated)
+        call_rotated(address, state, own, world, i, state.rotated)

@@ -36,7 +36,7 @@ def turn_shape(state, i, angle):
             axes[(i * d + k) * d + j] = item(axis, k)
     bodies.offset[i] = add(bodies.offset[i], turn_of_arm(angle, bodies.offset[i]))
     if bodies.shape[i] >= 0:
-        write_rotated(state, bodies.shape[i], i, state.rotated)
+        write_rotated(state, bodies.shape[i], i)
 
 
 @part
@@ -151,4 +151,4 @@ def turn_to(state, i, end, spin, until, t):
     if t != until:
         rotate_pose(state, i, spin, t - until)
     elif bodies.shape[i] >= 0:
-        write_rotated(state, bodies.shape[i], i, state.rotated)
+        write_rotated(state, bodies.shape[i], i)

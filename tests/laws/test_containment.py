@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 import pytest
+from helpers_pairwise import pairwise
 from laws.helpers_laws import SWEPT, beyond, seeds, walls
 from worlds import METHODS, ball, both_dimensions, box, make_world
+
+from carom import RigidBody, Transform
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 TOO_FAST = "so fast that discrete collisions may miss"
 IMPACTS = 50_000  # of a room, then it ends: elastic bodies of very different masses have millions
@@ -139,3 +144,20 @@ def test_nothing_leaves_a_room_at_any_speed(seed, d, mode):
             if world.stats().counters["impacts"] > 20_000:
                 break
         assert len(world.bodies.dynamic) == 60
+
+
+@pytest.mark.parametrize(("mode", "e"), pairwise(SWEPT, (0.0, 0.5)))
+@pytest.mark.parametrize("seed", seeds(6, 600, known=(67, 119, 168)))
+def test_no_arrow_passes_a_wall_however_both_are_turned(seed, mode, e):
+    """Both 2 cm thick: how thin they are does not depend on how they are turned, nor which pairs are swept."""
+    random = np.random.default_rng(seed)
+    leans, turned, speed = random.uniform(0.5, 1.1), random.uniform(0, 6.3), random.uniform(2, 12)
+    out = np.array((-math.sin(leans), math.cos(leans)))
+    with make_world(collision=mode) as world:
+        world.add_plugin(Rotation())
+        world.create_entity(Transform((0, 0), leans), BoxCollider((5, 0.01), restitution=e))
+        arrow = RigidBody(linear_velocity=-out * speed)
+        world.create_entity(Transform(1.5 * out, turned), arrow, Spin(), BoxCollider((0.5, 0.01), restitution=e))
+        for _ in range(60):
+            world.step()
+            assert world.bodies.dynamic.position[0] @ out > -0.05

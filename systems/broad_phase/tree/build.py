@@ -55,6 +55,7 @@ def directory_size(count: int) -> int:
 def place_in_one_cell(tree):
     """Brute force: all valid boxes in the one cell of the top level; codes of 0 rule nothing out."""
     lower, upper, boxes, count, d = tree.lower, tree.upper, tree.boxes, 0, len(zero_of(tree))
+    directory = tree.directory
     for i in range(tree.start, tree.stop):
         low, high, valid = lower[i], upper[i], True
         for q in range(d):
@@ -70,7 +71,7 @@ def place_in_one_cell(tree):
     for q in range(3):
         tree.level_stride[0, q] = 0
     tree.level_begin[0], tree.level_end[0] = 0, count
-    tree.directory[0], tree.directory[1], tree.directory[2] = 0, count, count
+    directory[0], directory[1], directory[2] = 0, count, count
 
 
 @part

@@ -24,12 +24,12 @@ def moved_body(solver, k):
 @part
 def is_loaded(solver, k, dt):
     """Whether contact k, of two bodies that can be moved, bears a load, or will: they overlap."""
-    a, b, acceleration = solver.first[k], solver.second[k], solver.acceleration
+    a, b, acceleration, impulse = solver.first[k], solver.second[k], solver.acceleration, solver.impulse[k]
     if solver.gap[k] < -NEGLIGIBLE * solver.extent[k]:
         return True
     least = NEGLIGIBLE * solver.mass[k] * dt
     load = max(dot(acceleration[a], acceleration[a]), dot(acceleration[b], acceleration[b]))
-    return solver.impulse[k] > 0.0 and solver.impulse[k] * solver.impulse[k] > least * least * load
+    return impulse > 0.0 and impulse * impulse > least * least * load
 
 
 @part

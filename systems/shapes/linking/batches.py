@@ -94,9 +94,8 @@ def write_manifold(state, c, at, contact):
 @inlined
 def shapes_of(state, start):
     """(cheaper shape, costlier shape, whether the pair is flipped) of the candidates of a batch."""
-    c = state.candidates.bucket[start]
-    one = state.bodies.shape[state.pairs.a[c]]
-    two = state.bodies.shape[state.pairs.b[c]]
+    c, shape = state.candidates.bucket[start], state.bodies.shape
+    one, two = shape[state.pairs.a[c]], shape[state.pairs.b[c]]
     first, second = min(one, two), max(one, two)
     return first, second, state.shapes.flipped[first * state.shapes.count + second]
 
@@ -104,7 +103,8 @@ def shapes_of(state, start):
 @inlined
 def parameters_of(state, first, second, flipped):
     """Addresses of the parameter records, in the order of the pair."""
-    one, two = state.shapes.parameters[first], state.shapes.parameters[second]
+    parameters = state.shapes.parameters
+    one, two = parameters[first], parameters[second]
     return (two, one) if flipped else (one, two)
 
 

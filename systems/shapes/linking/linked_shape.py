@@ -16,6 +16,7 @@ from ....framework.jit.records.record_type import record_at, rows_of
 from ....framework.jit.records.schema import Schema, vectors
 from ....framework.jit.source import source_module
 from ....framework.plugins.registry import Shape
+from ....framework.vectors import smallest
 from ...records import STATE
 from ..convex.edges import edge_towards
 from .parameters import (
@@ -49,6 +50,16 @@ class LinkedShape:
             "return half",
             function=self.shape.bounds,
         )
+
+    @cached_property
+    def least(self) -> Linked | None:
+        """Its least half extent along its body's axes, from its own parameters; None if rotation changes nothing."""
+        axes = str(tuple(tuple(float(j == k) for k in range(self.dimensions)) for j in range(self.dimensions)))
+        own, turns = parameters_source(self.shape, "at(own)", "i", "Parameters", axes), self.shape.turned is not None
+        return self._linked(
+            "least(own, i)", f"return smallest(function({own}, {self.dimensions}))",
+            function=self.shape.bounds if turns or self.shape.rotates else None,
+        )  # fmt: skip
 
     @cached_property
     def rotated(self) -> Linked | None:
@@ -109,7 +120,7 @@ class LinkedShape:
     def all_functions(self, by_address: bool, touched: bool = False) -> Iterator[Linked]:
         """by_address: whether some pair takes the shape by the addresses of support and rounding; touched: whether what
         spins touches it in several points, found by that of its edge too."""
-        found = [self.bounds, self.rotated, self.material]
+        found = [self.bounds, self.least, self.rotated, self.material]
         if self.shape.support is not None and (by_address or touched):
             found += [self.support, self.rounding]
         if touched:
@@ -126,7 +137,7 @@ class LinkedShape:
         scope = {
             "function": user_function(function), "Parameters": parameter_tuple(self.shape), "array_of": array_of,
             "at": record_at(parameter_schema(self.shape), self.dimensions), "rows_of": rows_of,
-            "edge_towards": edge_towards, "ALONE": ALONE, "NOT_FINITE": NOT_FINITE,
+            "edge_towards": edge_towards, "smallest": smallest, "ALONE": ALONE, "NOT_FINITE": NOT_FINITE,
         }  # fmt: skip
         shape, name = self.shape, header.partition("(")[0]
         title = f'"""{shape.component.__name__}, {self.dimensions}D."""\n\n'

@@ -65,8 +65,9 @@ def parameter_tuple(shape: Shape) -> Any:
     return collections.namedtuple(shape.component.__name__, shape.parameters)
 
 
-def parameters_source(shape: Shape, record: str, row: str, kind: str) -> str:
-    """Source of that tuple, of class ``kind``, for a row of the shape's record; uses ``array_of``."""
+def parameters_source(shape: Shape, record: str, row: str, kind: str, axes: str = "") -> str:
+    """Source of that tuple, of class ``kind``, for a row of the shape's record, turned like its body or along these
+    ``axes``; uses ``array_of``."""
     parts = []
     for name in shape.columns:
         if isinstance(shape.component.columns[name], ArrayColumn):
@@ -75,7 +76,7 @@ def parameters_source(shape: Shape, record: str, row: str, kind: str) -> str:
         else:
             parts.append(f"{record}.column_{name}[{row}]")
     if shape.rotates:
-        parts.append(f"{record}.axes[{row}]")
+        parts.append(axes or f"{record}.axes[{row}]")
     return f"{kind}({', '.join(parts)})"
 
 
