@@ -150,7 +150,7 @@ def touch_of_turning(state, a, b, path, spins, times, limits):
         _, depth, normal, point = evaluate(state, shape_a, a, shape_b, b, d)
         w = rate_along(path, t)
         if look == 0 and grazes > -math.inf:
-            sunk = depth + min(grazes * graze, max(graze, MOST_SUNK * slop))
+            sunk = min(depth + grazes * graze, max(depth, graze, MOST_SUNK * slop))
             least = max(0.0, depth, min(sunk, thin))
         if look == 0 and not 0.0 < grazes < math.inf:  # else it has sunk in by plastic impacts, which add up
             begun = max(0.0, depth)
