@@ -106,10 +106,15 @@ def quaternion_of(turn):
 
 
 @inlined
+def mixed_compliance(bodies, i, arm, along, other):
+    """1 / kg that an impulse at the end of an arm, along a unit vector, moves along another by turning the body."""
+    return dot(twist(arm, along), change_of_spin(bodies, i, twist(arm, other)))
+
+
+@inlined
 def compliance(bodies, i, arm, along):
-    """1 / kg that an impulse at the end of an arm, along a unit vector, moves by turning the body."""
-    turned = twist(arm, along)
-    return dot(turned, change_of_spin(bodies, i, turned))
+    """The same along the first."""
+    return mixed_compliance(bodies, i, arm, along, along)
 
 
 @inlined

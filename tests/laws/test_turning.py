@@ -281,3 +281,53 @@ def test_what_slides_and_turns_goes_aside_as_its_mirror_image_does():
             aside.append(math.copysign(1.0, spin) * float(at @ np.cross((0.0, 1.0, 0.0), way)))
     assert aside == pytest.approx([aside[0]] * 4, abs=0.005)
     assert 0.05 < abs(aside[0]) < 0.15
+
+
+def stands(half, tilt, mu, mode, seconds):
+    """(poses after each step, way that it creeps in the last half, m, largest spin in it, rad/s) of a box that is let
+    go on one lower corner, a little tilted."""
+    with turning_world(2, G, collision=mode) as world:
+        wall(world, (0.0, -1.0), (60.0, 1.0), friction=mu)
+        high = half[1] * math.cos(tilt) + half[0] * abs(math.sin(tilt))
+        entity, poses, spins = box(world, (0.0, high), half, rotation=tilt, friction=mu), [], []
+        for _ in range(60 * seconds):
+            world.step()
+            poses.append(pose(world, entity))
+            spins.append(abs(motion(world, entity)[1]))
+        later = len(poses) // 2
+        return np.array(poses), abs(poses[-1][0] - poses[later][0]), max(spins[later:])
+
+
+def upright(seed):
+    """(half extents, tilt, friction) of a box that friction can just tip: mu h is about b."""
+    random = np.random.default_rng([seed, 81])
+    mu, wide = random.choice([0.3, 0.5, 0.9]), random.uniform(0.1, 0.6)
+    return (wide, wide / mu * random.uniform(0.8, 1.3)), random.uniform(-0.1, 0.1), mu
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_an_upright_box_comes_to_rest_where_it_stands(mode):
+    """The friction of one corner came before that of the other: it rocked on at .025 rad/s and crept towards -x, by up
+    to 3 mm/s, a third of these for ever."""
+    for half, tilt, mu in (((0.278, 0.612), 0.0011, 0.5), *(upright(seed) for seed in range(8))):
+        _, crept, spin = stands(half, tilt, mu, mode, 10)
+        assert crept < 1e-6
+        assert spin < 1e-6
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("mode", MODES)
+def test_any_upright_box_comes_to_rest(mode):
+    for seed in range(100, 500):
+        _, crept, spin = stands(*upright(seed), mode, 15)
+        assert crept < 1e-6
+        assert spin < 1e-6
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_what_rocks_to_the_left_is_the_mirror_image_of_what_rocks_to_the_right(mode):
+    """Level ground has no direction: a box that is tilted the other way moves as its mirror image does. They were
+    centimetres apart after some seconds."""
+    for half, tilt, mu in (((0.278, 0.612), 0.0011, 0.5), *(upright(seed) for seed in range(4))):
+        poses, mirrored = (stands(half, way * tilt, mu, mode, 3)[0] for way in (1.0, -1.0))
+        np.testing.assert_allclose(mirrored * (-1.0, 1.0, -1.0), poses, rtol=0.0, atol=1e-9)

@@ -15,7 +15,7 @@ HASHES = {
     "pile3d": ({"n": 27}, "e4300420ce26b5aeb4f1edcdd696e3de5685e6fdb56dc708878a2864b2334ad6"),
     "tumbler": ({"n": 12}, "0c1980139e89fde1c589cce28d44e01f52c316eeab435314c4e599fccb103c62"),
     "bridge": ({"n": 8, "crates": 2}, "89b02bbea34e848cb5dd40e7357479776f5ad7175bf5e11c378742a1b600cc65"),
-    "ragdoll": ({"n": 1}, "de743f5efcba4ed41888d4a8590839b475e44f4c8fe3caadd0b6517e8826df34"),
+    "ragdoll": ({"n": 1}, "d53226efb2bc55c57f9bbd3c9a95744213c823efd9d1f4a53a93d5b785564bdc"),
 }
 STEPS = 60
 

@@ -31,6 +31,8 @@ CHUNK = Schema(
     spin_b=vectors(apart=True, flat=1, unit="rad/s"),
     impulse=floats(unit="N s"),  # at two points
     other=floats(unit="N s"),
+    pull=vectors(apart=True, unit="N s"),  # along the surface at these
+    other_pull=vectors(apart=True, unit="N s"),
     way=vectors(apart=True, unit="m"),  # of the second body since the step began, as the first one sees it
     turn_a=vectors(apart=True, flat=1, unit="rad"),
     turn_b=vectors(apart=True, flat=1, unit="rad"),
@@ -40,6 +42,12 @@ CHUNK = Schema(
     versine_b=floats(unit="1"),
 )
 make_chunk = stack_record(CHUNK, ROW_CHUNK)
+
+
+@inlined
+def chunk_of(solver):
+    """Room for a chunk."""
+    return make_chunk(scale(solver.velocity[0], 0.0))
 
 
 @part
@@ -55,13 +63,15 @@ def find_chunks(solver, span):
 def load_masses(solver, span):
     """The masses of the bodies of the pairs of a range."""
     start, c = span[0], solver.first_chunk
+    inverse_mass, inertia, products = solver.inverse_mass, solver.inverse_inertia, solver.inverse_products
     while start < span[1]:
-        for k in range(start, start + (solver.ends[c] - start) // solver.points[c]):
+        stop = solver.ends[c]
+        for k in range(start, start + (stop - start) // solver.points[c]):
             a, b = solver.first[k], solver.second[k]
-            solver.mass_a[k], solver.mass_b[k] = solver.inverse_mass[a], solver.inverse_mass[b]
-            solver.inertia_a[k], solver.products_a[k] = solver.inverse_inertia[a], solver.inverse_products[a]
-            solver.inertia_b[k], solver.products_b[k] = solver.inverse_inertia[b], solver.inverse_products[b]
-        start, c = solver.ends[c], c + 1
+            solver.mass_a[k], solver.mass_b[k] = inverse_mass[a], inverse_mass[b]
+            solver.inertia_a[k], solver.products_a[k] = inertia[a], products[a]
+            solver.inertia_b[k], solver.products_b[k] = inertia[b], products[b]
+        start, c = stop, c + 1
 
 
 @inlined
@@ -69,8 +79,7 @@ def gather_motion(solver, chunk, start, pairs):
     """Bring the velocities of the bodies to the pairs of a chunk."""
     for q in range(pairs):
         a, b = solver.first[start + q], solver.second[start + q]
-        chunk.velocity_a[q], chunk.spin_a[q] = solver.velocity[a], solver.spin[a]
-        chunk.velocity_b[q], chunk.spin_b[q] = solver.velocity[b], solver.spin[b]
+        store_motion(chunk, q, (solver.velocity[a], solver.spin[a], solver.velocity[b], solver.spin[b]))
 
 
 @inlined
@@ -87,13 +96,13 @@ def gather_places(solver, chunk, start, pairs):
 def scatter_motion(solver, chunk, start, pairs):
     """Take them back to those that move."""
     for q in range(pairs):
-        k = start + q
+        k, (v_a, s_a, v_b, s_b) = start + q, chunk_motion(chunk, q)
         if solver.mass_a[k] > 0.0:
             a = solver.first[k]
-            solver.velocity[a], solver.spin[a] = chunk.velocity_a[q], chunk.spin_a[q]
+            solver.velocity[a], solver.spin[a] = v_a, s_a
         if solver.mass_b[k] > 0.0:
             b = solver.second[k]
-            solver.velocity[b], solver.spin[b] = chunk.velocity_b[q], chunk.spin_b[q]
+            solver.velocity[b], solver.spin[b] = v_b, s_b
 
 
 @inlined
@@ -116,14 +125,20 @@ def parting_at(motion, arm_a, arm_b):
 
 
 @inlined
+def spun(solver, k, torque_a, torque_b):
+    """What torques change the spins of the bodies of the pair whose first row is k."""
+    return (
+        symmetric(solver.inertia_a[k], solver.products_a[k], torque_a),
+        symmetric(solver.inertia_b[k], solver.products_b[k], torque_b),
+    )
+
+
+@inlined
 def pushed(solver, k, motion, arm_a, arm_b, push):
     """The motion of the pair whose first row is k after an impulse at a point."""
-    v_a, s_a, v_b, s_b = motion
-    v_a = add_scaled(v_a, push, -solver.mass_a[k])
-    s_a = sub(s_a, symmetric(solver.inertia_a[k], solver.products_a[k], twist(arm_a, push)))
-    v_b = add_scaled(v_b, push, solver.mass_b[k])
-    s_b = add(s_b, symmetric(solver.inertia_b[k], solver.products_b[k], twist(arm_b, push)))
-    return v_a, s_a, v_b, s_b
+    (v_a, s_a, v_b, s_b), (x_a, x_b) = motion, spun(solver, k, twist(arm_a, push), twist(arm_b, push))
+    v_a, v_b = add_scaled(v_a, push, -solver.mass_a[k]), add_scaled(v_b, push, solver.mass_b[k])
+    return v_a, sub(s_a, x_a), v_b, add(s_b, x_b)
 
 
 @inlined
@@ -138,8 +153,7 @@ def terms_at(solver, one, k, motion, bias, softly):
     that changes their spins, 1 / kg that it moves, what a soft row keeps, how much faster than it may it closes)."""
     n, (v_a, s_a, v_b, s_b), soft = solver.normal[k], motion, softly * softness(solver, k)
     t_a, t_b = twist(solver.arm_a[k], n), twist(solver.arm_b[k], n)
-    x_a = symmetric(solver.inertia_a[one], solver.products_a[one], t_a)
-    x_b = symmetric(solver.inertia_b[one], solver.products_b[one], t_b)
+    x_a, x_b = spun(solver, one, t_a, t_b)
     own = SEVERAL * (solver.mass_a[one] + solver.mass_b[one] + (dot(t_a, x_a) + dot(t_b, x_b)))
     excess = dot(sub(v_a, v_b), n) + (dot(s_a, t_a) - dot(s_b, t_b)) - bias[k]
     keep = 1.0 - soft  # it gives a share of its impulse back: all of its equation times what it keeps
@@ -147,16 +161,41 @@ def terms_at(solver, one, k, motion, bias, softly):
 
 
 @inlined
-def rub_at(solver, one, k, motion, runs):
-    """The motion after the impulse along the surface at row k, of the pair whose first row is ``one``. runs: ARMS if
-    some surface does, else NO_ARMS; two variants, as one with a branch would not solve several pairs together."""
-    n, arm_a, arm_b, tangent = solver.normal[k], solver.arm_a[k], solver.arm_b[k], solver.tangent[k]
-    slip = parting_at(motion, arm_a, arm_b)
+def pull_at(solver, k, motion, old, share, push, runs):
+    """The impulse along the surface at row k that stops a share of what slides there, where it is ``old`` so far, and
+    the row pushes so much. runs: ARMS if some surface does, else NO_ARMS; two variants, as one with a branch would not
+    solve several pairs together."""
+    slip = parting_at(motion, solver.arm_a[k], solver.arm_b[k])
     if len(runs) > 0:
         slip = add(slip, solver.surface_slip[k])
-    pull = pull_along_surface(tangent, slip, n, solver.tangent_mass[k], solver.friction[k] * solver.impulse[k])
+    return pull_along_surface(old, slip, solver.normal[k], share * solver.tangent_mass[k], solver.friction[k] * push)
+
+
+@inlined
+def pulled(solver, one, k, motion, pull):
+    """The motion with that impulse in place of the one so far, of the pair whose first row is ``one``."""
+    return pushed(solver, one, motion, solver.arm_a[k], solver.arm_b[k], sub(pull, solver.tangent[k]))
+
+
+@inlined
+def rub_at(solver, one, k, motion, runs):
+    """The motion after the impulse along the surface at row k, of the pair whose first row is ``one``."""
+    pull = pull_at(solver, k, motion, solver.tangent[k], 1.0, solver.impulse[k], runs)
+    motion = pulled(solver, one, k, motion, pull)
     solver.tangent[k] = pull
-    return pushed(solver, one, motion, arm_a, arm_b, sub(pull, tangent))
+    return motion
+
+
+@inlined
+def rub_two(solver, k, m, motion, p, q, runs):
+    """(motion, impulses) after the friction of two points k and m of a pair in a plane, which push by p and q. What
+    slides at one slides at the other: they share the impulse as they share the load, both at once, so that neither is
+    the first. Else what stands on both would rock on, and creep to one side."""
+    both, first = add(solver.tangent[k], solver.tangent[m]), p / (p + q) if p + q > 0.0 else 0.5
+    second = 1.0 - first
+    pull = pull_at(solver, k, motion, scale(both, first), first, p, runs)
+    other = pull_at(solver, m, motion, scale(both, second), second, q, runs)
+    return pulled(solver, k, m, pulled(solver, k, k, motion, pull), other), pull, other
 
 
 @inlined
@@ -194,14 +233,6 @@ def solve_one(solver, one, motion, bias, softly, runs):
     new = old + excess if old + excess > 0.0 else 0.0
     solver.impulse[one] = new
     return rub_at(solver, one, one, pushed(solver, one, motion, arm_a, arm_b, scale(n, new - old)), runs)
-
-
-@inlined
-def rub_rows(solver, chunk, start, first, pairs, runs):
-    """The rows of one point of some pairs along their surfaces."""
-    for q in range(pairs):
-        k = first + q
-        store_motion(chunk, q, rub_at(solver, start + q, k, chunk_motion(chunk, q), runs))
 
 
 @inlined
@@ -243,20 +274,40 @@ def solve_rows(solver, chunk, bias, softly, start, pairs, layout, runs):
         for q in range(pairs):
             store_motion(chunk, q, solve_one(solver, start + q, chunk_motion(chunk, q), bias, softly, runs))
         return
-    for e in range(points // 2):
-        first, second = start + e * stride, start + (e + points // 2) * stride
+    half = len(solver.normal[start]) - 1  # of two points in a plane, of four in space: known when it is compiled
+    for e in range(half):
+        first, second = start + e * stride, start + (e + half) * stride
         for q in range(pairs):  # it stores nothing where it reads: else no two pairs would be solved together
-            motion = chunk_motion(chunk, q)
-            motion, chunk.impulse[q], chunk.other[q] = solve_two(
-                solver, start + q, first + q, second + q, motion, bias, softly
-            )
+            one, k, m = start + q, first + q, second + q
+            motion, p, o = solve_two(solver, one, k, m, chunk_motion(chunk, q), bias, softly)
+            chunk.impulse[q], chunk.other[q] = p, o
+            if half == 1:
+                motion, chunk.pull[q], chunk.other_pull[q] = rub_two(solver, k, m, motion, p, o, runs)
             store_motion(chunk, q, motion)
         for q in range(pairs):
-            solver.impulse[first + q], solver.impulse[second + q] = chunk.impulse[q], chunk.other[q]
-    for q in range(pairs if points == 4 else 0):
+            k, m = first + q, second + q
+            solver.impulse[k], solver.impulse[m] = chunk.impulse[q], chunk.other[q]
+            if half == 1:
+                solver.tangent[k], solver.tangent[m] = chunk.pull[q], chunk.other_pull[q]
+    if half == 1:
+        return
+    for q in range(pairs):
         spread_load(solver, start + q, stride)
     for e in range(points):
-        rub_rows(solver, chunk, start, start + e * stride, pairs, runs)
+        for q in range(pairs):
+            motion = rub_at(solver, start + q, start + e * stride + q, chunk_motion(chunk, q), runs)
+            store_motion(chunk, q, motion)
+
+
+@inlined
+def solve_pairs(solver, chunk, bias, softly, start, pairs, layout):
+    """The same, and the velocities of the bodies are brought before and taken back."""
+    gather_motion(solver, chunk, start, pairs)
+    if solver.surfaces_run:
+        solve_rows(solver, chunk, bias, softly, start, pairs, layout, ARMS)
+    else:
+        solve_rows(solver, chunk, bias, softly, start, pairs, layout, NO_ARMS)
+    scatter_motion(solver, chunk, start, pairs)
 
 
 @part
@@ -278,15 +329,15 @@ def measure_rows(solver, chunk, ahead, dt, first, pairs):
 def measure_chunks(solver, ahead, dt, span):
     """The same of all rows of a range."""
     start, c, any_far = span[0], solver.first_chunk, False
-    chunk = make_chunk(scale(solver.velocity[0], 0.0))
+    chunk = chunk_of(solver)
     while start < span[1]:
-        points = solver.points[c]
-        pairs = (solver.ends[c] - start) // points
+        points, stop = solver.points[c], solver.ends[c]
+        pairs = (stop - start) // points
         gather_motion(solver, chunk, start, pairs)
         gather_places(solver, chunk, start, pairs)
         for e in range(points):
             any_far |= measure_rows(solver, chunk, ahead, dt, start + e * pairs, pairs)
-        start, c = solver.ends[c], c + 1
+        start, c = stop, c + 1
     return any_far
 
 
@@ -295,30 +346,20 @@ def solve_chunks(solver, bias, pushes, span):
     """One pass over the rows of a range. bias, pushes: see ``solve_normals``; without a branch for the latter, or no
     two pairs would be solved together."""
     start, c, softly = span[0], solver.first_chunk, 1.0 if pushes else 0.0
-    chunk = make_chunk(scale(solver.velocity[0], 0.0))
+    chunk = chunk_of(solver)
     while start < span[1]:
-        points = solver.points[c]
-        pairs = (solver.ends[c] - start) // points
-        gather_motion(solver, chunk, start, pairs)
-        if solver.surfaces_run:
-            solve_rows(solver, chunk, bias, softly, start, pairs, (points, pairs), ARMS)
-        else:
-            solve_rows(solver, chunk, bias, softly, start, pairs, (points, pairs), NO_ARMS)
-        scatter_motion(solver, chunk, start, pairs)
-        start, c = solver.ends[c], c + 1
+        points, stop = solver.points[c], solver.ends[c]
+        pairs = (stop - start) // points
+        solve_pairs(solver, chunk, bias, softly, start, pairs, (points, pairs))
+        start, c = stop, c + 1
 
 
 @part
 def relax_pair(solver, k, start, c):
     """A pass over the pair of row k, of chunk c, which begins at ``start``; all its points as in a chunk, so that what
     lands flat stays so."""
-    chunk = make_chunk(scale(solver.velocity[0], 0.0))
+    chunk = chunk_of(solver)
     points = solver.points[c]
     pairs = (solver.ends[c] - start) // points
     one = start + (k - start) % pairs
-    gather_motion(solver, chunk, one, 1)
-    if solver.surfaces_run:
-        solve_rows(solver, chunk, solver.target_speed, 0.0, one, 1, (points, pairs), ARMS)
-    else:
-        solve_rows(solver, chunk, solver.target_speed, 0.0, one, 1, (points, pairs), NO_ARMS)
-    scatter_motion(solver, chunk, one, 1)
+    solve_pairs(solver, chunk, solver.target_speed, 0.0, one, 1, (points, pairs))

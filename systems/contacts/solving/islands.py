@@ -271,7 +271,7 @@ def place_rows(state):
     solver, bodies, pairs, starts = state.solver, state.bodies, state.pairs, stack_array(STARTS, 0)
     row, island, number, range_of = solver.body_row, solver.island, solver.number, solver.range_of
     ends, body_ends, count = solver.row_ends, solver.body_ends, solver.bodies
-    slot, colour, contacts, listed = solver.slot, solver.colour, solver.contacts, solver.listed
+    slot, colour, contacts, listed, ranges = solver.slot, solver.colour, solver.contacts, solver.listed, solver.ranges
     for k in range(2 * COLOURS + 1):
         starts[k] = 0
     for r in range(contacts):
@@ -283,9 +283,9 @@ def place_rows(state):
         starts[colour[r]] += 1
         slot[r], listed[e] = e, r
     ends[0], body_ends[0] = contacts, count
-    if solver.ranges == 1:
+    if ranges == 1:
         return
-    for s in range(solver.ranges):
+    for s in range(ranges):
         ends[s] = body_ends[s] = 0
     for r in range(contacts):
         c = solver.pair[r]
@@ -295,7 +295,7 @@ def place_rows(state):
     for q in range(count):
         body_ends[range_of[island[q]] if island[q] >= 0 else 0] += 1
     rows = places = 0
-    for s in range(solver.ranges):  # from how many to where each begins
+    for s in range(ranges):  # from how many to where each begins
         rows, ends[s] = rows + ends[s], rows
         places, body_ends[s] = places + body_ends[s], places
     for e in range(contacts):

@@ -20,6 +20,7 @@ from ...integration.turning import (
     compliance,
     cross_spin,
     end_of_turn,
+    mixed_compliance,
     shares_of_small_turn,
     shares_of_turn,
     twist,
@@ -93,8 +94,8 @@ def most_compliance(solver, k, arms):
         return along
     two = cross_spin(n, one)
     across, a, b = compliance_along(solver, k, two, arms), solver.first[k], solver.second[k]
-    mixed = dot(twist(solver.arm_a[k], one), change_of_spin(solver, a, twist(solver.arm_a[k], two)))
-    mixed += dot(twist(solver.arm_b[k], one), change_of_spin(solver, b, twist(solver.arm_b[k], two)))
+    mixed = mixed_compliance(solver, a, solver.arm_a[k], one, two)
+    mixed += mixed_compliance(solver, b, solver.arm_b[k], one, two)
     half = 0.5 * (along - across)
     return 0.5 * (along + across) + math.sqrt(half * half + mixed * mixed)
 

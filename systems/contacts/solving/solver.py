@@ -174,7 +174,7 @@ def solve_substep(solver, springs, times, rule, ends, span, arms):
 def is_still(solver, dt, span, arms):
     """Whether an island rests, and its last substep has changed nothing that matters: those that follow would not."""
     start, stop, begin, end = span
-    extent, fastest = math.inf, 0.0
+    extent, fastest, changes = math.inf, 0.0, False
     if len(arms) > 0 and solver.joints.begin < solver.joints.end:
         return False
     for q in range(begin, end):
@@ -183,13 +183,9 @@ def is_still(solver, dt, span, arms):
             around = scale(solver.spin[q], solver.reach[q])
             fastest = max(fastest, dot(around, around))
     for k in range(start, stop):
-        extent = min(extent, solver.extent[k])
-    if not math.sqrt(fastest) * dt <= NEGLIGIBLE * extent:
-        return False
-    changes = False
-    for k in range(start, stop):
-        changes |= abs(solver.impulse[k] - solver.previous[k]) > NEGLIGIBLE * solver.impulse[k]
-    return not changes
+        extent, push = min(extent, solver.extent[k]), solver.impulse[k]
+        changes |= abs(push - solver.previous[k]) > NEGLIGIBLE * push
+    return not changes and math.sqrt(fastest) * dt <= NEGLIGIBLE * extent
 
 
 @part
@@ -324,8 +320,8 @@ def solve_contacts(state, dt):
 @packed
 def solve_turning_contacts(state, dt):
     """The contacts and joints of bodies of which some spin."""
-    joints = state.solver.joints
-    joints.solver, state.solver.tumbling = state.links[JOINED_RANGE], state.links[TUMBLE]
-    if state.solver.contacts > 0 or joints.active > 0:
+    solver, joints = state.solver, state.solver.joints
+    joints.solver, solver.tumbling = state.links[JOINED_RANGE], state.links[TUMBLE]
+    if solver.contacts > 0 or joints.active > 0:
         solve_substeps(state, dt, ARMS)
     return OK
