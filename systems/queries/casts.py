@@ -10,7 +10,7 @@ import math
 
 from ...framework.compilation import inlined, pasted
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, add_scaled, divided, item, larger, length, replace, smaller, sub
+from ...framework.vectors import add, add_scaled, at_most, divided, item, larger, length, replace, smaller, sub
 from ..bits import lowest_bit
 from ..broad_phase.tree.cells import cells_of, cover, parts_of, uncertainty
 from ..broad_phase.uniform_grid import LANES, cells_around, frame_of, outline
@@ -48,9 +48,12 @@ def cast_path(state, batch, q, rounding):
 
 @inlined
 def box_interval(lower, upper, path, reach):
-    """(enter, leave) of the path as far as ``reach`` and the box lower..upper; enter > leave if they never meet."""
+    """(enter, leave) of the path as far as ``reach`` and the box lower..upper; enter > leave if they never meet.
+
+    What has no shape has a box of nan: nothing meets that.
+    """
     back, front = sub(path.start, path.half), add(path.start, path.half)
-    enter, leave = 0.0, reach
+    enter, leave = 0.0, reach if at_most(lower, upper) else -1.0
     for k in range(len(back)):
         one = (item(lower, k) - item(front, k)) * item(path.inverse, k)
         two = (item(upper, k) - item(back, k)) * item(path.inverse, k)

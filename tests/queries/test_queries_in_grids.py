@@ -5,16 +5,27 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from queries.helpers_queries import GRAZE, Bodies, directions, scene
-from worlds import both_dimensions
+from worlds import ball, both_dimensions, make_world
+
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 
 ASKED = 6  # places, each time
 
 
+def some_of(bodies, which):
+    return Bodies(*(column[which] for column in vars(bodies).values()))
+
+
+def collider_of(world, entity):
+    return world.try_component(entity, SphereCollider) or world.try_component(entity, AABBCollider)
+
+
 def compare(world, bodies, rng):
-    """Answers around random bodies with those of brute force."""
+    """Answers around random bodies with those of brute force; of bodies whose colliders are off there are none."""
     d = world.dimensions
     bodies.centre[np.searchsorted(bodies.entity, world.bodies.entity)] = world.bodies.position
     centres = bodies.centre[rng.integers(0, len(bodies.entity), ASKED)] + rng.standard_normal((ASKED, d))
+    bodies = some_of(bodies, [collider_of(world, entity).enabled for entity in bodies.entity.tolist()])
     ways, radii = directions(rng, ASKED, d), 2 * rng.random(ASKED)
     spheres, nearest = world.query_spheres(centres, radii), world.query_nearests(centres)
     boxes = world.query_aabbs(centres - radii[:, None], centres + radii[:, None])
@@ -74,7 +85,7 @@ def test_answers_while_bodies_sleep(d, count, kinds, grids):
             gone = rng.choice(sleepers, 2, replace=False)
             for entity in gone.tolist():
                 world.delete_entity(entity, immediate=True)
-            bodies = Bodies(*(column[~np.isin(every.entity, gone)] for column in vars(every).values()))
+            bodies = some_of(every, ~np.isin(every.entity, gone))
         elif turn % 7 == 3:
             world.wake(rng.choice(sleepers))
         elif turn % 7 == 5:
@@ -90,3 +101,66 @@ def test_answers_while_bodies_sleep(d, count, kinds, grids):
         if turn == 0:
             assert (bool(state.grid.serves), bool(state.static_grid.serves)) == grids
             assert state.first > 0.8 * len(world.bodies.dynamic)
+
+
+@both_dimensions
+def test_what_is_off_is_met_by_no_ray(d):
+    """A ray along a row of balls meets those that are on, in order, whether they were switched before the step or after
+    it: a kinematic one, which is outside of the grid of many dynamic ones, and some that are in it."""
+    world, ways = make_world(d), np.eye(d)
+    balls = [ball(world, (3.0 * k, *[0.0] * (d - 1)), 1.0, kind="dynamic" if k else "kinematic") for k in range(100)]
+    colliders = [world.component_for_entity(entity, SphereCollider) for entity in balls]
+    for turn, k in enumerate((0, 1, 2, 50, 2, 1, 50, 0)):
+        colliders[k].enabled = not colliders[k].enabled
+        if turn % 2 == 0:
+            world.step()
+        on = [entity for entity, collider in zip(balls, colliders, strict=True) if collider.enabled]
+        assert [hit.entity for hit in world.ray_cast(-5.0 * ways[0], ways[0])] == on
+        assert world.ray_casts(-5.0 * ways[:1], ways[0]).entity.tolist() == on[:1]
+
+
+@pytest.mark.slow
+@both_dimensions
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(
+    ("count", "kinds"),
+    [
+        (40, ("dynamic", "static", "kinematic")),  # none of them in a grid
+        (400, ("dynamic",) * 30 + ("kinematic", "static")),  # a few kinematic ones outside of the grid of what moves
+        (400, ("dynamic", "static", "kinematic", "static", "static")),  # both grids
+        (300, ("dynamic", "static", "static")),
+    ],
+)
+def test_answers_while_colliders_are_switched(d, count, kinds, seed):
+    """What is off is not there: whatever is switched off and on, moves, sleeps, changes its kind, comes or goes, with
+    steps between and without, answers are those of a loop over all bodies that are on."""
+    world, bodies, side = scene(d, count, seed=seed, kinds=kinds, sleeping=True)
+    rng = np.random.default_rng([seed, count])
+    for _ in range(100 if seed % 2 else 2):
+        world.step()
+    compare(world, bodies, rng)
+    for turn in range(24):
+        entities = world.bodies.entity.copy()
+        sleepers, statics = entities[: world.physics.state.sleepers], world.bodies.static.entity
+        chosen = (entities, sleepers if len(sleepers) else entities, statics)[turn % 3]
+        for entity in rng.choice(chosen, min(len(chosen), int(rng.integers(1, 12))), replace=False).tolist():
+            collider = collider_of(world, entity)
+            collider.enabled = not collider.enabled
+        if turn % 4 == 1:
+            gone = rng.choice(entities, 2, replace=False)
+            for entity in gone.tolist():
+                world.delete_entity(entity, immediate=True)
+            bodies = some_of(bodies, ~np.isin(bodies.entity, gone))
+        elif turn % 4 == 2:
+            place, size, kind = rng.random(d) * side, 0.1 + rng.random(), kinds[turn % len(kinds)]
+            collider = SphereCollider(size, enabled=bool(rng.random() < 0.5))
+            entity = world.create_entity(Transform(place), RigidBody(kind=kind), collider)
+            new = [entity], [place], [[size] * d], [True]
+            bodies = Bodies(*(np.concatenate(both) for both in zip(vars(bodies).values(), new, strict=True)))
+        elif turn % 4 == 3:
+            kind = ("kinematic", "dynamic", "static")[turn // 4 % 3]
+            world.component_for_entity(int(rng.choice(entities)), RigidBody).kind = kind
+        compare(world, bodies, rng)
+        if turn % 3 == 0:
+            world.step()
+            compare(world, bodies, rng)
