@@ -74,8 +74,9 @@ def box_level(state, level, i, before, after):
 def grid_stop(state):
     """The row behind those of the grid of what moves. Kinematic bodies are often long: if they are few they are outside
     of it."""
-    few = state.moving - state.dynamic <= OUTSIDE_MAX // 2 and state.dynamic - state.first > BRUTE_FORCE_MAX
-    return state.dynamic if few else state.moving
+    dynamic, moving = state.dynamic, state.moving
+    few = moving - dynamic <= OUTSIDE_MAX // 2 and dynamic - state.first > BRUTE_FORCE_MAX
+    return dynamic if few else moving
 
 
 @part

@@ -108,14 +108,15 @@ def colour_rows(state):
 @part
 def join_bodies(state):
     """Number the bodies of joints, which join islands as contacts do, and groups, which contacts do not join."""
-    joints, inverse_mass = state.solver.joints, state.bodies.inverse_mass
+    solver, inverse_mass = state.solver, state.bodies.inverse_mass
+    joints = solver.joints
     for e in range(joints.active):
         j = joints.order[e]
         a, b = joints.row_a[j], joints.row_b[j]
         p, q = solver_index(state, a) if a >= 0 else -1, solver_index(state, b) if b >= 0 else -1
         if p >= 0 and q >= 0 and inverse_mass[a] > 0.0 and inverse_mass[b] > 0.0:
-            join_roots(state.solver.island, p, q)
-            join_roots(state.solver.group, p, q)
+            join_roots(solver.island, p, q)
+            join_roots(solver.group, p, q)
 
 
 @inlined
@@ -249,12 +250,13 @@ def choose_substeps(solver, t, usual, dt):
     if solver.size_of[t] == 0:  # it has joints alone
         solver.substeps_of[t], solver.load_share[t] = least, math.inf
         return least > usual or solver.at_once[t]
-    own, hard = own_need(solver, t, dt), is_hard_island(solver, t, usual, dt)
-    need = sag * solver.stiff[t] / (solver.lightest[t] * MOST_SAG)
+    hard, stiff = is_hard_island(solver, t, usual, dt), solver.stiff[t]
+    own, lightest = solver.own[t], solver.lightest[t]
+    need = sag * stiff / (lightest * MOST_SAG)
     if hard:
-        need *= OWN_SAG / max(OWN_SAG, own)
-    strike = solver.approach_extents[t] - 2.0 * solver.most_change[t] * solver.own[t] * dt
-    ratio = solver.stiff[t] / (solver.lightest[t] * solver.own[t])
+        need *= OWN_SAG / max(OWN_SAG, own_need(solver, t, dt))
+    strike = solver.approach_extents[t] - 2.0 * solver.most_change[t] * own * dt
+    ratio = stiff / (lightest * own)
     struck = STRIKE_SUBSTEPS * strike * ratio if strike > STRUCK_EXCESS else 0.0
     most = max(LEAST_WORK_SUBSTEPS, most_repeats(solver.size_of[t] + solver.links[t]))
     asked, substeps = max(need, struck * struck), least

@@ -111,15 +111,15 @@ def integrate_positions(solver, h, span, arms):
     """Bodies move for a substep; what moves by itself belongs to no special range, but moves with each of them."""
     if len(arms) > 0:
         turn_arms(solver, -1.0, span, arms)
-    shift = solver.shift
+    shift, velocity = solver.shift, solver.velocity
     for q in range(span[2], span[3]):
-        shift[q] = add_scaled(shift[q], solver.velocity[q], h)
+        shift[q] = add_scaled(shift[q], velocity[q], h)
     for m in range(solver.movers if span[2] > 0 else 0):
         q = solver.mover[m]
-        shift[q] = add_scaled(shift[q], solver.velocity[q], h)
+        shift[q] = add_scaled(shift[q], velocity[q], h)
         if len(arms) > 0:
             rotate_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], h))
-    if len(arms) > 0 and len(solver.velocity[span[2]]) == 3 and (solver.joints.active > 0 or solver.lopsided):
+    if len(arms) > 0 and len(velocity[span[2]]) == 3 and (solver.joints.active > 0 or solver.lopsided):
         call_tumble(solver.tumbling, solver, h, span)
         load_masses(solver, span)
     elif len(arms) > 0:
