@@ -338,6 +338,10 @@ def scribble_long(state, dt):
     state.bodies.force[0] = (0.0, 1.0, 0.0)
 
 
+def scribble_short(state, dt):
+    state.bodies.force[0] = 1.0
+
+
 def scribble_by_dictionary(state, dt):
     state.bodies.mass[0] = HEAVY[0]
 
@@ -345,8 +349,11 @@ def scribble_by_dictionary(state, dt):
 @pytest.mark.compiled
 @pytest.mark.parametrize(
     ("stage", "why"),
-    [(scribble, "float64"), (scribble_long, "takes 2 numbers here, got 3"), (scribble_by_dictionary, "name 'HEAVY'")],
-)
+    [
+        (scribble, "float64"), (scribble_long, "takes 2 numbers here, got 3"),
+        (scribble_short, "takes 2 numbers here, got one"), (scribble_by_dictionary, "name 'HEAVY'"),
+    ],
+)  # fmt: skip
 def test_what_cannot_be_compiled_is_named_before_a_step_begins(stage, why):
     plugin = Plugin("wrong")
     plugin.stage(after="put_back", writes=("mass", "force"))(stage)

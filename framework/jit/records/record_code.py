@@ -253,10 +253,10 @@ class _StoreItem(AbstractTemplate):
         if len(arguments) == 3 and isinstance(arguments[0], ColumnType):
             found, (column, _, given) = _index_type(*arguments[:2]), arguments
             if found is not None:
-                both = isinstance(found[1], types.BaseTuple) and isinstance(given, types.BaseTuple)
-                if both and len(given) != len(found[1]):  # pyright: ignore[reportArgumentType]
-                    takes = f"{column.label or 'this column'} takes {len(found[1])} numbers here"  # pyright: ignore[reportArgumentType]
-                    raise TypingError(f"{takes}, got {len(given)}")  # pyright: ignore[reportArgumentType]
+                takes, got = (len(kind) if isinstance(kind, types.BaseTuple) else 0 for kind in (found[1], given))
+                if takes != got:
+                    told = f"{takes} numbers here" if takes else "one number here"
+                    raise TypingError(f"{column.label or 'this column'} takes {told}, got {got or 'one'}")
                 return signature(types.none, column, found[0], found[1])
         return None
 
