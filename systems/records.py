@@ -230,7 +230,7 @@ SHAPES = Schema(
     parameters=ints(),  # addresses of the shapes' parameter records, as they are in the world
     own_parameters=ints(),  # the same as the components have them, before rotation
     bounds=ints(),
-    least=ints(),
+    half_thickness=ints(),
     rotated=ints(),  # 0 for shapes that rotation does not change, both
     moments=ints(),  # 0 for shapes that do not tell; empty unless a stage of a plugin asks
     material=ints(),  # 0 for shapes that are the same everywhere
@@ -271,7 +271,7 @@ PAIR_COLUMNS = Section(
     crossed=flags(),  # they have met on their way, and have not pushed
     impulse=floats(unit="N s"),
     struck=floats(unit="s"),  # time of its last impact in this step, where there is an impulse
-    parts=flags(),  # and if it rests, is borne so that it may be sent back
+    parting=flags(),  # it rests, and flies apart or is sent back: no overlap to be pushed out
     # the manifold, made once in a step: what the pair's function says of
     at=vectors(unit="m"),  # this way from the centre of a's shape to that of b's; nan: of none
     depth=floats(unit="m"),

@@ -11,7 +11,7 @@ from ..ccd.search_bounds import GIVE, find_margins, place_at
 from ..codes import OK
 from ..integration.turning import size_of_turn
 from ..linking.parts import BOUND_SEARCHES, call_bound_searches
-from ..shapes.dispatch import half_extents, least_half_extent, write_rotated
+from ..shapes.dispatch import half_extents, half_thickness, write_rotated
 from ..shapes.surfaces import along_world
 from ..shapes.tolerances import driven_travel, reach_of
 from .brute_force import BRUTE_FORCE_MAX
@@ -50,7 +50,7 @@ def find_extents(state, level, start, stop):
             if state.rotated:
                 at = along_world(state, i, at)
                 write_rotated(state, shape, i)
-                least = least_half_extent(state, shape, i)
+                least = half_thickness(state, shape, i)
             offsets[level, i] = at
             half = half_extents(state, shape, i)
         least = min(smallest(half), least)

@@ -47,7 +47,7 @@ def keep_pair(state, j, found):
     new.a[found], new.b[found] = old.a[j], old.b[j]
     new.is_solid[found], new.near_contact[found] = old.is_solid[j], old.near_contact[j]
     new.crossed[found], new.disabled[found] = old.crossed[j], old.disabled[j]
-    new.impulse[found], new.struck[found], new.parts[found] = old.impulse[j], old.struck[j], old.parts[j]
+    new.impulse[found], new.struck[found], new.parting[found] = old.impulse[j], old.struck[j], old.parting[j]
     new.hit[found], new.early[found], new.at[found] = old.hit[j], old.early[j], old.at[j]
     new.depth[found], new.normal[found], new.point[found] = old.depth[j], old.normal[j], old.point[j]
 

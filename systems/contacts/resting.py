@@ -184,10 +184,10 @@ def support_along(bodies, a, b, normal):
 def still_bounces(state, dt, c, depth, normal, turns):
     """Whether a pair that bounces is no contact at rest: it meets in the next step only, or is on its way out.
 
-    Notes in pairs.parts whether it parts. turns: so far that only sweeps search its impacts.
+    Notes in pairs.parting whether it flies apart. turns: so far that only sweeps search its impacts.
     """
     pairs, bodies = state.pairs, state.bodies
-    a, b, velocity = pairs.a[c], pairs.b[c], bodies.linear_velocity
+    a, b, struck, velocity = pairs.a[c], pairs.b[c], pairs.impulse[c] > 0.0, bodies.linear_velocity
     e = restitution_at(state, a, b, (pairs.point[c], pairs.normal[c], pairs.at[c]))
     if not e > 0.0:
         return False
@@ -204,7 +204,6 @@ def still_bounces(state, dt, c, depth, normal, turns):
         known = (known or (e == 1.0 and depth <= FAST * extent)) and (not turns or is_swept(state, a, b, extent))
         if known and abs(speed) > threshold and is_turning(state, dt, a, b):
             return True  # its next impact is searched with the shapes as they are turned then
-    struck = pairs.impulse[c] > 0.0
     held = support_along(bodies, a, b, normal)  # without which they are nearer, and close faster
     near = driven_travel(state, a) + driven_travel(state, b)  # as a motor may bring them together in this step
     if speed >= -held:
@@ -212,8 +211,8 @@ def still_bounces(state, dt, c, depth, normal, turns):
     farthest = -near if near > 0.0 else 0.0 if struck else SAME_PLACE * extent
     if speed < -threshold and depth <= farthest:
         return True  # the next step's impact
-    pairs.parts[c] = parts = speed > threshold
-    return parts and struck  # on its way out
+    pairs.parting[c] = parting = speed > threshold
+    return parting and struck  # on its way out
 
 
 @inlined
@@ -238,8 +237,8 @@ def is_resting(state, dt, c):
     d = centre_offset(bodies, a, b)
     turns = state.spinning and turns_far(state, a, b)
     struck = pairs.impulse[c] > 0.0
-    parts = struck and (pairs.early[c] or is_borne(state, a) or is_borne(state, b))  # what bears one may send it back
-    if struck and not parts and turns and state.impacts.sweeps and restitution_of(state, a, b) > 0.0:  # it has left
+    parting = struck and (pairs.early[c] or is_borne(state, a) or is_borne(state, b))  # what bears one may send it back
+    if struck and not parting and turns and state.impacts.sweeps and restitution_of(state, a, b) > 0.0:  # it has left
         return False
     if pairs.early[c] and not hit and not turns and is_at_manifold(pairs, c, d, smaller_extent(bodies, a, b)):  # usual
         depth, normal, far = depth_by_plane(pairs, c, d), pairs.normal[c], False
@@ -255,13 +254,13 @@ def is_resting(state, dt, c):
                 if before >= -margin:
                     depth, normal, far = before, across, True
     was_near = near_contact[c] and has_manifold(pairs, c)  # not so pairs that were found within the step
-    stays = depth >= 0.0 or parts or (was_near and not hit and not turns)
+    stays = depth >= 0.0 or parting or (was_near and not hit and not turns)
     if not stays and depth < -turning_margin(state, dt, a, b):
         return False  # else it may have been pushed too much by the prediction
     if depth >= 0.0:
         near_contact[c] = True
-    pairs.parts[c] = parts
-    if not parts and state.impacts.active and still_bounces(state, dt, c, depth, normal, turns):
+    pairs.parting[c] = parting
+    if not parting and state.impacts.active and still_bounces(state, dt, c, depth, normal, turns):
         return False
     return far or not meets_at_corner(state, a, b, d, (depth, normal), slop_of(state, a, b))
 
@@ -356,7 +355,7 @@ def linearise(state, dt):
         if solver.point[r] > 0:  # as the first of the pair
             continue
         c = solver.pair[r]
-        a, b, parts = pairs.a[c], pairs.b[c], pairs.parts[c]
+        a, b, parting = pairs.a[c], pairs.b[c], pairs.parting[c]
         extent, d = smaller_extent(bodies, a, b), centre_offset_at_start(bodies, a, b)
         slop, end, struck_along = slop_for(state, extent), centre_offset(bodies, a, b), pairs.normal[c]
         if not is_at_manifold(pairs, c, d, extent):
@@ -366,16 +365,15 @@ def linearise(state, dt):
         varies = not convex and normal_varies(state, a, b, d, normal)
         way, struck = sub(end, d), bodies.impact_count[a] + bodies.impact_count[b] > 0
         slides = convex and not struck and gap + dot(way, normal) >= -STAYS_SLOPS * slop  # its plane parts them
-        if not is_stationary(way, slop) and (
-            parts or (apart and not slides) or meets_at_corner(state, a, b, d, (-gap, normal), slop)
-        ):
+        moves = not is_stationary(way, slop)
+        if moves and (parting or (apart and not slides) or meets_at_corner(state, a, b, d, (-gap, normal), slop)):
             flush = far = False
-            if convex and not parts:
+            if convex and not parting:
                 flush, gap, normal = plane_of_end(state, a, b, d, way, slop)
-            if not (flush or parts):
+            if not (flush or parting):
                 far, gap, normal = touch_of_long_way(state, dt, a, b, end)
             if not (flush or far):
-                gap, normal = entry(state, a, b, d, way, parts, slop)
+                gap, normal = entry(state, a, b, d, way, parting, slop)
             forget_manifold(pairs, c)
         if gap == math.inf:  # deep in a map that has no face there, at neither end: one that it does not reach
             gap = extent + length(way)
@@ -387,13 +385,13 @@ def linearise(state, dt):
         if apart and state.spinning and is_ball(state, a, normal) and is_ball(state, b, normal):
             apart = False  # neither has a corner to slide past
         # After an impact at time t the body seems to come from dv t behind: no overlap to be pushed out.
-        parts |= bounced and gap > 0.0
+        parting |= bounced and gap > 0.0
         mu = friction_at(state, a, b, (pairs.point[c], normal, d))
         has_friction |= mu != 0.0
         for e in range(r, r + rows_from(solver, r)):
             k = solver.slot[e]
             solver.normal[k], solver.gap[k], solver.extent[k], solver.friction[k] = normal, gap, extent, mu
-            solver.apart[k], solver.hard[k], solver.parting[k] = apart, not varies, parts
+            solver.apart[k], solver.hard[k], solver.parting[k] = apart, not varies, parting
     solver.has_friction, solver.surfaces_run = has_friction, any_surface_runs(state) and find_surface_slips(state)
     solver.has_rolling = False
     return call_of_step(state.links[ARMS_AT_REST], state, dt) if state.spinning else OK

@@ -113,7 +113,7 @@ def mixed_compliance(bodies, i, arm, along, other):
 
 @inlined
 def compliance(bodies, i, arm, along):
-    """The same along the first."""
+    """1 / kg that an impulse at the end of an arm, along a unit vector, moves along it by turning the body."""
     return mixed_compliance(bodies, i, arm, along, along)
 
 

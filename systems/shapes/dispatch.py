@@ -18,7 +18,7 @@ from .linking.signatures import (
     call_bounds,
     call_corner,
     call_evaluate,
-    call_least,
+    call_half_thickness,
     call_moments,
     call_rotated,
     call_sweep,
@@ -137,11 +137,11 @@ def half_extents(state, shape, i):
 
 
 @inlined
-def least_half_extent(state, shape, i):
-    """That of row i's shape along the axes of its body; infinity if rotation does not change the shape."""
+def half_thickness(state, shape, i):
+    """The least half extent of row i's shape along the axes of its body; infinity if rotation changes nothing."""
     shapes = state.shapes
-    address = shapes.least[shape]
-    return call_least(address, shapes.own_parameters[shape], i) if address != 0 else math.inf
+    address = shapes.half_thickness[shape]
+    return call_half_thickness(address, shapes.own_parameters[shape], i) if address != 0 else math.inf
 
 
 @inlined

@@ -150,7 +150,7 @@ def test_a_heavy_ball_falls_on_a_plank_that_lies(mode, mass, e):
 
 
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("seed", seeds(2, 100, known=(93, 97)))
+@pytest.mark.parametrize("seed", seeds(2, 100, known=(93, 97, 91001)))
 def test_a_see_saw_stays_above_the_ground(seed, mode):
     """10 to 100 kg fall 1 to 12 m on one end of a hinged plank of 3.5 kg and .2 m: contacts at rest hold it, and send
     it back to what strikes it."""

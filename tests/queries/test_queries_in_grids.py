@@ -42,6 +42,14 @@ def compare(world, bodies, rng):
             assert min(rays.distance[i], 4.0) == pytest.approx(min(met.min(), 4.0), abs=1e-6)
 
 
+def without_two(world, bodies, among, rng):
+    """The bodies, after two entities among these are deleted."""
+    gone = rng.choice(among, 2, replace=False)
+    for entity in gone.tolist():
+        world.delete_entity(entity, immediate=True)
+    return some_of(bodies, ~np.isin(bodies.entity, gone))
+
+
 @pytest.mark.slow
 @both_dimensions
 def test_answers_follow_steps_and_writes(d):
@@ -82,10 +90,7 @@ def test_answers_while_bodies_sleep(d, count, kinds, grids):
     for turn in range(9):
         sleepers = world.bodies.entity[: state.sleepers]
         if turn % 7 == 1:
-            gone = rng.choice(sleepers, 2, replace=False)
-            for entity in gone.tolist():
-                world.delete_entity(entity, immediate=True)
-            bodies = some_of(every, ~np.isin(every.entity, gone))
+            bodies = without_two(world, every, sleepers, rng)
         elif turn % 7 == 3:
             world.wake(rng.choice(sleepers))
         elif turn % 7 == 5:
@@ -147,10 +152,7 @@ def test_answers_while_colliders_are_switched(d, count, kinds, seed):
             collider = collider_of(world, entity)
             collider.enabled = not collider.enabled
         if turn % 4 == 1:
-            gone = rng.choice(entities, 2, replace=False)
-            for entity in gone.tolist():
-                world.delete_entity(entity, immediate=True)
-            bodies = some_of(bodies, ~np.isin(bodies.entity, gone))
+            bodies = without_two(world, bodies, entities, rng)
         elif turn % 4 == 2:
             place, size, kind = rng.random(d) * side, 0.1 + rng.random(), kinds[turn % len(kinds)]
             collider = SphereCollider(size, enabled=bool(rng.random() < 0.5))

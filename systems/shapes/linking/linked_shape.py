@@ -52,12 +52,12 @@ class LinkedShape:
         )
 
     @cached_property
-    def least(self) -> Linked | None:
+    def half_thickness(self) -> Linked | None:
         """Its least half extent along its body's axes, from its own parameters; None if rotation changes nothing."""
         axes = str(tuple(tuple(float(j == k) for k in range(self.dimensions)) for j in range(self.dimensions)))
         own, turns = parameters_source(self.shape, "at(own)", "i", "Parameters", axes), self.shape.turned is not None
         return self._linked(
-            "least(own, i)", f"return smallest(function({own}, {self.dimensions}))",
+            "half_thickness(own, i)", f"return smallest(function({own}, {self.dimensions}))",
             function=self.shape.bounds if turns or self.shape.rotates else None,
         )  # fmt: skip
 
@@ -120,7 +120,7 @@ class LinkedShape:
     def all_functions(self, by_address: bool, touched: bool = False) -> Iterator[Linked]:
         """by_address: whether some pair takes the shape by the addresses of support and rounding; touched: whether what
         spins touches it in several points, found by that of its edge too."""
-        found = [self.bounds, self.least, self.rotated, self.material]
+        found = [self.bounds, self.half_thickness, self.rotated, self.material]
         if self.shape.support is not None and (by_address or touched):
             found += [self.support, self.rounding]
         if touched:

@@ -81,7 +81,7 @@ class LinkedShapes:
         shapes.count = len(self.shapes)
         shapes.concave = np.array([not shape.convex for shape in self.shapes], bool)
         shapes.sharp = np.array([shape.sharp for shape in self.shapes], bool)
-        for name in ("bounds", "least", "rotated", "material", "evaluate", "batch", "corner"):
+        for name in ("bounds", "half_thickness", "rotated", "material", "evaluate", "batch", "corner"):
             setattr(shapes, name, self._table(name))
         shapes.mixing, shapes.flipped = addresses(self._rules), self._flipped
         shapes.moments = self._table("moments") if moments else np.zeros(0, np.int64)
@@ -108,7 +108,7 @@ class LinkedShapes:
     def _table(self, name: str) -> np.ndarray:
         """Addresses of a function, by shape, or for pairs at first * count + second; 0 where there is none."""
         if name not in self._tables:
-            if name in ("bounds", "least", "rotated", "moments", "material"):
+            if name in ("bounds", "half_thickness", "rotated", "moments", "material"):
                 functions = [getattr(function, name) for function in self.functions]
             else:
                 functions = [getattr(self.pairs.get(pair), name, None) for pair in np.ndindex(2 * (len(self.shapes),))]

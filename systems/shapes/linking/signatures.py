@@ -30,7 +30,7 @@ def signatures(dimensions: int) -> dict[str, Signature]:
         "sweep": tuple_of(BOOL, FLOAT)(state, *rows, vector, vector),  # (d, v): hit, time
         "corner": BOOL(state, *rows, vector, FLOAT),  # (d, slop)
         "bounds": vector(state, *row),  # half extents
-        "least": FLOAT(*row),  # half extent along the axes of its body
+        "half_thickness": FLOAT(*row),  # the least half extent along the axes of its body
         "moments": floats(moments)(state, *row),  # of its own: measure, centre, means of products of coordinates
         # (point, normal): friction, restitution, surface velocity
         "material": tuple_of(FLOAT, FLOAT, vector)(*row, vector, vector),
@@ -76,6 +76,6 @@ def call_in_dimension(signature_of: Callable[[int], Any]) -> Any:
         "evaluate", "batch", "sweep", "corner", "bounds", "moments", "material", "rotated", "support", "edge",
     )
 )  # fmt: skip
-call_rounding, call_least, call_mixing = (
-    linked_call(partial(linked_signature, name, 2)) for name in ("rounding", "least", "mixed")
+call_rounding, call_half_thickness, call_mixing = (
+    linked_call(partial(linked_signature, name, 2)) for name in ("rounding", "half_thickness", "mixed")
 )
