@@ -234,13 +234,13 @@ def is_resting(state, dt, c):
     hit, carried = count[a] + count[b] > 0, bodies.warm_started[a] or bodies.warm_started[b]
     if not near_contact[c] and not hit and not carried:
         return False
-    d = centre_offset(bodies, a, b)
+    d, extent = centre_offset(bodies, a, b), smaller_extent(bodies, a, b)
     turns = state.spinning and turns_far(state, a, b)
     struck = pairs.impulse[c] > 0.0
     parting = struck and (pairs.early[c] or is_borne(state, a) or is_borne(state, b))  # what bears one may send it back
     if struck and not parting and turns and state.impacts.sweeps and restitution_of(state, a, b) > 0.0:  # it has left
         return False
-    if pairs.early[c] and not hit and not turns and is_at_manifold(pairs, c, d, smaller_extent(bodies, a, b)):  # usual
+    if pairs.early[c] and not hit and not turns and is_at_manifold(pairs, c, d, extent):  # usual
         depth, normal, far = depth_by_plane(pairs, c, d), pairs.normal[c], False
     else:
         depth, normal, far = deepest(state, dt, c, d, turns)
@@ -248,10 +248,11 @@ def is_resting(state, dt, c):
         if state.spinning and not turns and depth < -margin:
             # A thin bar that lies on terrain is soon behind it, and what slides fast soon beyond what bears it.
             start = centre_offset_at_start(bodies, a, b)
-            slides = carried and not hit and length(sub(d, start)) > FAST * smaller_extent(bodies, a, b)
+            way = sub(d, start)
+            slides = carried and not hit and length(way) > FAST * extent
             if slides or depth == -math.inf:
                 _, before, across, _ = evaluate_pair(state, a, b, start)
-                if before >= -margin:
+                if before - max(0.0, dot(way, across)) >= -margin:  # else that plane parts them
                     depth, normal, far = before, across, True
     was_near = near_contact[c] and has_manifold(pairs, c)  # not so pairs that were found within the step
     stays = depth >= 0.0 or parting or (was_near and not hit and not turns)

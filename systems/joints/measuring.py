@@ -161,7 +161,7 @@ def measure_joints(solver, moved_for):
     """Where the joints of a range hold their bodies now, and what they ask. moved_for: s since they were measured."""
     joints, shift, order = solver.joints, solver.shift, solver.joints.order
     kinds, first, second, base_a, base_b = joints.kind, joints.first, joints.second, joints.base_a, joints.base_b
-    between, arms_a, arms_b, gap = joints.between, joints.arm_a, joints.arm_b, joints.gap
+    between, arms_a, arms_b, gap, reach = joints.between, joints.arm_a, joints.arm_b, joints.gap, solver.reach
     usual = 1.0 / joints.stiffness
     usual_mass, usual_impulse = 1.0 / (1.0 + usual), usual / (1.0 + usual)  # divisions cost more than all else of a row
     for e in range(joints.begin, joints.end):
@@ -186,9 +186,12 @@ def measure_joints(solver, moved_for):
             arms_a[j], arms_b[j], gap[j] = arm_a, arm_b, way
             compute_point_mass(solver, j, scale(way, 0.0))
             if is_holding(joints, j):
-                wide = length(way)
-                bound = most_pushed(solver, j, wide)
-                joints.push_rate[j] = joints.rate * (bound / wide if bound < wide else 1.0)
+                rate, near = joints.rate, FULL_PUSH_OVERLAP * (reach[a] + reach[b])
+                if dot(way, way) > near * near:  # else what bounds the push is farther away, whatever the arms
+                    wide = length(way)
+                    bound = most_pushed(solver, j, wide)
+                    rate *= bound / wide if bound < wide else 1.0
+                joints.push_rate[j] = rate
                 gives, mass_scale, impulse_scale = compliance_of(solver, j, usual), usual_mass, usual_impulse
                 if gives < usual:
                     mass_scale, impulse_scale = 1.0 / (1.0 + gives), gives / (1.0 + gives)

@@ -215,7 +215,7 @@ def test_a_cradle_on_pins_swings_on(lifted, joint, d):
         assert 0.95 * start < energy_of(world) - lowest < 1.02 * start
 
 
-@pytest.mark.parametrize("seed", seeds(3, 60))
+@pytest.mark.parametrize("seed", seeds(3, 60, known=(12,)))
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("d", [2, 3])
 def test_what_circles_strikes_with_its_energy_whenever_in_a_step(d, mode, seed):

@@ -148,7 +148,7 @@ def number_islands(state, dt, ordered):
     moved. It is that already if rows are ``ordered``. What is known of its bodies is summed up."""
     solver, bodies, island, count = state.solver, state.bodies, state.solver.island, 0
     velocity, start, warm_started = bodies.linear_velocity, bodies.start_velocity, bodies.warm_started
-    number = solver.number
+    number, lightest, most_change = solver.number, solver.lightest, solver.most_change
     for q in range(solver.bodies):
         i = solver.body_row[q]
         w = bodies.inverse_mass[i]
@@ -159,7 +159,7 @@ def number_islands(state, dt, ordered):
         t = island[q] if ordered else (number[root] if root < q else count)
         if t == count:
             count += 1
-            solver.lightest[t], solver.most_change[t], solver.mass_of[t], solver.force_of[t] = math.inf, 0.0, 0.0, 0.0
+            lightest[t], most_change[t], solver.mass_of[t], solver.force_of[t] = math.inf, 0.0, 0.0, 0.0
             solver.stiff[t] = solver.own[t] = solver.approach_extents[t] = solver.taken[t] = 0.0
             solver.size_of[t] = solver.substeps_of[t] = 0
             solver.credit[t] = 0.0
@@ -169,7 +169,7 @@ def number_islands(state, dt, ordered):
         if warm_started[i]:
             change = sub(change, bodies.warm_start_velocity[i])
         speed = math.sqrt(dot(change, change))
-        solver.lightest[t], solver.most_change[t] = min(solver.lightest[t], w), max(solver.most_change[t], speed)
+        lightest[t], most_change[t] = min(lightest[t], w), max(most_change[t], speed)
         solver.mass_of[t] += 1.0 / w
         solver.force_of[t] += speed / w
     solver.islands = count
@@ -192,17 +192,17 @@ def measure_joined_islands(state, dt):
 def measure_islands(state, dt):
     """What each island's rows ask for: how stiff they must be, and how fast they are struck."""
     solver, pairs, bodies, nothing = state.solver, state.pairs, state.bodies, zero_of(state)
-    velocity, inverse_mass, t = bodies.start_velocity, bodies.inverse_mass, -1
+    velocity, inverse_mass, size_of, t = bodies.start_velocity, bodies.inverse_mass, solver.size_of, -1
     for r in range(solver.contacts):
         if solver.point[r] > 0:  # asks for nothing else
-            solver.size_of[t], solver.tips[t] = solver.size_of[t] + 1, True
+            size_of[t], solver.tips[t] = size_of[t] + 1, True
             continue
         c = solver.pair[r]
         a, b = pairs.a[c], pairs.b[c]
         t = island_of_rows(state, a, b)
         w_a, w_b, inverse_extent = inverse_mass[a], inverse_mass[b], 1.0 / smaller_extent(bodies, a, b)
         v_a, v_b = velocity[a] if a < state.moving else nothing, velocity[b] if b < state.moving else nothing
-        solver.size_of[t] += 1
+        size_of[t] += 1
         stiff = (w_a + w_b) * inverse_extent
         solver.stiff[t], solver.own[t] = max(solver.stiff[t], stiff), max(solver.own[t], stiff / max(w_a, w_b))
         strike = dot(sub(v_a, v_b), pairs.normal[c]) * dt * inverse_extent
