@@ -281,11 +281,14 @@ def relax_listed(solver):
 
 @part
 def add_joints(solver):
-    """What the joints of a range have done in a substep."""
+    """What the joints of a range have done in a substep: the share that acts, see guard."""
     joints, order, impulse, push = solver.joints, solver.joints.order, solver.joints.impulse, solver.joints.push
-    total, thrust = joints.total, joints.thrust
+    total, thrust, share = joints.total, joints.thrust, solver.share
     for e in range(joints.begin, joints.end):
         j = order[e]
+        kept = share[island_of_joint(solver, j)]
+        if kept < 1.0:
+            impulse[j], push[j] = impulse[j] * kept, scale(push[j], kept)
         total[j] += impulse[j]
         thrust[j] = add(thrust[j], push[j])
 

@@ -79,6 +79,29 @@ def test_no_chain_gains_energy(d, gravity):
         world.close()
 
 
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_chain_that_hangs_gains_nothing_as_its_step_changes(d, seed):
+    """1 s at 1/60 s, then once, or each other time, a step that is 3 to 300 times as short: no more than what its
+    weight does as it falls for two long steps."""
+    random, dt = np.random.default_rng(seed), 1 / 60
+    gravity = (0, -10) if d == 2 else (0, 0, -10)
+    with World(Physics(d, gravity=gravity), Rotation(), Joints()) as world:
+        links, down, before = int(random.integers(2, 16)), np.eye(d)[-1], None
+        for k in range(links):
+            body = RigidBody(random.uniform(1, 3)), BoxCollider(np.where(down, 0.5, 0.1), group=1), Spin()
+            link = world.create_entity(Transform(-(k + 0.5) * down), *body)
+            world.create_entity(Ball(before, link, anchor=-k * down))
+            before = link
+        start, allowed, short = energy(world), 200 * world.bodies.mass.sum() * dt**2, dt / 3 ** random.uniform(1, 5)
+        for step in range(180):
+            shorter = step >= 60 and step % 2 == 0 and (seed % 2 == 0 or step == 60)
+            world.settings = world.settings.replace(dt=short if shorter else dt)
+            world.step()
+            assert energy(world) < start + allowed
+        assert not world.faults
+
+
 def chain_in_a_room(seed: int, d: int) -> World:
     """The same with boxes and balls, which rub the walls of a room and each other."""
     random, mode = np.random.default_rng((seed, d)), ("discrete", "continuous")[seed % 2]
