@@ -25,6 +25,7 @@ from ..integration.turning import change_of_spin, cross_spin, lever, turn_of_arm
 from ..joints.bodies import turned_before, turned_in_step
 from ..joints.direct import directions_at
 from ..joints.groups import group_of
+from ..joints.order import numbers_of
 from ..joints.records import ALIGN, DRIVE, HOLD, LIMIT, POINT, ROD, SERVO, SLIDE, TURN
 from ..parts.rows import owner_of, place_of
 
@@ -45,12 +46,6 @@ def answers(joints, j):
     rule = joints.rule[j]
     holds = rule in (HOLD, DRIVE, SERVO) or (rule == LIMIT and joints.load[j] != 0.0)
     return holds and joints.most[j] == math.inf
-
-
-@inlined
-def numbers_of(joints, j):
-    """So many numbers a row holds."""
-    return len(joints.normal[j]) if joints.kind[j] == POINT else 1
 
 
 @part

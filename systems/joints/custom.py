@@ -28,19 +28,12 @@ call_given = call_in_dimension(custom_signature)
 
 
 @inlined
-def rates_of_custom(solver, j):
-    """How fast the value of a row changes by what each of its bodies does."""
+def speed_of_custom(solver, j):
+    """How fast the value of a row changes."""
     joints = solver.joints
     a, b = joints.first[j], joints.second[j]
     at_a = dot(joints.along_a[j], solver.velocity[a]) + dot(joints.turn_a[j], solver.spin[a])
-    return at_a, dot(joints.normal[j], solver.velocity[b]) + dot(joints.turn_b[j], solver.spin[b])
-
-
-@inlined
-def speed_of_custom(solver, j):
-    """How fast the value of a row changes."""
-    at_a, at_b = rates_of_custom(solver, j)
-    return at_a + at_b
+    return at_a + dot(joints.normal[j], solver.velocity[b]) + dot(joints.turn_b[j], solver.spin[b])
 
 
 @part

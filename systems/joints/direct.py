@@ -19,7 +19,7 @@ from ...framework.vectors import add, add_scaled, dot, item, replace, scale, sub
 from ..contacts.constants import DIRECT_STIFFNESS, DIRECT_STIFFNESS_MAX, FRAME_BEND
 from ..integration.turning import change_of_spin, compliance, cross_spin, twist
 from .custom import speed_of_custom
-from .order import NO_BLOCK, block_of, freedoms
+from .order import NO_BLOCK, block_of, freedoms, numbers_of
 from .records import CUSTOM, HELD_AT_ONCE, LIMIT, LIMITED_AT_ONCE, POINT, TURN
 
 # What is asked of rows: to push errors out, to hold without that, to hold what is left; RESULT_OF: of the solution.
@@ -126,7 +126,7 @@ def add_row(solver, j, weight):
     if moves_a and moves_b:
         first = a if direct.place[a] < direct.place[b] else b
         block = block_of(direct, first, b if first == a else a)
-    for axis in range(len(zero) if joints.kind[j] == POINT else 1):
+    for axis in range(numbers_of(joints, j)):
         push_a, turn_a, push_b, turn_b = directions_at(joints, j, axis)
         if moves_a:
             to_energy_norm(solver, a, push_a, turn_a, of_a)
@@ -391,7 +391,7 @@ def solve_limited(solver, j, pushes):
         i = joints.order[e]
         if joints.at_once[i] == HELD_AT_ONCE:
             share = (old - new) * inverse_mass_of(solver, i)
-            for k in range(len(zero) if joints.kind[i] == POINT else 1):
+            for k in range(numbers_of(joints, i)):
                 answer = share * change_at(solver, i, k)
                 if joints.kind[i] == POINT:
                     joints.push[i] = replace(joints.push[i], k, item(joints.push[i], k) + answer)

@@ -39,6 +39,12 @@ def is_rigid(joints, j):
     return joints.rule[j] == HOLD and joints.most[j] == math.inf
 
 
+@inlined
+def numbers_of(joints, j):
+    """So many numbers a row holds."""
+    return len(joints.normal[j]) if joints.kind[j] == POINT else 1
+
+
 @part
 def measure_group(state, j):
     """What a row of joints is to the group of its bodies, by whose first one that is known."""
@@ -50,7 +56,7 @@ def measure_group(state, j):
     direct.heavy[g] = min(direct.heavy[g], w_a if w_a > 0.0 else w_b, w_b if w_b > 0.0 else w_a)
     direct.welds[g] += joints.kind[j] == TURN and joints.rule[j] == HOLD
     if joints.rule[j] in (HOLD, DRIVE, SERVO) and joints.most[j] == math.inf:
-        direct.freedom[g] -= 2 * (len(joints.normal[j]) if joints.kind[j] == POINT else 1)
+        direct.freedom[g] -= 2 * numbers_of(joints, j)
     if joints.kind[j] <= ROD and joints.rule[j] <= LIMIT:
         size = joints.low[j] if joints.rule[j] == HOLD else joints.high[j]
         if joints.kind[j] == POINT:

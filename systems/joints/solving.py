@@ -3,31 +3,26 @@
 from __future__ import annotations
 
 from ...framework.compilation import packed, part
-from ...framework.vectors import add, dot, scale
-from ..integration.turning import cross_spin
+from ...framework.vectors import dot, item
 from . import calls
-from .custom import rates_of_custom
-from .direct import PUSH_PASS, REFINE_PASS, solve_direct
+from .direct import PUSH_PASS, REFINE_PASS, directions_at, solve_direct
 from .measuring import measure_joints
-from .records import CUSTOM, POINT, TURN
+from .order import numbers_of
+from .records import POINT
 from .rows import add_joints, island_of_joint, keep_joints, relax_listed, solve_joints, start_joints, warm_start_joints
 
 
 @part
 def work_of_joint(solver, j):
     """The work of a row on what moves by itself, J: minus what that gives to the island."""
-    joints, island = solver.joints, solver.island
-    a, b = joints.first[j], joints.second[j]
-    if island[a] >= 0 and island[b] >= 0:
-        return 0.0
-    q, arm, away = (a, joints.arm_a[j], -1.0) if island[a] < 0 else (b, joints.arm_b[j], 1.0)
-    if joints.kind[j] == CUSTOM:
-        at_a, at_b = rates_of_custom(solver, j)
-        return joints.impulse[j] * (at_a if q == a else at_b)
-    if joints.kind[j] >= TURN:
-        return away * joints.impulse[j] * dot(joints.normal[j], solver.spin[q])
-    push = joints.push[j] if joints.kind[j] == POINT else scale(joints.normal[j], joints.impulse[j])
-    return away * dot(push, add(solver.velocity[q], cross_spin(solver.spin[q], arm)))
+    joints, work = solver.joints, 0.0
+    for k in range(numbers_of(joints, j)):
+        push_a, turn_a, push_b, turn_b = directions_at(joints, j, k)
+        impulse = item(joints.push[j], k) if joints.kind[j] == POINT else joints.impulse[j]
+        for q, push, turn in ((joints.first[j], push_a, turn_a), (joints.second[j], push_b, turn_b)):
+            if solver.island[q] < 0:
+                work += impulse * (dot(push, solver.velocity[q]) + dot(turn, solver.spin[q]))
+    return work
 
 
 @packed
