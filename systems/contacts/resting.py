@@ -168,8 +168,7 @@ def deepest(state, dt, c, d, turns):
     far, gap, normal = touch_of_long_way(state, dt, a, b, d)
     if far:
         return -gap - dot(sub(d, centre_offset_at_start(bodies, a, b)), normal), normal, True
-    may_bounce = state.impacts.active
-    depth, normal = depth_at(state, c, d, smaller_extent(bodies, a, b), may_bounce)
+    depth, normal = depth_at(state, c, d, smaller_extent(bodies, a, b), state.impacts.active)
     return depth, normal, False
 
 
@@ -412,6 +411,7 @@ def find_touching(state, dt):
     Those that may are near contact, rest or had an impact, or are not solid.
     """
     pairs, bodies, impacts, count = state.pairs, state.bodies, state.impacts, 0
+    points, hit = pairs.point, pairs.hit
     if state.response_idle:
         pairs.touching_count = 0
         return OK
@@ -421,7 +421,7 @@ def find_touching(state, dt):
         solid, crossed = pairs.is_solid[c], pairs.crossed[c]
         if solid and not pairs.near_contact[c] and not crossed:
             continue
-        a, b, pushed, normal, met = pairs.a[c], pairs.b[c], pairs.impulse[c] > 0.0, pairs.normal[c], pairs.point[c]
+        a, b, pushed, normal, met = pairs.a[c], pairs.b[c], pairs.impulse[c] > 0.0, pairs.normal[c], points[c]
         d, extent = centre_offset(bodies, a, b), smaller_extent(bodies, a, b)
         slop = slop_for(state, extent)
         known = pushed and pairs.rests[c] and is_stationary(sub(d, pairs.at[c]), slop)
@@ -431,20 +431,20 @@ def find_touching(state, dt):
                 continue
             make_manifold(state, c, d)
         depth = depth_by_plane(pairs, c, d)
-        touches = pairs.hit[c] or (solid and depth >= -SAME_PLACE * extent)
+        touches = hit[c] or (solid and depth >= -SAME_PLACE * extent)
         if not touches and not pushed and not crossed:
             continue
-        pairs.depth[c], pairs.hit[c] = max(0.0, depth), touches
+        pairs.depth[c], hit[c] = max(0.0, depth), touches
         if pushed or (crossed and not touches):  # along this
             pairs.normal[c] = normal
         if crossed and not touches:
-            pairs.point[c] = sub(met, shape_centre(bodies, a))
+            points[c] = sub(met, shape_centre(bodies, a))
         pairs.touching[count] = c
         count += 1
     for r in range(impacts.logged):
         c = impacts.log_pair[r]
-        if not pairs.hit[c] and not pairs.crossed[c]:
-            pairs.point[c] = sub(impacts.log_point[r], shape_centre(bodies, pairs.a[c]))
+        if not hit[c] and not pairs.crossed[c]:
+            points[c] = sub(impacts.log_point[r], shape_centre(bodies, pairs.a[c]))
     pairs.touching_count = count
     state.contacts_counted += count
     return OK

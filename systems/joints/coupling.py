@@ -14,6 +14,7 @@ from __future__ import annotations
 from ...framework.compilation import inlined, part
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, item, replace, row, scale, store
+from ..contacts.constants import TURNING_FREQUENCY
 from ..integration.turning import change_of_spin, cross_spin, symmetric, twist
 from .records import CUSTOM, HOLD, LIMIT, POINT, SPRING, TURN
 
@@ -42,15 +43,21 @@ def end_of(joints, j):
 
 
 @inlined
+def is_fast(joints, j):
+    """Whether a spring is too fast for its substeps: such springs gain energy where they meet at a body."""
+    return joints.frequency[j] * joints.period > TURNING_FREQUENCY
+
+
+@inlined
 def is_soft_spring(joints, j):
-    """Whether a row is a spring that its substeps can follow: others gain energy where springs meet at a body."""
-    return joints.rule[j] == SPRING and joints.frequency[j] <= joints.fastest
+    """Whether a row is a spring that its substeps can follow."""
+    return joints.rule[j] == SPRING and not is_fast(joints, j)
 
 
 @inlined
 def is_holding(joints, j):
     """Whether a row holds its value, as springs do that are too fast for their substeps."""
-    return joints.rule[j] == HOLD or (joints.rule[j] == SPRING and joints.frequency[j] > joints.fastest)
+    return joints.rule[j] == HOLD or (joints.rule[j] == SPRING and is_fast(joints, j))
 
 
 @inlined

@@ -73,11 +73,11 @@ JOINTS = Schema(
     soft_further=vectors(unit="1 or 1/m or m"),
     axes_b=vectors(unit="1"),
     solver=integer(),  # address of what solves them, see calls
+    period=number(unit="s"),  # of a usual substep, in this step or the last one if that was longer
     # in a range
     begin=integer(),  # places in ``order``
     end=integer(),
     step=number(unit="s"),  # of a substep
-    fastest=number(unit="Hz"),  # springs above it hold
     stiffness=number(unit="1"),  # of what holds
     rate=number(unit="1/s"),  # at which what holds pushes its error out
     asked=integer(),  # the joint whose function runs now; 0: none

@@ -17,7 +17,7 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.elementary import cos, exp
 from ...framework.vectors import add, add_scaled, length, scale, sub
-from ..contacts.constants import FREQUENCY, JOINT_DAMPING_RATIO, TURNING_FREQUENCY
+from ..contacts.constants import FREQUENCY, JOINT_DAMPING_RATIO
 from ..contacts.solving.records import TORN_OPEN, note_fault
 from ..integration.turning import change_of_spin, cross_spin, symmetric, twist
 from .coupling import couple, first_of, has_coupling, is_holding, is_soft_spring, response_at, symmetric_product
@@ -80,12 +80,12 @@ def joint_spring(angle, ratio, together):
 
 
 @part
-def start_joints(solver, h, period):
-    """The joints of a range start with the forces that they had, in substeps of h. They are as stiff as in the usual
+def start_joints(solver, h):
+    """The joints of a range start with the forces that they had, in substeps of h. They are as stiff as in their
     ``period``, whatever contacts ask for: changes of it would give energy to what is stretched."""
     joints = solver.joints
-    joints.step, joints.fastest = h, TURNING_FREQUENCY / period
-    omega = 2.0 * math.pi * FREQUENCY / period
+    joints.step = h
+    omega = 2.0 * math.pi * FREQUENCY / joints.period
     damping = 2.0 * JOINT_DAMPING_RATIO + h * omega
     joints.stiffness, joints.rate = stiffness, rate = h * omega * damping, omega / damping
     kept, back = stiffness / (1.0 + stiffness), 1.0 / (1.0 + stiffness)
@@ -281,14 +281,11 @@ def relax_listed(solver):
 
 @part
 def add_joints(solver):
-    """What the joints of a range have done in a substep: the share that acts, see guard."""
+    """What the joints of a range have done in a substep."""
     joints, order, impulse, push = solver.joints, solver.joints.order, solver.joints.impulse, solver.joints.push
-    total, thrust, share = joints.total, joints.thrust, solver.share
+    total, thrust = joints.total, joints.thrust
     for e in range(joints.begin, joints.end):
         j = order[e]
-        kept = share[island_of_joint(solver, j)]
-        if kept < 1.0:
-            impulse[j], push[j] = impulse[j] * kept, scale(push[j], kept)
         total[j] += impulse[j]
         thrust[j] = add(thrust[j], push[j])
 
@@ -305,18 +302,23 @@ def is_torn(solver, j):
 
 @part
 def keep_joints(solver, dt):
-    """The forces of the last substep, for the next step, no larger than their means: what is more was a blow. Where all
-    is found at once that needs none, and passes, which may be next, could not undo what is gone by then."""
+    """The forces of the last substep, for the next step, no larger than their means: what is more was a blow. A step
+    shorter than the last one tells its share alone. Where all is found at once that needs none, and passes, which may
+    be next, could not undo what is gone by then."""
     joints = solver.joints
-    by = 1.0 / joints.step
+    by, share = 1.0 / joints.step, dt / solver.usual / joints.period
     for e in range(joints.begin, joints.end):
         j = joints.order[e]
         last, mean = joints.impulse[j] * by, abs(joints.total[j]) / dt
-        joints.load[j] = min(mean, max(-mean, last))
+        load, old = min(mean, max(-mean, last)), joints.load[j]
         pull, most = scale(joints.push[j], by), length(joints.thrust[j]) / dt
         size = length(pull)
         if joints.at_once[j] == HELD_AT_ONCE:
-            joints.load[j], most = 0.0, 0.0
-        joints.pull[j] = scale(pull, most / size) if size > most else pull
+            load, most = 0.0, 0.0
+        if size > most:
+            pull = scale(pull, most / size)
+        if share < 1.0:
+            load, pull = old + share * (load - old), add_scaled(joints.pull[j], sub(pull, joints.pull[j]), share)
+        joints.load[j], joints.pull[j] = load, pull
         if joints.kind[j] < TURN and is_torn(solver, j):
             note_fault(solver, TORN_OPEN, joints.joint[j])

@@ -30,7 +30,7 @@ def solve_joined_range(solver, what, numbers, span):
     """Whatever calls asks of the joints of a range."""
     (h, dt), joints = numbers, solver.joints
     if what == calls.START:
-        start_joints(solver, h, dt / solver.usual)
+        start_joints(solver, h)
         measure_joints(solver, 0.0)
     elif what == calls.START_WARM:
         warm_start_joints(solver)

@@ -82,8 +82,7 @@ def test_no_chain_gains_energy(d, gravity):
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_chain_that_hangs_gains_nothing_as_its_step_changes(d, seed):
-    """1 s at 1/60 s, then once, or each other time, a step that is 3 to 300 times as short: no more than what its
-    weight does as it falls for two long steps."""
+    """1 s at 1/60 s, then once, or each other time, a step that is 3 to 250 times as short."""
     random, dt = np.random.default_rng(seed), 1 / 60
     gravity = (0, -10) if d == 2 else (0, 0, -10)
     with World(Physics(d, gravity=gravity), Rotation(), Joints()) as world:
@@ -93,12 +92,12 @@ def test_a_chain_that_hangs_gains_nothing_as_its_step_changes(d, seed):
             link = world.create_entity(Transform(-(k + 0.5) * down), *body)
             world.create_entity(Ball(before, link, anchor=-k * down))
             before = link
-        start, allowed, short = energy(world), 200 * world.bodies.mass.sum() * dt**2, dt / 3 ** random.uniform(1, 5)
+        start, short = energy(world), dt / 3 ** random.uniform(1, 5)
         for step in range(180):
             shorter = step >= 60 and step % 2 == 0 and (seed % 2 == 0 or step == 60)
             world.settings = world.settings.replace(dt=short if shorter else dt)
             world.step()
-            assert energy(world) < start + allowed
+            assert energy(world) < start
         assert not world.faults
 
 

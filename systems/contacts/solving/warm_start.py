@@ -116,7 +116,7 @@ ROOM_TO_STORE = (Rows("warm_start", WARM_START_ROWS, lambda s: 0 if s.response_i
 def store_warm_start(state, dt):
     """Keep the contacts that pushed, for the next step; the memory until now stays, for a step that is undone."""
     solver, memory, pairs, entity = state.solver, state.warm_start, state.pairs, state.bodies.entity
-    if state.response_idle or (solver.contacts == 0 and memory.counts[memory.now] == 0):
+    if state.response_idle or solver.contacts + solver.joints.active + memory.counts[memory.now] == 0:
         return OK
     new, count, nowhere = 1 - memory.now, 0, scale(zero_of(state), math.nan)
     for r in range(solver.contacts):
