@@ -320,7 +320,8 @@ CONTACTS = Schema(
 
 # The solver's columns: those of contacts, but for faults, from ``bodies`` on those of bodies, islands,
 # ranges, and those of either that are there where bodies spin.
-_fields = {name: field for name, field in SOLVER.fields.items() if name not in ("faults", "faulty", "joints", "direct")}
+_APART = "addresses", "faults", "faulty", "joints", "direct"
+_fields = {name: field for name, field in SOLVER.fields.items() if name not in _APART}
 SOLVER_ARMS = Section("contact", "rotation", "bodies spin", **{name: _fields.pop(name) for name in ARM_COLUMNS})
 SOLVER_SPINS = Section("body at rest", "rotation", "bodies spin", **{name: _fields.pop(name) for name in TURN_COLUMNS})
 SOLVER_SURFACES = Section("contact", "contacts at rest", "surfaces run", surface_slip=_fields.pop("surface_slip"))

@@ -15,6 +15,7 @@ from .contacts.bodies import gather_joined
 from .contacts.events import ContactEvents
 from .contacts.points import lay_arms
 from .contacts.response import Response
+from .contacts.solving.fours import solve_fours
 from .contacts.solving.islands import measure_joined_islands
 from .contacts.solving.turning import tumble, turn_back
 from .forces.accumulation import ForceAccumulation
@@ -29,6 +30,7 @@ from .linking.parts import (
     BOUND_SEARCHES,
     CLOSING_POINT,
     FIRST_TOUCH,
+    FOURS,
     FREE_TURN,
     JOINED_BODIES,
     JOINED_IMPACT,
@@ -164,6 +166,7 @@ LINKED_PARTS = {
     TURN_BY_IMPACT: turn_by_impact, JOINED_ISLANDS: measure_joined_islands, JOINED_BODIES: gather_joined,
     JOINED_RESPONSE: respond_joined, JOINED_IMPACT: strike_joined, JOINED_START: bend_struck,
     JOINED_RANGE: solve_joined_range, JOINED_SUPPORT: mark_joined, TURN_BACK: turn_back, TUMBLE: tumble,
+    FOURS: solve_fours,
 }  # fmt: skip
 
 # The system of each stage; "" for those that open and close a step.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...framework.compilation import inlined
-from ..linking.parts import call_joined_range
+from ..linking.parts import JOINED_RANGE, call_joined_range
 
 # See solving.solve_joined_range, which does it.
 (
@@ -17,5 +17,5 @@ def for_joints(solver, what, numbers, span, arms):
     the step; returns the first one, or what joints add to it."""
     joints = solver.joints
     if len(arms) > 0 and joints.begin < joints.end:
-        return call_joined_range(joints.solver, solver, what, numbers, span)
+        return call_joined_range(solver.addresses[JOINED_RANGE], solver, what, numbers, span)
     return numbers[0]

@@ -17,12 +17,12 @@ from ..shapes.linking.signatures import call_in_dimension
 (
     BOUND_SEARCHES, FIRST_TOUCH, TAKE_TOGETHER, FREE_TURN, TURNING_TOUCH, TOUCH_OF_TURN, CLOSING_POINT, ARMS_AT_REST,
     TURNING_RESPONSE, TURN_BY_IMPACT, JOINED_ISLANDS, JOINED_BODIES, JOINED_RESPONSE, JOINED_IMPACT,
-    JOINED_START, JOINED_RANGE, JOINED_SUPPORT, TURN_BACK, TUMBLE,
-) = PLACES = range(19)  # fmt: skip
+    JOINED_START, JOINED_RANGE, JOINED_SUPPORT, TURN_BACK, TUMBLE, FOURS,
+) = PLACES = range(20)  # fmt: skip
 SWEPT_PARTS, IMPACT_PARTS = (BOUND_SEARCHES, FIRST_TOUCH), (FIRST_TOUCH,)
-IN_SPACE = (FREE_TURN, TURN_BACK, TUMBLE)  # in a plane nothing calls them
+IN_SPACE = (FREE_TURN, TURN_BACK, TUMBLE, FOURS)  # in a plane nothing calls them
 TURNING_PARTS = (*IN_SPACE, TURNING_TOUCH, TOUCH_OF_TURN, CLOSING_POINT, ARMS_AT_REST, TURNING_RESPONSE, TURN_BY_IMPACT)
-JOINT_PARTS = (JOINED_SUPPORT, JOINED_ISLANDS, JOINED_BODIES, JOINED_RANGE, TURN_BACK, TUMBLE)
+JOINT_PARTS = (JOINED_SUPPORT, JOINED_ISLANDS, JOINED_BODIES, JOINED_RANGE, TURN_BACK, TUMBLE, FOURS)
 JOINT_IMPACT_PARTS = (JOINED_RESPONSE, JOINED_IMPACT, JOINED_START)
 
 
@@ -46,15 +46,16 @@ def signature_of(place: int, dimensions: int) -> Signature:
         of_step, response, turn_by_impact,
         of_step, of_step, response, turn_by_impact, of_step,
         f(solver, i, floats(2), span),
-        of_step, of_step, i(solver, f, span),
+        of_step, of_step, i(solver, f, span), i(solver, BOOL, tuple_of(i, i, i)),
     )[place]  # fmt: skip
 
 
 (
     call_bound_searches, call_first_touch, call_take_together, call_free_turn, call_turning_touch, call_touch_of_turn,
     call_closing_point, call_of_step, call_turning_response, call_turn_by_impact, call_joined_range, call_tumble,
+    call_fours,
 ) = (
-    call_in_dimension(partial(signature_of, place)) for place in (*PLACES[:JOINED_ISLANDS], JOINED_RANGE, TUMBLE)
+    call_in_dimension(partial(signature_of, place)) for place in (*PLACES[:JOINED_ISLANDS], JOINED_RANGE, TUMBLE, FOURS)
 )  # fmt: skip
 
 

@@ -38,7 +38,7 @@ class StepLinks:
         self._scene, self._state, self._program = scene, scene.state, program
         self._integration, self._search, self._plugin_stages = integration, search, plugin_stages
         self._joints, self._parts = self._state.solver.joints, self._state.parts
-        self._state.links = np.zeros(len(PLACES), np.int64)
+        self._state.links = self._state.solver.addresses = np.zeros(len(PLACES), np.int64)
         self.version = NEVER_LINKED  # of the scene
         self._forces = NEVER_LINKED, False  # how many force systems there were, and whether some of them turn
         self._joined = False, False  # there are joints, and parts of bodies

@@ -18,7 +18,7 @@ body, and the impulses.
 
 A pass (``passes``) is ``rows.solve_normals`` and ``rows.solve_friction``. How a row moves its bodies is
 ``rows.closing_speed`` and ``rows.apply_impulse``, and for many spinning bodies at once, with the same bits,
-``chunks.solve_two`` and ``solve_one``; nowhere else. Rows of joints are in ``systems/joints``;
-where there are some, ``turning`` turns bodies in space. ``hard`` chooses contacts that do not sag.
+``chunks.solve_two`` and ``solve_one``, and ``fours`` for pairs of four points; nowhere else. Rows of joints are in
+``systems/joints``; where there are some, ``turning`` turns bodies in space. ``hard`` chooses contacts that do not sag.
 ``warm_start`` keeps impulses between steps, ``prediction`` corrects the flight of what they held.
 """

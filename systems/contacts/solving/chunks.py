@@ -7,18 +7,15 @@ the pairs are solved.
 
 from __future__ import annotations
 
-import math
-
 from ....framework.compilation import inlined, part
 from ....framework.jit.records.schema import Schema, floats, vectors
 from ....framework.jit.records.stack_record import stack_record
 from ....framework.vectors import add, add_scaled, dot, scale, sub
 from ...integration.turning import cross_spin, end_of_turn, symmetric, twist
-from ..constants import TURNING_FREQUENCY
+from ...linking.parts import FOURS, call_fours
 from .records import ROW_CHUNK
 from .rows import ARMS, NO_ARMS, pull_along_surface, update_targets
 
-SAG_OF_SHARE = 0.25 / (2.0 * math.pi * TURNING_FREQUENCY) ** 2  # kg m/s, of a contact's spring, per N s on four of them
 SEVERAL = 1.0 + 1e-9  # times the masses that two points of a pair move: they are solved at once even if they are one
 
 # What the rows of a chunk need of the bodies of its pairs.
@@ -235,73 +232,33 @@ def solve_one(solver, one, motion, bias, softly, runs):
     return rub_at(solver, one, one, pushed(solver, one, motion, arm_a, arm_b, scale(n, new - old)), runs)
 
 
-@inlined
-def area_between(a, b, c, n):
-    """Twice the area of a triangle, seen along n; below 0 the other way round."""
-    return dot(cross_spin(sub(b, a), sub(c, a)), n)
-
-
-@inlined
-def spread_load(solver, p, stride):
-    """Four points of a pair, of which p is the first row, share its load as four equal springs do: their impulses lose
-    what adds up to no force and no torque, so that nothing moves otherwise; friction has its limits from them. Where
-    one is open by more than a spring sags under its share they stay as they are."""
-    rows, n, push, by = (p, p + stride, p + 2 * stride, p + 3 * stride), solver.normal[p], solver.impulse, 1.0
-    (a, b, c, d), at, load, more, square = rows, solver.arm_a, 0.0, 0.0, 0.0
-    a, b, c, d = at[a], at[b], at[c], at[d]
-    weights = area_between(b, c, d, n), -area_between(a, c, d, n), area_between(a, b, d, n), -area_between(a, b, c, n)
-    for e in range(4):
-        pushed, w = push[rows[e]], weights[e]
-        load, more, square = load + pushed, more + w * pushed, square + w * w
-    more /= square if square > 0.0 else 1.0
-    for e in range(4):
-        k, less = rows[e], weights[e] * more
-        if less > push[k]:
-            by = min(by, push[k] / less)
-        if solver.target_speed[k] * solver.mass[k] > SAG_OF_SHARE * load:
-            by = 0.0
-    for e in range(4):
-        push[rows[e]] -= by * more * weights[e]
-
-
 @part
 def solve_rows(solver, chunk, bias, softly, start, pairs, layout, runs):
-    """The rows of some pairs of a chunk, without a branch for single ones; of four points those across first, as on
-    two of them what lies flat is in balance. layout: (points of each pair, rows from one of these to the next);
-    runs: see ``rub_at``."""
-    points, stride = layout
-    if points == 1:
+    """The rows of some pairs of a chunk, of one point, or of two in a plane. layout: (points of each pair, rows
+    from one of these to the next); runs: see ``pull_at``."""
+    if layout[0] == 1:
         for q in range(pairs):
             store_motion(chunk, q, solve_one(solver, start + q, chunk_motion(chunk, q), bias, softly, runs))
         return
-    half = len(solver.normal[start]) - 1  # of two points in a plane, of four in space: known when it is compiled
-    for e in range(half):
-        first, second = start + e * stride, start + (e + half) * stride
-        for q in range(pairs):  # it stores nothing where it reads: else no two pairs would be solved together
-            one, k, m = start + q, first + q, second + q
-            motion, p, o = solve_two(solver, one, k, m, chunk_motion(chunk, q), bias, softly)
-            chunk.impulse[q], chunk.other[q] = p, o
-            if half == 1:
-                motion, chunk.pull[q], chunk.other_pull[q] = rub_two(solver, k, m, motion, p, o, runs)
-            store_motion(chunk, q, motion)
-        for q in range(pairs):
-            k, m = first + q, second + q
-            solver.impulse[k], solver.impulse[m] = chunk.impulse[q], chunk.other[q]
-            if half == 1:
-                solver.tangent[k], solver.tangent[m] = chunk.pull[q], chunk.other_pull[q]
-    if half == 1:
-        return
+    for q in range(pairs):  # it stores nothing where it reads: else no two pairs would be solved together
+        k, m = start + q, start + layout[1] + q
+        motion, p, o = solve_two(solver, k, k, m, chunk_motion(chunk, q), bias, softly)
+        motion, chunk.pull[q], chunk.other_pull[q] = rub_two(solver, k, m, motion, p, o, runs)
+        chunk.impulse[q], chunk.other[q] = p, o
+        store_motion(chunk, q, motion)
     for q in range(pairs):
-        spread_load(solver, start + q, stride)
-    for e in range(points):
-        for q in range(pairs):
-            motion = rub_at(solver, start + q, start + e * stride + q, chunk_motion(chunk, q), runs)
-            store_motion(chunk, q, motion)
+        k, m = start + q, start + layout[1] + q
+        solver.impulse[k], solver.impulse[m] = chunk.impulse[q], chunk.other[q]
+        solver.tangent[k], solver.tangent[m] = chunk.pull[q], chunk.other_pull[q]
 
 
 @inlined
 def solve_pairs(solver, chunk, bias, softly, start, pairs, layout):
-    """The same, and the velocities of the bodies are brought before and taken back."""
+    """The same, and the velocities of the bodies are brought before and taken back; those of four points are
+    solved in ``fours``."""
+    if layout[0] > 2:
+        call_fours(solver.addresses[FOURS], solver, softly > 0.0, (start, pairs, layout[1]))
+        return
     gather_motion(solver, chunk, start, pairs)
     if solver.surfaces_run:
         solve_rows(solver, chunk, bias, softly, start, pairs, layout, ARMS)

@@ -18,6 +18,7 @@ SOLVER = Schema(
     "Solver",
     unshared=True,
     # rows: contacts at rest, in the order of their ranges and colours
+    addresses=ints(),  # of parts that it calls: the links of the state
     contacts=integer(),
     slot=ints("int32"),  # the row of contact r,
     pair=ints("int32"),  # its pair,
@@ -95,7 +96,6 @@ SOLVER = Schema(
     inverse_products=vectors(flat=0, unit="1/(kg m^2)"),
     frame=table("float64", 4, unit="1"),  # principal axes, a quaternion, with joints in space: see turning
     inverse_moments=vectors(unit="1/(kg m^2)"),  # about these
-    tumbling=integer(),  # address of what turns bodies in space, see turning
     reach=floats(unit="m"),  # of its shape from its centre of mass
     number=ints("int32"),
     mover=ints("int32"),  # bodies that move by themselves

@@ -17,7 +17,7 @@ from ....framework.vectors import add, add_scaled, dot, scale
 from ...codes import OK
 from ...joints import calls
 from ...joints.calls import for_joints
-from ...linking.parts import JOINED_RANGE, TUMBLE, call_tumble
+from ...linking.parts import TUMBLE, call_tumble
 from ..constants import (
     DAMPING_RATIO,
     FREQUENCY,
@@ -120,7 +120,7 @@ def integrate_positions(solver, h, span, arms):
         if len(arms) > 0:
             rotate_body(solver, q, add_scaled(solver.turn[q], solver.spin[q], h))
     if len(arms) > 0 and len(velocity[span[2]]) == 3 and (solver.joints.active > 0 or solver.lopsided):
-        call_tumble(solver.tumbling, solver, h, span)
+        call_tumble(solver.addresses[TUMBLE], solver, h, span)
         load_masses(solver, span)
     elif len(arms) > 0:
         integrate_rotation(solver, span[2], span[3], h)
@@ -320,8 +320,6 @@ def solve_contacts(state, dt):
 @packed
 def solve_turning_contacts(state, dt):
     """The contacts and joints of bodies of which some spin."""
-    solver, joints = state.solver, state.solver.joints
-    joints.solver, solver.tumbling = state.links[JOINED_RANGE], state.links[TUMBLE]
-    if solver.contacts > 0 or joints.active > 0:
+    if state.solver.contacts > 0 or state.solver.joints.active > 0:
         solve_substeps(state, dt, ARMS)
     return OK
