@@ -12,7 +12,7 @@ import numpy as np
 from ..framework.jit.records.record import Record
 from ..framework.jit.records.schema import Column, Section
 
-WARM_START_NUMBERS = ("step",)  # numbers of which there are two, beside the counts
+WARM_START_NUMBERS = ("step", "period")  # numbers of which there are two, beside the counts
 CONTACT_NUMBERS = ("steps", "stays")
 BEFORE_STEP = ("load", "pull", "normal", "along_a", "value")  # of joints, what a step starts with
 

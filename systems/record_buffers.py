@@ -23,7 +23,7 @@ def reserve_fixed(state: Record) -> None:
             if column.stacked:
                 setattr(record, name, column.fresh((2, 0), state.dimensions))
     state.warm_start.rows_version = np.full(2, -1, np.int64)
-    state.warm_start.step = np.full(2, np.finfo(float).tiny)
+    state.warm_start.step, state.warm_start.period = np.ones(2), np.zeros(2)
     state.contacts.stays, state.contacts.steps = np.zeros(2, np.int64), np.zeros(2, np.int64)
     state.solver.faults, state.solver.faulty = np.zeros(KINDS_OF_FAULT, np.int64), np.zeros(KINDS_OF_FAULT, np.int64)
     state.frame = np.zeros(7)

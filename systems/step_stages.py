@@ -89,7 +89,8 @@ def axes_are_old(state):
 
 def read_bodies(state, dt):
     """1 / mass of what moves freely; whether any speed is limited, any body swept or rotated."""
-    bodies, mass, inverse_mass, limited = state.bodies, state.bodies.mass, state.bodies.inverse_mass, False
+    bodies, limited = state.bodies, False
+    mass, inverse_mass = bodies.mass, bodies.inverse_mass
     limit, out, first, dynamic = bodies.max_linear_speed, bodies.quarantined, state.first, state.dynamic
     for i in range(first, dynamic):
         inverse_mass[i] = 1.0 / mass[i]

@@ -145,7 +145,8 @@ def box_rows(state, start, stop, motion):
 
     A box holds every level, so that what the first one meets is looked at.
     """
-    bodies, lower, upper = state.bodies, state.bodies.lower, state.bodies.upper
+    bodies = state.bodies
+    lower, upper = bodies.lower, bodies.upper
     starts = ends = bodies.position
     if motion == MOVING and state.moved:
         starts = bodies.previous_position

@@ -30,13 +30,13 @@ SURVIVED, GONE = -1, -2  # in ``pairs.place``; from 0 on it is the place in the 
 @part
 def mark_kept(state):
     """place[c] = SURVIVED for the pairs that something has come of in this step, GONE for the others."""
-    pairs, impacts = state.pairs, state.impacts
+    pairs, impacts, place = state.pairs, state.impacts, state.pairs.place
     for c in range(pairs.count):
-        pairs.place[c] = SURVIVED if pairs.crossed[c] or pairs.impulse[c] > 0.0 or pairs.disabled[c] else GONE
+        place[c] = SURVIVED if pairs.crossed[c] or pairs.impulse[c] > 0.0 or pairs.disabled[c] else GONE
     for h in range(pairs.found):
-        pairs.place[pairs.hits[h]] = SURVIVED
+        place[pairs.hits[h]] = SURVIVED
     for k in range(impacts.logged):  # of which some have no impulse, where joints took all
-        pairs.place[impacts.log_pair[k]] = SURVIVED
+        place[impacts.log_pair[k]] = SURVIVED
 
 
 @part

@@ -51,7 +51,8 @@ def is_swept(state, a, b, travel):
 def turns_far(state, a, b):
     """Whether a pair has to be looked at on its way: one of the two turns by more than a part of the smaller one. Where
     they may bounce, only if it turns by itself, past the middle of the other: impacts have the rest."""
-    bodies, extent, inverse_mass = state.bodies, state.bodies.min_extent, state.bodies.inverse_mass
+    bodies = state.bodies
+    extent, inverse_mass = bodies.min_extent, bodies.inverse_mass
     if len(bodies.axes) == 0:
         return False
     way_a, way_b = way_of_turning(bodies, a, bodies.turn[a]), way_of_turning(bodies, b, bodies.turn[b])

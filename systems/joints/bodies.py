@@ -85,8 +85,6 @@ def begin_joints(state, dt):
     if not state.collides:
         state.solver.contacts = state.pairs.count = state.pairs.resting_count = 0
     find_active(state)
-    last = state.warm_start.step[state.warm_start.now]
-    state.solver.joints.period = max(dt, last) / state.substeps  # else a short step throws what long ones let sag
     if state.collides:
         find_driven(state, dt)
     return OK

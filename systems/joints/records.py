@@ -72,7 +72,7 @@ JOINTS = Schema(
     axes_a=vectors(unit="1"),  # of the bodies of a CUSTOM, likewise: as many rows as there are dimensions
     soft_further=vectors(unit="1 or 1/m or m"),
     axes_b=vectors(unit="1"),
-    period=number(unit="s"),  # of a usual substep, in this step or the last one if that was longer
+    period=number(unit="s"),  # of a usual substep whose springs are as soft as those of this step
     # in a range
     begin=integer(),  # places in ``order``
     end=integer(),

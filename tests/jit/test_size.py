@@ -17,7 +17,7 @@ from carom.systems.contacts.solving.records import SOLVER, WARM_START
 from carom.systems.joints.records import JOINTS
 from carom.systems.linking import preparation, steps
 
-CONSTANTS, FIELDS = 33, 210
+CONSTANTS, FIELDS = 33, 211
 FIRST_STEP, LATER = 128, 270  # KB of byte code that asteroids links, and with what it may need later
 
 

@@ -10,9 +10,13 @@ import math
 import numpy as np
 import pytest
 from helpers_rest import SLOP, G, depths, energy, heights, overlaps, rows_of, speed, tower
-from worlds import ball, both_dimensions, box, floor, make_world, run
+from laws.helpers_laws import seeds
+from rotation.helpers_turning import box as turning_box
+from worlds import MODES, ball, both_dimensions, box, floor, make_world, run
 
+from carom import Physics, Settings, World
 from carom.components import AABBCollider, Transform
+from carom.plugins.rotation import Rotation
 from carom.scenes import pyramid
 
 
@@ -28,6 +32,25 @@ def test_more_substeps_give_stiffer_contacts():
         deepest.append(overlaps(world, ids).max())
     assert max(deepest) < SLOP
     assert deepest[2] > 3 * deepest[3] > 40 * deepest[4]
+
+
+@pytest.mark.parametrize("seed", seeds(6, 60))
+def test_towers_do_not_hop_as_steps_get_shorter(seed):
+    """Ten at 1/60 s sag. Then once a step up to 100 times as short, or for good, or steps of any length from 1/20 to
+    1/500 s: what comes up again gets no higher than without any sag."""
+    random, dt = np.random.default_rng(seed), 1 / 60
+    plugins, kind = ([Rotation()], {"maker": turning_box, "half": (0.5, 0.5)}) if seed % 2 else ([], {})
+    with World(Physics(2, gravity=(0.0, -G)), *plugins, settings=Settings(collision=MODES[seed // 2 % 3])) as world:
+        floor(world)
+        ids = tower(world, 10, **kind)
+        run(world, 120)
+        short = dt / 10 ** random.uniform(0, 2)
+        for k in range(120):
+            any_step = 1 / random.uniform(20, 500) if k < 60 else dt
+            step = (short if k == 0 else dt, short, any_step)[seed % 3]
+            world.settings = world.settings.replace(dt=step)
+            world.step()
+            assert heights(world, ids)[-1] < 9.5
 
 
 @pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])

@@ -18,6 +18,9 @@ from ...parts.stages import copy_prediction_to_parts
 from ...records import CURVES, PREDICTED
 from .warm_start import find_rows, scale_to
 
+STIFFENS = 0.1  # s per s by which the period of springs falls where steps get shorter: what long ones let sink in has
+# time to come up, and is not thrown
+
 
 @part
 def mark_disabled(state):
@@ -91,8 +94,9 @@ def predict_rest(state, dt):
 
     What held them acts like a force throughout the step, and they move as the solver is to move them.
     """
-    bodies = state.bodies
+    bodies, memory = state.bodies, state.warm_start
     state.any_warm_started = False
+    state.solver.joints.period = max(dt, memory.period[memory.now] - STIFFENS * dt) / state.substeps
     forget_support(state)
     if not may_support(state):
         return OK

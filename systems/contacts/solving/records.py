@@ -170,6 +170,7 @@ WARM_START = Schema(
     counts=ints(),
     rows_version=ints(),
     step=floats(unit="s"),  # that the impulses are for
+    period=floats(unit="s"),  # of a step with springs as soft as those of the last one
 )  # fmt: skip
 
 

@@ -197,27 +197,28 @@ def scale_impulses(solver, by, span):
 
 
 @part
-def contact_spring(solver, frequency, substeps, h):
+def contact_spring(solver, frequency, substeps, h, slow):
     """(share of its impulse that a soft row gives back, speed per overlap at which it is pushed out) where springs have
-    a frequency, times the rate of the substeps.
+    a frequency, times the rate of the substeps; ``slow`` times as slow, as a step before was longer.
 
     Where there are more substeps than usual springs are damped by as much more: for the heavy bodies that they bear,
     and so that overlap is pushed out at the usual rate.
     """
-    omega = 2.0 * math.pi * frequency / h
+    omega = 2.0 * math.pi * frequency / (h * slow)
     damping = 2.0 * DAMPING_RATIO * substeps / solver.usual + h * omega
     return 1.0 / (1.0 + h * omega * damping), omega / damping
 
 
 @inlined
-def set_spring(solver, k, springs, h, stiff, arms):
+def set_spring(solver, k, springs, times, stiff, arms):
     """How row k pushes overlap out, see ``contact_spring``: softer in an island where some pair has several points, but
     less so where one of its bodies cannot be moved, at once where it is hard, not at all where it parts. It sags under
     the impulse of the last step."""
     hard, parting, tips = solver.hard[k], solver.parting[k], int(solver.tips[island_of(solver, k)])
+    h, slow = times
     held = solver.inverse_mass[solver.first[k]] == 0.0 or solver.inverse_mass[solver.second[k]] == 0.0
     soft, bias_rate = springs[2 * tips if held else tips]
-    sag = 0.0 if stiff else solver.impulse[k] * h / (SQUARE_OF_TURN[tips] * solver.mass[k])
+    sag = 0.0 if stiff else solver.impulse[k] * h * slow * slow / (SQUARE_OF_TURN[tips] * solver.mass[k])
     at_once = parting or (hard and (len(arms) == 0 or len(solver.normal[k]) == 2))  # on three points it would rock on
     solver.push_rate[k] = 1.0 / h if at_once else bias_rate
     solver.most_push[k] = 0.0 if parting else -bias_rate * (FULL_PUSH_OVERLAP * solver.extent[k] + sag)
@@ -229,20 +230,20 @@ def solve_range(solver, s, dt, span, arms):
     """The substeps of a range."""
     rule, special = rule_of(solver, s, dt, span, arms), s > 0
     substeps, _, _, stiff, capped = rule
-    h = dt / substeps
+    h, slow = dt / substeps, solver.joints.period / (dt / solver.usual)
     if capped:
         cap_mass_ratio(solver, solver.island[span[2]], dt, span, arms)
     springs = (
-        contact_spring(solver, FREQUENCY, substeps, h),
-        contact_spring(solver, TURNING_FREQUENCY, substeps, h),
-        contact_spring(solver, STATIC_STIFFNESS * TURNING_FREQUENCY, substeps, h),
+        contact_spring(solver, FREQUENCY, substeps, h, slow),
+        contact_spring(solver, TURNING_FREQUENCY, substeps, h, slow),
+        contact_spring(solver, STATIC_STIFFNESS * TURNING_FREQUENCY, substeps, h, slow),
     )
     if len(arms) > 0:
         find_chunks(solver, span)
         load_masses(solver, span)
     scale_impulses(solver, 1.0 / substeps, span)
     for k in range(span[0], span[1]):
-        set_spring(solver, k, springs, h, stiff, arms)
+        set_spring(solver, k, springs, (h, slow), stiff, arms)
     for_joints(solver, calls.START, (h, dt), span, arms)
     measure(solver, h, dt, False, span, arms)
     for step in range(substeps):

@@ -133,6 +133,6 @@ def store_warm_start(state, dt):
         memory.place[new, count] = solver.place[k] if state.spinning else nowhere
         count += 1
     memory.counts[new], memory.rows_version[new] = count, state.version
-    memory.step[new] = dt
+    memory.step[new], memory.period[new] = dt, solver.joints.period * state.substeps
     memory.now = new
     return OK
