@@ -9,8 +9,6 @@ What the queue holds of pairs that are candidates again stays: their paths are t
 
 from __future__ import annotations
 
-import math
-
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.schedule.stages import Rows
@@ -20,7 +18,7 @@ from ..impacts.records import EVENTS
 from ..impacts.worklist import list_pair, most_listed
 from ..integration.trajectory import along, relative_path
 from ..narrow_phase.manifolds import forget_manifold
-from ..narrow_phase.one_way import is_one_way, one_way_holds
+from ..narrow_phase.one_way import one_way_holds
 from ..narrow_phase.stages import is_solid_pair, layers_meet, rank_rows
 from ..records import PAIR_COLUMNS
 
@@ -62,9 +60,9 @@ def add_pair(state, a, b, found, dt):
     new.early[found], new.impulse[found] = False, 0.0
     new.normal[found] = new.point[found] = zero_of(state)
     forget_manifold(new, found)
-    if new.is_solid[found] and (is_one_way(state, a) or is_one_way(state, b)):
+    if new.is_solid[found]:
         path, now = relative_path(state, a, b), state.impacts.until
-        if not one_way_holds(state, a, b, along(path, now), along(path, dt), -math.inf):
+        if not one_way_holds(state, a, b, along(path, now), along(path, dt), -1.0):
             new.is_solid[found], new.disabled[found] = False, True
             new.disabled_count += 1
 

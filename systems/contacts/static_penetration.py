@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
-from ...framework.vectors import add, add_scaled, dot, item, length, scale, sub
+from ...framework.vectors import add, add_scaled, at_most, dot, larger, length, negative, scale, shifted, smaller, sub
 from ..broad_phase.boxes import find_extents
 from ..ccd.search_bounds import FAST, turns_far
 from ..ccd.turning_touch import turn_of_path
@@ -31,7 +31,7 @@ from ..narrow_phase.manifolds import (
     depth_bound_on_path,
     evaluate_pair,
 )  # fmt: skip
-from ..narrow_phase.one_way import is_one_way
+from ..narrow_phase.one_way import one_way_holds
 from ..narrow_phase.stages import is_solid_pair, layers_meet
 from ..parts.rows import next_row, owner_of
 from ..shapes.tolerances import SAME_PLACE, smaller_extent, way_of_turning
@@ -73,22 +73,22 @@ def penetration_of(state, dt, c, a, b):
     d, start = centre_offset(bodies, a, b), segment_start(state, a, b)
     travel = sub(d, start)
     way = length(travel)
-    allowed = (JOINED if is_joined(state, a, b) else ALLOWED) * extent
+    allowed, edge = (JOINED if is_joined(state, a, b) else ALLOWED) * extent, FAST * extent
     found, depth, normal = False, 0.0, travel
     if state.spinning and turns_far(state, a, b):  # where it started says nothing of the shapes at the end
         searched = along(relative_path(state, a, b), dt)
         pushed = sub(d, searched)
         unseen = state.impacts.sweeps and max(a, b) >= state.moving  # by searches; what turns by itself sweeps it up
-        if unseen and length(pushed) > FAST * extent and not evaluate_pair(state, a, b, searched)[0]:
-            found, gap, normal = first_touch_on_segment(state, a, b, searched, pushed, FAST * extent)
+        if unseen and length(pushed) > edge and not evaluate_pair(state, a, b, searched)[0]:
+            found, gap, normal = first_touch_on_segment(state, a, b, searched, pushed, edge)
             if found:
                 return -gap - dot(pushed, normal) - allowed, normal
         if c != NO_PAIR and depth_bound_on_path(state, c) <= allowed:  # usual
             return 0.0, normal
         depth, normal = depth_on_side_of_touch(state, dt, a, b, d)
         return depth - allowed, normal
-    if way > FAST * extent:
-        found, gap, normal = first_touch_on_segment(state, a, b, start, travel, FAST * extent)
+    if way > edge:
+        found, gap, normal = first_touch_on_segment(state, a, b, start, travel, edge)
         depth = -gap - dot(travel, normal)
     elif c != NO_PAIR and depth_bound(state.pairs, c, d) <= allowed:  # usual
         return 0.0, normal
@@ -100,23 +100,34 @@ def penetration_of(state, dt, c, a, b):
 
 
 @part
+def lets_pass(state, a, b):
+    """Whether two that can push each other do not in this step: their contact is disabled, or is none as one of them is
+    solid from one side only."""
+    pairs, bodies = state.pairs, state.bodies
+    for c in range(pairs.count if pairs.disabled_count > 0 else 0):
+        if pairs.disabled[c] and pairs.a[c] in (a, b) and pairs.b[c] in (a, b):
+            return True
+    return not one_way_holds(state, a, b, centre_offset_at_start(bodies, a, b), centre_offset(bodies, a, b), -1.0)
+
+
+@part
 def push_out(state, dt, c, a, b):
     """Move the one of a and b that can be moved out of the other, where it is deeper than it may, and take the speed
     that leads there; returns how far it was moved."""
     bodies, velocities = state.bodies, state.bodies.linear_velocity
     far, normal = penetration_of(state, dt, c, a, b)
-    if not far > 0.0:
+    if not far > 0.0 or (c == NO_PAIR and lets_pass(state, a, b)):
         return 0.0
-    i, fixed, sign = (b, a, 1.0) if bodies.inverse_mass[b] > 0.0 else (a, b, -1.0)
+    i, fixed, normal = (b, a, normal) if bodies.inverse_mass[b] > 0.0 else (a, b, negative(normal))
     velocity = velocities[i]
     if fixed < state.moving:
         velocity = sub(velocity, velocities[fixed])
-    closing = sign * dot(velocity, normal)
+    closing = dot(velocity, normal)
     k = owner_of(state, i)
     while k >= 0:
-        bodies.position[k] = add_scaled(bodies.position[k], normal, sign * far)
+        bodies.position[k] = add_scaled(bodies.position[k], normal, far)
         if closing < 0.0:
-            velocities[k] = add_scaled(velocities[k], normal, -sign * closing)
+            velocities[k] = add_scaled(velocities[k], normal, -closing)
             if rows_at_rest(state) > 0:  # what held it does not push it there again
                 bodies.held_velocity[k] = velocities[k]
         k = next_row(state, k)
@@ -141,24 +152,21 @@ def may_penetrate(state, c, i):
     rests = state.impacts.sweeps and state.solver.contacts > 0 and pairs.rests[c]
     if rests or is_moved_by_solver(state, i):
         return True
-    struck = state.spinning and pairs.impulse[c] > 0.0
-    if struck and turns_far(state, pairs.a[c], pairs.b[c]):
-        return True
-    return state.spinning and state.bodies.impact_count[i] >= STOPPED
+    if not state.spinning:
+        return False
+    struck = pairs.impulse[c] > 0.0 and turns_far(state, pairs.a[c], pairs.b[c])
+    return struck or state.bodies.impact_count[i] >= STOPPED
 
 
 @part
 def is_displaced(state, i, dt):
     """Whether body i is where its neighbours are not known."""
     bodies = state.bodies
-    at, start, end = bodies.position[i], bodies.previous_position[i], along(path_of(state, i), dt)
-    known, astray = KNOWN * bodies.min_extent[i], False
+    at, known = bodies.position[i], KNOWN * bodies.min_extent[i]
+    start, end = bodies.previous_position[i], along(path_of(state, i), dt)
     if state.impacts.sweeps:
         start, end = bodies.search_lower[i], bodies.search_upper[i]
-    for k in range(len(at)):
-        low, high = min(item(start, k), item(end, k)), max(item(start, k), item(end, k))
-        astray |= not low - known <= item(at, k) <= high + known
-    return astray
+    return not (at_most(shifted(smaller(start, end), -known), at) and at_most(at, shifted(larger(start, end), known)))
 
 
 @part
@@ -166,9 +174,7 @@ def push_out_of_all(state, dt, i):
     """Body i against everything that cannot be moved."""
     bodies, moved = state.bodies, False
     for k in range(state.dynamic, state.count):
-        if bodies.shape[k] < 0 or is_one_way(state, i) or is_one_way(state, k):  # it may have come from behind
-            continue
-        if layers_meet(state, i, k) and is_solid_pair(state, i, k):
+        if bodies.shape[k] >= 0 and layers_meet(state, i, k) and is_solid_pair(state, i, k):
             moved |= push_out(state, dt, NO_PAIR, i, k) > 0.0
     return moved
 
@@ -192,7 +198,8 @@ def resolve_static_penetration(state, dt):
     if not pushed or state.count == dynamic:
         return OK
     for turn in range(ROUNDS):
-        first, moved = state.moving if turn == ROUNDS - 1 else dynamic, False
+        last, moved = turn == ROUNDS - 1, False
+        first = state.moving if last else dynamic
         for c in range(pairs.count):
             a, b = pairs.a[c], pairs.b[c]
             fixed, i = max(a, b), min(a, b)  # dynamic rows come first
@@ -201,7 +208,7 @@ def resolve_static_penetration(state, dt):
             measure_turned(state, i)
             far = push_out(state, dt, c, a, b)
             moved |= far > 0.0
-            if turn == ROUNDS - 1 and far > SAME_PLACE * smaller_extent(bodies, a, b):  # more than rounding
+            if last and far > SAME_PLACE * smaller_extent(bodies, a, b):  # more than rounding
                 note_fault(state.solver, SQUEEZED, i)
         if not moved:
             break

@@ -12,9 +12,10 @@ from contacts.helpers_one_way import REST, SHAPES, G, each_shape, make_world, pl
 from worlds import position, velocity
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import Settings, World
+from carom.framework import Phase, Settings, System, World
 from carom.plugins import Physics, tile_grid
 from carom.plugins.capsule import CapsuleCollider
+from carom.plugins.joints import Distance, Joints, MousePull, Slider
 from carom.plugins.rotation import BoxCollider, Rotation, Spin
 from carom.plugins.tile_grid import TileGridCollider
 
@@ -253,6 +254,70 @@ def test_twenty_jumps_of_any_height_end_on_it(shape, restitution):
     np.testing.assert_allclose(heights[-1], 0.5, atol=REST)
     if restitution == 0.0:
         assert sorted((contact.entity_a, contact.entity_b) for contact in begun) == [(1, each) for each in jumpers]
+
+
+SENDERS = {
+    "slider": lambda world, ball, up: world.create_entity(Slider(None, ball, direction=(0, 1), motor_speed=15.0 * up)),
+    "pull": lambda world, ball, up: world.create_entity(
+        MousePull(ball, grip=position(world, ball), target=(0, up), frequency=5.0, max_force=800.0)),
+    "spring": lambda world, ball, up: world.create_entity(
+        Distance(None, ball, point_a=(0, 5 * up), length=5.0, frequency=6.0, damping_ratio=1.0)),
+    "blow": lambda world, ball, up: world.create_entity(
+        Transform(position(world, ball) - (0, 0.55 * up)), RigidBody(10.0, linear_velocity=(0, 12 * up)),
+        SphereCollider(0.2, restitution=1.0, layer=2)),
+    "push": lambda world, ball, up: world.create_entity(
+        Transform(position(world, ball) - (0, 0.41 * up)), RigidBody(kind="kinematic", linear_velocity=(0, 12 * up)),
+        AABBCollider((0.3, 0.1), layer=2)),
+}  # fmt: skip
+
+
+def sent(mode, sender, place, up, **plate):
+    """Heights of a ball that a joint or another body has sent up or down within its first step, at a plate 0.1 thick
+    which the others do not meet."""
+    world = World(Physics(2), Rotation(), Joints(), settings=Settings(collision=mode, on_fault="ignore"))
+    world.create_entity(Transform((0, -0.05)), AABBCollider((5.0, 0.05), **{"mask": 1, **plate}))
+    ball = world.create_entity(Transform((0, place)), RigidBody(), Spin(), SphereCollider(0.3, restitution=0.5))
+    other = SENDERS[sender](world, ball, up)
+    heights = run(world, 1 / 60, ball)
+    if sender == "push":
+        world.component_for_entity(other, RigidBody).linear_velocity = (0, 0)
+    heights = np.concatenate((heights, run(world, 0.2, ball)))
+    world.close()
+    return heights
+
+
+@pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
+@pytest.mark.parametrize("sender", SENDERS)
+def test_what_is_sent_within_a_step_is_stopped_as_by_a_floor(mode, sender):
+    """At rest above it, then on it or in it by the end of the step in which a joint or a blow has sent it: free flight
+    foresaw nothing of that. What is sent from below or inside goes as if there were nothing, to the bit."""
+    for gap in (0.02, 0.05, 0.11, 0.17):
+        stopped, floor = (sent(mode, sender, 0.3 + gap, -1, one_way=way) for way in ((0, 1), 0))
+        assert min(stopped[-1], floor[-1]) > 0.1
+    for place, up in ((-0.45, 1), (0.1, -1), (-0.05, 1)):
+        met, free = (sent(mode, sender, place, up, one_way=(0, 1), mask=mask) for mask in (1, 0))
+        inside = np.cumsum(free[:, 0] > 0.3) == 0  # until it has left
+        assert np.array_equal(met[inside], free[inside])
+
+
+@pytest.mark.parametrize("way", [0, (0, 1)])
+def test_what_is_disabled_lets_through_what_a_motor_drives(way):
+    """A contact whose ``enabled`` a system clears stops nothing, however far a joint moves the body in a step."""
+
+    class Clear(System):
+        phase = Phase.NARROW
+
+        def process(self, dt):
+            self.world.contacts.enabled[:] = False
+
+    world = World(Physics(2, gravity=(0, -G)), Rotation(), Joints())
+    world.create_entity(Transform((0, -0.05)), AABBCollider((5.0, 0.05), one_way=way))
+    ball = world.create_entity(Transform((0, 0.3)), RigidBody(), Spin(), SphereCollider(0.3))
+    run(world, 0.1)
+    world.add_system(Clear())
+    world.create_entity(Slider(None, ball, direction=(0, 1), motor_speed=-15.0))
+    heights = run(world, 0.1, ball)[:, 0]
+    assert np.diff(heights) == pytest.approx(-15 / 60)
 
 
 @pytest.mark.parametrize("mode", ["discrete", "continuous"])
