@@ -20,6 +20,13 @@ from .services import PhysicsServices
 C = TypeVar("C")
 
 
+def whole_number(name: str, value: Any, least: int = 0) -> int:
+    """The value of an argument as an int; ValueError with its name unless it is a whole number from ``least`` on."""
+    if isinstance(value, bool) or not hasattr(value, "__index__") or operator.index(value) < least:
+        raise ValueError(f"{name} must be a whole number from {least}, got {value!r}")
+    return operator.index(value)
+
+
 class EntityVerbs:
     """What esper's module functions do, for one world; mixed into :class:`World`."""
 
@@ -54,9 +61,7 @@ class EntityVerbs:
 
         ValueError names field and row of a bad value; nothing is created then.
         """
-        if isinstance(count, bool) or not hasattr(count, "__index__") or operator.index(count) < 0:
-            raise ValueError(f"count must be a whole number from 0, got {count!r}")
-        count = operator.index(count)
+        count = whole_number("count", count)
         for one in many:
             if not isinstance(one, Many):
                 raise TypeError(f"create_entities takes what Component.many(...) makes, got {one!r}")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from operator import index
 from typing import TYPE_CHECKING, Any
+
+from ..errors import CaromError
+from .entities import whole_number
+from .world import World
 
 if TYPE_CHECKING:
     from .snapshots import Snapshot
-    from .world import World
 
 CHECKED = 30  # frames from one hash to the next
 KEPT = 10  # hashes
@@ -30,8 +32,8 @@ class Rollback:
     world
         the World; nothing else may step it
     apply
-        is called before each step with the inputs, a list with one of each player, and writes them into the world.
-        Inputs are anything that compares with ``==``, such as numbers and tuples; arrays do not
+        is called before each step with the inputs, a list with one of each player, and writes them into the world; it
+        takes no step itself. Inputs are anything that compares with ``==``, such as numbers and tuples; arrays do not
     players
         how many
     most
@@ -39,15 +41,18 @@ class Rollback:
     idle
         what is taken for an input before the first one of a player is known
 
-    ValueError without players, or with ``most`` below 1.
+    ValueError unless ``players`` and ``most`` are whole numbers from 1, TypeError for another ``world`` or ``apply``.
     """
 
     def __init__(
         self, world: World, apply: Callable[[list[Any]], object], players: int = 2, most: int = 8, idle: Any = 0
     ) -> None:
-        if players < 1 or most < 1:
-            raise ValueError(f"Rollback needs a player at least, and most of 1 or more, got {players!r}, {most!r}")
-        self.world, self.most = world, most
+        players = whole_number("Rollback: players", players, 1)
+        if not isinstance(world, World):
+            raise TypeError(f"Rollback: world must be a World, got {world!r}")
+        if not callable(apply):
+            raise TypeError(f"Rollback: apply must be callable, got {apply!r}")
+        self.world, self.most = world, whole_number("Rollback: most", most, 1)
         self.frame, self.replayed = 0, 0  # the next frame; steps that were taken again
         self._apply, self._idle = apply, idle
         self._inputs: list[list[Any]] = [[] for _ in range(players)]
@@ -56,12 +61,14 @@ class Rollback:
         self._hashes: dict[int, str] = {}
         self._wrong: int | None = None  # the first frame with a guess that was wrong
         self._reached = 0  # the frame to play again up to
+        self._playing = False
 
     def inputs(self, player: int) -> list[Any]:
         """All inputs of a player that are known, from frame 0 on; not to be changed. ValueError if there is no such
         player."""
-        if player not in range(len(self._inputs)):
-            raise ValueError(f"Rollback: player must be a number from 0 to {len(self._inputs) - 1}, got {player!r}")
+        player = whole_number("Rollback: player", player)
+        if player >= len(self._inputs):
+            raise ValueError(f"Rollback: player must be from 0 to {len(self._inputs) - 1}, got {player!r}")
         return self._inputs[player]
 
     @property
@@ -72,11 +79,13 @@ class Rollback:
     def give(self, player: int, frame: int, inputs: Iterable[Any]) -> None:
         """The inputs of a player in ``frame`` and those that follow. What is known already is skipped, and what leaves
         a gap is ignored: send all that the other may lack. ValueError for a player or a frame that cannot be, TypeError
-        for inputs that do not compare with ``==``; nothing of them is known then."""
-        known = self.inputs(player)
-        if index(frame) < 0:
-            raise ValueError(f"Rollback.give: frame must be at least 0, got {frame!r}")
-        new = list(inputs)[len(known) - frame :] if frame <= len(known) else []
+        for inputs that are no list or do not compare with ``==``; nothing of them is known then."""
+        known, frame = self.inputs(player), whole_number("Rollback.give: frame", frame)
+        try:
+            new = list(inputs)
+        except TypeError as error:
+            raise TypeError(f"Rollback.give: inputs must be a list, one for each frame, got {inputs!r}") from error
+        new = new[len(known) - frame :] if frame <= len(known) else []
         wrong = [] if self._wrong is None else [self._wrong]
         for at, each in enumerate(new, len(known)):
             guess = self._used[at][player] if at in self._used else each
@@ -99,7 +108,10 @@ class Rollback:
         return True
 
     def settle(self) -> None:
-        """Play again what was played with wrong guesses; what raises is played once more by the next call."""
+        """Play again what was played with wrong guesses; what raises is played once more by the next call. CaromError
+        in ``apply`` and in a step."""
+        if self._playing:
+            raise CaromError("Rollback: apply, and what is in a step, must not call step, settle, checksum or differs")
         if self._wrong is not None:
             self.world.restore(self._snapshots[self._wrong])
             self._reached = max(self._reached, self.frame)
@@ -117,12 +129,15 @@ class Rollback:
         if frame >= confirmed:  # else nothing leads back to here
             self._snapshots[frame] = before
         used = [known[frame] if frame < len(known) else known[-1] if known else self._idle for known in self._inputs]
+        self._playing = True
         try:
             self._call(used)
             self.world.step()
         except BaseException:
             self.world.restore(before)  # of a step that fails the inputs are not undone
             raise
+        finally:
+            self._playing = False
         self._used[frame] = used
         self.frame += 1
         for kept, oldest in (
@@ -150,7 +165,11 @@ class Rollback:
 
     def differs(self, frame: int, checksum: str) -> bool | None:
         """Whether another player's ``checksum`` of a ``frame`` is not the hash that this world had there; None if that
-        is not known here, or the other has not begun."""
+        is not known here, or the other has not begun. ValueError for a frame that cannot be, TypeError for what is no
+        checksum."""
+        frame = whole_number("Rollback.differs: frame", frame)
+        if not isinstance(checksum, str):
+            raise TypeError(f"Rollback.differs: checksum must be text, got {checksum!r}")
         self.settle()
         if not checksum or frame > self.confirmed or frame not in self._hashes:
             return None

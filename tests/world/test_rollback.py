@@ -7,6 +7,7 @@ import pytest
 
 from carom import (
     AABBCollider,
+    CaromError,
     Physics,
     RigidBody,
     Rollback,
@@ -96,7 +97,6 @@ def test_worlds_that_differ_are_found_out():
 
 
 @pytest.mark.plain
-@pytest.mark.plain
 @pytest.mark.parametrize("where", ["apply", "step"])
 @pytest.mark.parametrize("at", [0, 3, 4, 7])
 def test_what_raises_is_played_once_more(where, at):
@@ -167,15 +167,13 @@ def test_it_waits_for_the_slowest_and_ignores_gaps():
     rollback.give(1, 0, [0.0, 0.0, 0.5])
     assert rollback.step()
     assert (rollback.confirmed, rollback.frame, rollback.replayed) == (3, 4, 1)
-    for wrong in ({"players": 0}, {"most": 0}):
-        with pytest.raises(ValueError, match="Rollback needs"):
-            Rollback(world, apply, **wrong)
 
 
 @pytest.mark.plain
 @pytest.mark.parametrize(("wrong", "told"), [
-    ((2, 0, [1]), "from 0 to 1, got 2"), ((-1, 0, [1]), "from 0 to 1, got -1"), ((0, -1, [1]), "at least 0, got -1"),
-    ((0, 0.5, [1]), "'float'"), ((0, 0, 5), "'int' object is not iterable"),
+    ((2, 0, [1]), "from 0 to 1, got 2"), ((-1, 0, [1]), "player must be .* from 0, got -1"),
+    ((0, -1, [1]), "frame must be a whole number from 0, got -1"), ((0, 0.5, [1]), "frame must .*, got 0.5"),
+    (("0", 0, [1]), "player must be .* got '0'"), ((0, 0, 5), "inputs must be a list, one for each frame, got 5"),
     ((0, 0, [0.5, np.zeros(2)]), r"do not, got array\(\[0., 0.\]\)"),
     ((0, 0, [0.5, 0.5, (0.5, np.zeros(2))]), "do not, got .0.5, array"),
 ])  # fmt: skip
@@ -189,3 +187,47 @@ def test_what_cannot_be_an_input_is_refused_at_once(wrong, told):
     assert [rollback.inputs(player) for player in (0, 1)] == [[], []]
     rollback.settle()
     assert rollback.replayed == 0
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize(("wrong", "told"), [
+    ({"players": 0}, "players must be a whole number from 1, got 0"), ({"players": 2.5}, "players .* got 2.5"),
+    ({"players": "2"}, "players .* got '2'"), ({"players": True}, "players .* got True"),
+    ({"most": 0}, "most must be a whole number from 1, got 0"), ({"most": 2.5}, "most .* got 2.5"),
+    ({"most": "a"}, "most .* got 'a'"), ({"apply": None}, "apply must be callable, got None"),
+    ({"world": None}, "world must be a World, got None"),
+])  # fmt: skip
+def test_what_it_cannot_be_made_of_is_named(wrong, told):
+    world, apply = game()
+    with pytest.raises((ValueError, TypeError), match=f"Rollback: {told}"):
+        Rollback(**{"world": world, "apply": apply, **wrong})
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("wrong", [("a", "x"), (None, "x"), (-3, "x"), (0.5, "x"), (0, None), (0, 7)])
+def test_what_is_no_checksum_of_a_frame_is_named(wrong):
+    rollback = Rollback(*game())
+    name, value = ("frame", wrong[0]) if wrong[0] != 0 else ("checksum", wrong[1])
+    with pytest.raises((ValueError, TypeError), match=rf"Rollback\.differs: {name} must be .*, got {value!r}"):
+        rollback.differs(*wrong)
+
+
+@pytest.mark.plain
+@pytest.mark.parametrize("call", ["step", "settle", "checksum"])
+def test_apply_takes_no_step_itself(call):
+    """Told so; the frame is played by the next call."""
+    world, apply = game()
+    calls = [call]
+
+    def steps(inputs):
+        apply(inputs)
+        if calls:
+            getattr(rollback, calls.pop())()
+
+    rollback = Rollback(world, steps)
+    before = world.state_hash()
+    with pytest.raises(CaromError, match="Rollback: apply, and what is in a step, must not call step"):
+        rollback.step()
+    assert (rollback.frame, world.state_hash()) == (0, before)
+    assert rollback.step()
+    assert rollback.frame == 1
