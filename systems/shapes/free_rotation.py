@@ -20,7 +20,7 @@ from .convex.gjk import norm
 from .quaternions import product
 
 JACOBI_SWEEPS = 16  # of Jacobi rotations: each squares what is off the diagonal
-SPHERICAL = 1e-24  # square of the sine between momentum and angular velocity: less is none
+SPHERICAL = 1e-16  # square of the sine between momentum and angular velocity: less tells rounding, and gains no energy
 DIAGONAL = 1e-15  # of the trace: what is off the diagonal by less is rounding
 SMALL_TURN, NO_TURN = 1e-4, 1e-12  # rad: by what unlike moments add splitting is right; by that little they are alike
 MOST_MEANS, SAME_MEANS = 16, 1e-8  # of each other: the next arithmetic and geometric mean are the same number
