@@ -30,6 +30,8 @@ CHUNK = Schema(
     other=floats(unit="N s"),
     pull=vectors(apart=True, unit="N s"),  # along the surface at these
     other_pull=vectors(apart=True, unit="N s"),
+    third_pull=vectors(apart=True, unit="N s"),
+    fourth_pull=vectors(apart=True, unit="N s"),
     way=vectors(apart=True, unit="m"),  # of the second body since the step began, as the first one sees it
     turn_a=vectors(apart=True, flat=1, unit="rad"),
     turn_b=vectors(apart=True, flat=1, unit="rad"),

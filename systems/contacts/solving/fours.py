@@ -129,54 +129,71 @@ def most_moved(solver, p, n, arm_a, arm_b):
 
 
 @inlined
+def twisted_by(one, two, three, four, pulls):
+    """The torque of four impulses at the ends of four arms."""
+    a, b, c, d = pulls
+    return add(add(twist(one, a), twist(two, b)), add(twist(three, c), twist(four, d)))
+
+
+@inlined
+def pulled_at(pull, turn, arm, share, limit):
+    """What a point with a share of the load pulls, at an arm from the middle of the loads: no more than friction can.
+    pull, turn: what all would pull together, as one force and one turn."""
+    here = add(pull, cross_spin(turn, arm))
+    square = dot(here, here)
+    return scale(here, share * (limit / math.sqrt(square) if square > limit * limit else 1.0))
+
+
+@inlined
+def square_at(pull, turn, arm, push):
+    """How much one would pull there, squared, if it pushes."""
+    here = add(pull, cross_spin(turn, arm))
+    return dot(here, here) if push > 0.0 else 0.0
+
+
+@inlined
 def rub_four(solver, p, stride, motion, runs):
-    """The motion after the friction of four points of a pair, of which p is the first row. What slides there is seen
-    from the middle of their loads as one speed and one turn, and against that all pull at once, each by its load: by so
-    much as stops both, or where some would pull more than friction can, so that it is against what slides there."""
-    push, arms_a, arms_b, pulls = solver.impulse, solver.arm_a, solver.arm_b, solver.tangent
-    load = limit = pulled = inertia = most = 0.0
-    n = arm_a = arm_b = old = torque = scale(solver.normal[p], 0.0)
-    for e in range(4):
-        k = p + e * stride
-        load, limit, pulled = load + push[k], limit + solver.friction[k] * push[k], pulled + dot(pulls[k], pulls[k])
-    if limit + pulled == 0.0:
-        return motion
-    for e in range(4):
-        k = p + e * stride
-        w = push[k] / load if load > 0.0 else 0.0  # 1 where no other one pushes: there is no turn
-        n, old, torque = add_scaled(n, solver.normal[k], w), add(old, pulls[k]), add(torque, twist(arms_a[k], pulls[k]))
-        arm_a, arm_b = add_scaled(arm_a, arms_a[k], w), add_scaled(arm_b, arms_b[k], w)
-    each = 1.0 / load if load > 0.0 else 0.0
-    for e in range(4):
-        away = sub(arms_a[p + e * stride], arm_a)
-        inertia += each * push[p + e * stride] * dot(away, away)
-    (v_a, s_a, v_b, s_b), slip = motion, parting_at(motion, arm_a, arm_b)
+    """(motion, impulses) after the friction of four points of a pair, of which p is the first row. What slides there
+    is seen from the middle of their loads as one speed and one turn, and against that all pull at once, each by its
+    load: by so much as stops both, or where some would pull more than friction can, so that it is against what slides
+    there. Without a branch, so that several pairs are solved together."""
+    k, m, o, n = p + stride, p + 2 * stride, p + 3 * stride, solver.normal[p]
+    push, at, pulls, (v_a, s_a, v_b, s_b) = solver.impulse, solver.arm_a, solver.tangent, motion
+    load = (push[p] + push[k]) + (push[m] + push[o])
+    whole, limit = load if load > 0.0 else 1.0, solver.friction[p] * load
+    shares = push[p] / whole, push[k] / whole, push[m] / whole, push[o] / whole  # 1 if no other pushes: no turn
+    arm_a = combined(at[p], at[k], at[m], at[o], shares)
+    arm_b = combined(solver.arm_b[p], solver.arm_b[k], solver.arm_b[m], solver.arm_b[o], shares)
+    a, b, c, d = sub(at[p], arm_a), sub(at[k], arm_a), sub(at[m], arm_a), sub(at[o], arm_a)
+    before = pulls[p], pulls[k], pulls[m], pulls[o]
+    old = combined(before[0], before[1], before[2], before[3], (1.0, 1.0, 1.0, 1.0))
+    torque = twisted_by(a, b, c, d, before)
+    inertia = shares[0] * dot(a, a) + shares[1] * dot(b, b) + (shares[2] * dot(c, c) + shares[3] * dot(d, d))
+    slip = parting_at(motion, arm_a, arm_b)
     if len(runs) > 0:
         slip = add(slip, solver.surface_slip[p])
     (x_a, x_b), slip, turns = spun(solver, p, n, n), add_scaled(slip, n, -dot(slip, n)), dot(sub(s_b, s_a), n)
     moved, turned = most_moved(solver, p, n, arm_a, arm_b), inertia * (dot(n, x_a) + dot(n, x_b))
-    twisted = dot(sub(torque, twist(arm_a, old)), n)
+    twisted = dot(torque, n)
     bound = max(inertia * limit, abs(twisted) * math.sqrt(inertia))  # loads that move leave less of it
     twisted = twisted * limit / bound if bound > 0.0 else 0.0
-    pull, turn = add_scaled(old, slip, -1.0 / moved), scale(n, twisted - (turns / turned if turned > 0.0 else 0.0))
-    for e in range(4):
-        here = add(pull, cross_spin(turn, sub(arms_a[p + e * stride], arm_a)))
-        most = max(most, dot(here, here) if push[p + e * stride] > 0.0 else 0.0)
-    if most > limit * limit:
-        by = 1.0 / max(moved, turned)
-        pull, turn = add_scaled(old, slip, -by), scale(n, twisted - by * turns)
-    new = twists = scale(n, 0.0)
-    for e in range(4):
-        k = p + e * stride
-        here = add(pull, cross_spin(turn, sub(arms_a[k], arm_a)))
-        square = dot(here, here)
-        here = scale(here, each * push[k] * (limit / math.sqrt(square) if square > limit * limit else 1.0))
-        pulls[k] = here
-        new, twists = add(new, here), add(twists, twist(arms_a[k], here))
-    more, less = sub(twists, torque), sub(new, old)
-    x_a, x_b = spun(solver, p, more, add(more, twist(sub(arm_b, arm_a), less)))
+    stops, stays = 1.0 / moved, 1.0 / turned if turned > 0.0 else 0.0
+    pull, turn = add_scaled(old, slip, -stops), scale(n, twisted - stays * turns)
+    most = max(square_at(pull, turn, a, push[p]), square_at(pull, turn, b, push[k]))
+    most = max(most, max(square_at(pull, turn, c, push[m]), square_at(pull, turn, d, push[o])))
+    slides = most > limit * limit
+    by = 1.0 / max(moved, turned)
+    stops, stays = by if slides else stops, by if slides else stays
+    pull, turn = add_scaled(old, slip, -stops), scale(n, twisted - stays * turns)
+    new = (
+        pulled_at(pull, turn, a, shares[0], limit), pulled_at(pull, turn, b, shares[1], limit),
+        pulled_at(pull, turn, c, shares[2], limit), pulled_at(pull, turn, d, shares[3], limit),
+    )  # fmt: skip
+    less = sub(combined(new[0], new[1], new[2], new[3], (1.0, 1.0, 1.0, 1.0)), old)
+    more = sub(twisted_by(a, b, c, d, new), torque)
+    x_a, x_b = spun(solver, p, add(more, twist(arm_a, less)), add(more, twist(arm_b, less)))
     v_a, v_b = add_scaled(v_a, less, -solver.mass_a[p]), add_scaled(v_b, less, solver.mass_b[p])
-    return v_a, sub(s_a, x_a), v_b, add(s_b, x_b)
+    return (v_a, sub(s_a, x_a), v_b, add(s_b, x_b)), new
 
 
 @inlined
@@ -196,7 +213,15 @@ def solve_rows_of_four(solver, chunk, bias, softly, layout, runs):
         p = start + q
         store_motion(chunk, q, solve_rest(solver, p, stride, chunk_motion(chunk, q), bias, softly))
         spread_load(solver, p, stride)
-        store_motion(chunk, q, rub_four(solver, p, stride, chunk_motion(chunk, q), runs))
+    for q in range(pairs):
+        motion, pulls = rub_four(solver, start + q, stride, chunk_motion(chunk, q), runs)
+        chunk.pull[q], chunk.other_pull[q], chunk.third_pull[q], chunk.fourth_pull[q] = pulls
+        store_motion(chunk, q, motion)
+    pulls = solver.tangent
+    for q in range(pairs):
+        k = start + q
+        pulls[k], pulls[k + stride] = chunk.pull[q], chunk.other_pull[q]
+        pulls[k + 2 * stride], pulls[k + 3 * stride] = chunk.third_pull[q], chunk.fourth_pull[q]
 
 
 @packed
