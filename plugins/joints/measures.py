@@ -149,10 +149,12 @@ def borne(record: Any, rows: Any, dimensions: int, dt: float) -> dict[str, np.nd
     impulses, torques = _given(record, rows)
     if len(starts):
         impulses, torques = np.add.reduceat(impulses, starts), np.add.reduceat(torques, starts)
-    force, turn = (np.linalg.norm(done, axis=1) / dt for done in (impulses, torques))
-    load = np.maximum(force / record.breaking_force[rows][starts], turn / record.breaking_torque[rows][starts])
+    loads = []
+    for done, most in ((impulses, record.breaking_force), (torques, record.breaking_torque)):
+        force, most = np.linalg.norm(done, axis=1) / dt, most[rows][starts]
+        loads.append(np.divide(force, most, out=np.zeros_like(force), where=most < np.inf))
     torque = torques[:, 0] if dimensions == 2 else torques
-    return {"entity": record.joint[rows][starts], "impulse": impulses, "torque": torque, "load": load}
+    return {"entity": record.joint[rows][starts], "impulse": impulses, "torque": torque, "load": np.maximum(*loads)}
 
 
 def _given(record: Any, rows: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -160,5 +162,5 @@ def _given(record: Any, rows: Any) -> tuple[np.ndarray, np.ndarray]:
     kind, total = record.kind[rows, None], record.total[rows, None]
     along, given = total * record.normal[rows], kind == CUSTOM
     impulse = np.where(kind == POINT, record.thrust[rows], np.where((kind < TURN) | given, along, 0.0))
-    turned = np.where(given, total * record.turn_b[rows], along)
+    turned = total * np.where(given, record.turn_b[rows], record.normal[rows])
     return impulse, np.where(kind >= TURN, turned, 0.0)
