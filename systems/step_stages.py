@@ -48,7 +48,7 @@ def keep_state(state, dt):
 
     If nothing changes the velocity before keep_start, start_velocity has it too.
     """
-    bodies, pairs, impacts = state.bodies, state.pairs, state.impacts
+    bodies, pairs, impacts, first = state.bodies, state.pairs, state.impacts, state.first
     state.unforced, state.pushed, state.moved, state.has_parts = False, True, False, False
     state.forces_summed = state.candidates_ready = state.contacts_ready = False
     state.event_count, state.flight_usual = 0, False
@@ -58,11 +58,11 @@ def keep_state(state, dt):
     state.row_a, state.unsound = NOTHING_TESTED, 0
     state.all_still, state.sleep_stages = False, 0
     state.kept_rows = state.moving if state.collides and state.boxed_version == state.statics_version else state.count
-    state.kept, state.kept_first = OPENED, state.first
-    state.force_first = 0 if state.others_write or state.has_force_systems or state.pushes else state.first
+    state.kept, state.kept_first = OPENED, first
+    state.force_first = 0 if state.others_write or state.has_force_systems or state.pushes else first
     if not state.others_write and (state.collides or len(bodies.max_linear_speed) > 0):
         state.kept |= KEEPS_VELOCITY
-        for i in range(state.first, state.moving):
+        for i in range(first, state.moving):
             bodies.kept_velocity[i] = bodies.linear_velocity[i]
     state.warm_start.before, state.contacts.before = state.warm_start.now, state.contacts.now
     return OK

@@ -53,17 +53,17 @@ def keep_pair(state, j, found):
 @part
 def add_pair(state, a, b, found, dt):
     """A candidate becomes pair ``found``; how it stands at the end is not known yet."""
-    new = state.merged
+    new, is_solid = state.merged, state.merged.is_solid
     new.a[found], new.b[found] = a, b
-    new.is_solid[found] = is_solid_pair(state, a, b)
+    is_solid[found] = is_solid_pair(state, a, b)
     new.near_contact[found], new.crossed[found], new.disabled[found] = True, False, False
     new.early[found], new.impulse[found] = False, 0.0
     new.normal[found] = new.point[found] = zero_of(state)
     forget_manifold(new, found)
-    if new.is_solid[found]:
+    if is_solid[found]:
         path, now = relative_path(state, a, b), state.impacts.until
         if not one_way_holds(state, a, b, along(path, now), along(path, dt), -1.0):
-            new.is_solid[found], new.disabled[found] = False, True
+            is_solid[found], new.disabled[found] = False, True
             new.disabled_count += 1
 
 
@@ -102,7 +102,7 @@ def merge_pairs(state, dt):
     """Join two lists in canonical order: candidates whose layers meet, and the pairs that something has come of. New
     candidates are searched for impacts."""
     candidates, old, new, rank = state.candidates, state.pairs, state.merged, state.bodies.rank
-    impacts = state.impacts
+    impacts, place = state.impacts, state.pairs.place
     mark_kept(state)
     new.disabled_count = old.disabled_count
     if state.ranks_version != state.version:
@@ -115,12 +115,12 @@ def merge_pairs(state, dt):
         if j < old.count:
             old_key = rank[old.a[j]] * n + rank[old.b[j]]
         if old_key <= new_key:
-            if old.place[j] == SURVIVED:
+            if place[j] == SURVIVED:
                 keep_pair(state, j, found)
             elif old_key == new_key:
                 add_pair(state, old.a[j], old.b[j], found, dt)
-                old.place[j] = found
-            found += 1 if old.place[j] >= 0 else 0
+                place[j] = found
+            found += 1 if place[j] >= 0 else 0
             i += 1 if old_key == new_key else 0
             j += 1
             continue

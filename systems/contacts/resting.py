@@ -350,17 +350,18 @@ def find_surface_slips(state):
 
 def linearise(state, dt):
     """Of each contact at rest the normal and the gap where the step starts, and what the solver needs of its bodies."""
-    pairs, bodies, solver, has_friction = state.pairs, state.bodies, state.solver, False
+    pairs, bodies, solver, normals = state.pairs, state.bodies, state.solver, state.pairs.normal
+    has_friction = False
     for r in range(solver.contacts):  # in the order of the pairs, for the caches
         if solver.point[r] > 0:  # as the first of the pair
             continue
         c = solver.pair[r]
         a, b, parting = pairs.a[c], pairs.b[c], pairs.parting[c]
         extent, d = smaller_extent(bodies, a, b), centre_offset_at_start(bodies, a, b)
-        slop, end, struck_along = slop_for(state, extent), centre_offset(bodies, a, b), pairs.normal[c]
+        slop, end, struck_along = slop_for(state, extent), centre_offset(bodies, a, b), normals[c]
         if not is_at_manifold(pairs, c, d, extent):
             make_manifold(state, c, d)
-        gap, normal = -depth_by_plane(pairs, c, d), pairs.normal[c]
+        gap, normal = -depth_by_plane(pairs, c, d), normals[c]
         apart, convex = gap > REST_GAP * extent, both_convex(state, bodies.shape[a], bodies.shape[b])
         varies = not convex and normal_varies(state, a, b, d, normal)
         way, struck = sub(end, d), bodies.impact_count[a] + bodies.impact_count[b] > 0
@@ -381,7 +382,7 @@ def linearise(state, dt):
         if bounced and dot(normal, struck_along) <= 0.0:
             normal = struck_along  # coincident centres have parted: not back again
             forget_manifold(pairs, c)
-        pairs.normal[c] = normal
+        normals[c] = normal
         if apart and state.spinning and is_ball(state, a, normal) and is_ball(state, b, normal):
             apart = False  # neither has a corner to slide past
         # After an impact at time t the body seems to come from dv t behind: no overlap to be pushed out.

@@ -228,8 +228,8 @@ def solve_group_friction(state, count):
 
     Bodies are taken to be split among their impacts, so that these together never do more than stop what slides.
     """
-    impacts, pairs, rubs = state.impacts, state.pairs, False
-    inverse_mass, group, member = state.bodies.inverse_mass, impacts.group, impacts.member
+    impacts, pairs, bodies, rubs = state.impacts, state.pairs, state.bodies, False
+    inverse_mass, group, member = bodies.inverse_mass, impacts.group, impacts.member
     for g in range(count):
         m = group[g]
         c = impacts.event_pair[member[m]]
@@ -242,14 +242,14 @@ def solve_group_friction(state, count):
             arms = normal, normal
             if state.spinning:
                 arms = arms_of(state, member[m])
-                w = add(w, velocity_by_spin(state.bodies, a, b, arms))
+                w = add(w, velocity_by_spin(bodies, a, b, arms))
             sliding = add_scaled(w, normal, -dot(w, normal))
             fast, light = length(sliding), 0.0
             for side in range(2 if fast > 0.0 else 0):
                 i, arm, turning = (a, arms[0], 0.0) if side == 0 else (b, arms[1], 0.0)
                 entry = impacts.first_member[owner_of(state, i)]
                 if state.spinning:
-                    turning = compliance(state.bodies, i, arm, divided(sliding, fast))
+                    turning = compliance(bodies, i, arm, divided(sliding, fast))
                 while entry >= 0:
                     light, entry = light + inverse_mass[i] + turning, impacts.next_member[entry]
             if fast > 0.0:

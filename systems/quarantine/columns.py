@@ -23,10 +23,10 @@ def are_allowed(checked, start, stop):
 def is_column_sound(state, checked):
     """Whether all rows of a column hold what the field allows, static ones if they may have changed; those of bodies
     without the component do not count."""
-    values, owned, width, sound = checked.values, checked.owned, checked.width, True
-    start = state.moving if checked.rows == STATIC_ROWS else 0
-    stop = state.dynamic if checked.rows == DYNAMIC_ROWS else state.moving
-    if checked.rows != DYNAMIC_ROWS and (checked.statics or state.read_version != state.statics_version):
+    values, owned, width, rows, sound = checked.values, checked.owned, checked.width, checked.rows, True
+    start = state.moving if rows == STATIC_ROWS else 0
+    stop = state.dynamic if rows == DYNAMIC_ROWS else state.moving
+    if rows != DYNAMIC_ROWS and (checked.statics or state.read_version != state.statics_version):
         stop = state.count
     if checked.least == 0.0 and are_allowed(checked, start * width, stop * width):
         return True

@@ -53,6 +53,23 @@ def test_towers_do_not_hop_as_steps_get_shorter(seed):
             assert heights(world, ids)[-1] < 9.5
 
 
+@pytest.mark.parametrize("turns", [False, True])
+@pytest.mark.parametrize("times", [2, 5, 10])
+def test_one_long_step_lets_no_tower_sink(times, turns):
+    """Of ten, which the next steps bear as before: no more than .01 of a box."""
+    plugins, kind = ([Rotation()], {"maker": turning_box, "half": (0.5, 0.5)}) if turns else ([], {})
+    with World(Physics(2, gravity=(0.0, -G)), *plugins) as world:
+        floor(world)
+        ids = tower(world, 10, **kind)
+        run(world, 120)
+        world.settings = world.settings.replace(dt=times / 60)
+        world.step()
+        world.settings = world.settings.replace(dt=1 / 60)
+        for _ in range(60):
+            world.step()
+            assert overlaps(world, ids).max() < 0.01
+
+
 @pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
 @pytest.mark.parametrize(("e", "deepest"), [(0.0, 0.07), (0.5, 0.016), (0.9, 0.015)])
 @both_dimensions

@@ -20,7 +20,7 @@ from .rows import compute_effective_mass, rotate_body
 @part
 def cap_mass_ratio(solver, t, dt, span, arms):
     """Cap the masses of island t at what it can carry with MOST_REPEATS."""
-    least = solver.lightest[t] / solver.load_share[t]
+    least, mass = solver.lightest[t] / solver.load_share[t], solver.solver_mass
     solver.mass_of[t] = solver.force_of[t] = 0.0
     for q in range(span[2], span[3]):
         by = solver.inverse_mass[q] / least
@@ -31,9 +31,9 @@ def cap_mass_ratio(solver, t, dt, span, arms):
                 solver.inverse_inertia[q] = scale(solver.inverse_inertia[q], 1.0 / by)
                 solver.inverse_products[q] = scale(solver.inverse_products[q], 1.0 / by)
                 solver.inverse_moments[q] = scale(solver.inverse_moments[q], 1.0 / by)
-            solver.inverse_mass[q], solver.solver_mass[q] = least, 1.0 / least
-        solver.mass_of[t] += solver.solver_mass[q]
-        solver.force_of[t] += solver.solver_mass[q] * length(solver.acceleration[q]) * dt
+            solver.inverse_mass[q], mass[q] = least, 1.0 / least
+        solver.mass_of[t] += mass[q]
+        solver.force_of[t] += mass[q] * length(solver.acceleration[q]) * dt
     for k in range(span[0], span[1]):
         compute_effective_mass(solver, k, arms)
 

@@ -16,10 +16,7 @@ from ...narrow_phase.manifolds import is_of_pair, skip_before
 from ...parts.rows import owner_of
 from ...parts.stages import copy_prediction_to_parts
 from ...records import CURVES, PREDICTED
-from .warm_start import find_rows, scale_to
-
-STIFFENS = 0.1  # s per s by which the period of springs falls where steps get shorter: what long ones let sink in has
-# time to come up, and is not thrown
+from .warm_start import FOLLOWS, find_rows, scale_to
 
 
 @part
@@ -96,7 +93,7 @@ def predict_rest(state, dt):
     """
     bodies, memory = state.bodies, state.warm_start
     state.any_warm_started = False
-    state.solver.joints.period = max(dt, memory.period[memory.now] - STIFFENS * dt) / state.substeps
+    state.solver.joints.period = max(dt, memory.period[memory.now] - FOLLOWS * dt) / state.substeps
     forget_support(state)
     if not may_support(state):
         return OK

@@ -19,6 +19,9 @@ from ..constants import NEGLIGIBLE, SAME_PLACE_EXTENTS, WARM_START_MAX
 from .guard import island_of
 from .records import WARM_START_ROWS
 
+FOLLOWS = 0.1  # s per s by which the period of springs follows the length of steps: what long ones let sink in has
+# time to come up, and is not thrown
+
 
 @part
 def scale_to(state, dt):
@@ -133,6 +136,7 @@ def store_warm_start(state, dt):
         memory.place[new, count] = solver.place[k] if state.spinning else nowhere
         count += 1
     memory.counts[new], memory.rows_version[new] = count, state.version
-    memory.step[new], memory.period[new] = dt, solver.joints.period * state.substeps
+    most = memory.period[memory.now] + FOLLOWS * dt  # one long step alone lets nothing sink in
+    memory.step[new], memory.period[new] = dt, min(solver.joints.period * state.substeps, most)
     memory.now = new
     return OK
