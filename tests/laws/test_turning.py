@@ -383,3 +383,19 @@ def test_a_pad_that_turns_as_it_slides_is_slowed_at_each_corner(ahead):
             seen, turns = motion(world, pad)
             assert turns[1] == pytest.approx(w, abs=0.05)
             assert np.linalg.norm(seen) == pytest.approx(np.linalg.norm(v), abs=0.01)
+
+
+def test_where_the_middle_of_a_floor_is_changes_nothing():
+    """A box that is thrown on a slab in space lands, lifts and rubs the same if the slab's middle is 50 m away."""
+    ends = []
+    for middle in (0.0, 50.0):
+        with turning_world(3, G) as world:
+            wall(world, (middle, -1.0, 0.0), (200.0, 1.0, 200.0), friction=1.0)
+            thrown, half, pushed = [], (0.4, 0.3, 0.2), (0.5, 0.0, 0.3)
+            for k in range(8):
+                place, pose = (3.0 * k, 1.0, 0.0), (1.0, 0.1 * k, 0.3, 0.2)
+                thrown.append(box(world, place, half, pushed, (1.0, 2.0, k), pose, friction=1.0))
+            for _ in range(120):
+                world.step()
+            ends.append(world.bodies.position[[world.bodies.row_of(one) for one in thrown]].copy())
+    np.testing.assert_allclose(ends[1], ends[0], atol=1e-6)

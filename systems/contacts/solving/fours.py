@@ -160,8 +160,9 @@ def rub_four(solver, p, stride, motion, runs):
     k, m, o, n = p + stride, p + 2 * stride, p + 3 * stride, solver.normal[p]
     push, at, pulls, (v_a, s_a, v_b, s_b) = solver.impulse, solver.arm_a, solver.tangent, motion
     load = (push[p] + push[k]) + (push[m] + push[o])
-    whole, limit = load if load > 0.0 else 1.0, solver.friction[p] * load
-    shares = push[p] / whole, push[k] / whole, push[m] / whole, push[o] / whole  # 1 if no other pushes: no turn
+    # 1 if no other one pushes: there is no turn. Where none does what they have pulled goes, about their middle.
+    whole, even, limit = load if load > 0.0 else 1.0, 0.0 if load > 0.0 else 0.25, solver.friction[p] * load
+    shares = push[p] / whole + even, push[k] / whole + even, push[m] / whole + even, push[o] / whole + even
     arm_a = combined(at[p], at[k], at[m], at[o], shares)
     arm_b = combined(solver.arm_b[p], solver.arm_b[k], solver.arm_b[m], solver.arm_b[o], shares)
     a, b, c, d = sub(at[p], arm_a), sub(at[k], arm_a), sub(at[m], arm_a), sub(at[o], arm_a)
