@@ -350,8 +350,7 @@ def find_surface_slips(state):
 
 def linearise(state, dt):
     """Of each contact at rest the normal and the gap where the step starts, and what the solver needs of its bodies."""
-    pairs, bodies, solver, normals = state.pairs, state.bodies, state.solver, state.pairs.normal
-    has_friction = False
+    pairs, bodies, solver, normals, has_friction = state.pairs, state.bodies, state.solver, state.pairs.normal, False
     for r in range(solver.contacts):  # in the order of the pairs, for the caches
         if solver.point[r] > 0:  # as the first of the pair
             continue

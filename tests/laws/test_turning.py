@@ -307,23 +307,25 @@ def upright(seed):
     return (wide, wide / mu * random.uniform(0.8, 1.3)), random.uniform(-0.1, 0.1), mu
 
 
+def check_rest(boxes, mode, seconds):
+    """They creep and turn no more."""
+    for half, tilt, mu in boxes:
+        _, crept, spin = stands(half, tilt, mu, mode, seconds)
+        assert crept < 1e-6
+        assert spin < 1e-6
+
+
 @pytest.mark.parametrize("mode", MODES)
 def test_an_upright_box_comes_to_rest_where_it_stands(mode):
     """The friction of one corner came before that of the other: it rocked on at .025 rad/s and crept towards -x, by up
     to 3 mm/s, a third of these for ever."""
-    for half, tilt, mu in (((0.278, 0.612), 0.0011, 0.5), *(upright(seed) for seed in range(8))):
-        _, crept, spin = stands(half, tilt, mu, mode, 10)
-        assert crept < 1e-6
-        assert spin < 1e-6
+    check_rest((((0.278, 0.612), 0.0011, 0.5), *map(upright, range(8))), mode, 10)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("mode", MODES)
 def test_any_upright_box_comes_to_rest(mode):
-    for seed in range(100, 500):
-        _, crept, spin = stands(*upright(seed), mode, 15)
-        assert crept < 1e-6
-        assert spin < 1e-6
+    check_rest(map(upright, range(100, 500)), mode, 15)
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -346,19 +348,13 @@ def upright_in_space(seed):
 def test_an_upright_box_comes_to_rest_in_space(mode):
     """One in ten rocked on, at up to .03 rad/s, also about a long face, and crept by up to .7 mm/s: of four points
     friction was solved one after the other, and what the last two left of the first was left."""
-    for seed in range(16):
-        _, crept, spin = stands(*upright_in_space(seed), mode, 20)
-        assert crept < 1e-6
-        assert spin < 1e-6
+    check_rest(map(upright_in_space, range(16)), mode, 20)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("mode", MODES)
 def test_any_upright_box_comes_to_rest_in_space(mode):
-    for seed in range(100, 500):
-        _, crept, spin = stands(*upright_in_space(seed), mode, 20)
-        assert crept < 1e-6
-        assert spin < 1e-6
+    check_rest(map(upright_in_space, range(100, 500)), mode, 20)
 
 
 @pytest.mark.parametrize("ahead", [0.0, 1.0, 3.0])
